@@ -36,7 +36,7 @@ import swgjoint
 from swgjoint.bench.scaling.joint import chain_model
 from swgjoint.drives.build_map import build_map
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.stress import SolidMaxima
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
@@ -149,8 +149,8 @@ small = swgjoint.Design.load("reference-3d-modified").with_changes(
 
 def run_in_space():
     """As many positions as a profile needs."""
-    ring = solid_ring(small, half=True)
-    follow = SolidContinuation(ring=ring, ratio=small.ratio)
+    ring = solid_sector_model(small, half=True)
+    follow = SolidContinuation(model=ring, ratio=small.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 5.0)
     state = follow.to_angle(state, 0.5 * np.pi / 42)
     assert state.outcome.ok
@@ -160,8 +160,8 @@ def run_in_space():
 times = profiled(run_in_space)
 whole = max(times.values())
 space = {
-    "condensation of sectors": seconds(times, "drive3d.py", "solid_ring"),
-    "ring: factorise, solve": seconds(times, "solid/equilibrium.py", "_solve_ring"),
+    "condensation of sectors": seconds(times, "drive3d.py", "solid_sector_model"),
+    "ring: factorise, solve": seconds(times, "solid/equilibrium.py", "_solve_sectors"),
     "frames and tangents": seconds(times, "solid/linearise.py", "linearise"),
     "search of tooth contact": seconds(times, "solid/teeth.py", "find"),
     "stresses": seconds(times, "solid/stress.py", "at"),

@@ -33,7 +33,7 @@ import matplotlib.pyplot as plt
 
 import swgjoint
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.elasticity import stress_maxima
 from swgjoint.fe.plane.stress import flexspline_stress
 from swgjoint.fe.solid.strip.masters import Orders
@@ -183,7 +183,7 @@ stored = next(r for r in replays if r["state"] == "elliptical")
 design = swgjoint.Design.load("reference-2d").with_changes(
     {"mesh.refinement": stored["ours_refinement"]}
 )
-model = ring_model(design, half=True, elastic_circular_spline=False)
+model = sector_model(design, half=True, elastic_circular_spline=False)
 state = Continuation(model=model, ratio=design.ratio).deflect()
 tensile, _, _ = stress_maxima(flexspline_stress(model, state))
 print(f"{tensile.max() / 1e6:.2f} MPa now, {stored['root_ours_MPa']:.2f} MPa stored")

@@ -15,11 +15,11 @@ import pytest
 from swgjoint.fe.common import complementarity
 from swgjoint.fe.plane import newton_step
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.solid import condensation
 from swgjoint.fe.solid import equilibrium as solid_equilibrium
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.gear.design.design import Design
 
 PITCH = 2.0 * np.pi / 122
@@ -96,7 +96,7 @@ def path(follow, torque, angle):
 def plane():
     """Half of the reference drive on a coarse mesh."""
     design = Design.load("reference-2d").with_changes({"mesh.refinement": 0.5})
-    model = ring_model(design, half=True)
+    model = sector_model(design, half=True)
     return Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
 
 
@@ -160,20 +160,22 @@ def small_solid():
             "mesh.refinement": 0.5,
         }
     )
-    return SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
+    return SolidContinuation(
+        model=solid_sector_model(design, half=True), ratio=design.ratio
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.fe
 def test_solid_iterations_and_factorisations(small_solid, counter):
     """One factorisation and one complementarity problem an iteration."""
-    counter.watch(condensation, "RingFactor")
+    counter.watch(condensation, "DenseCyclicFactor")
     counter.watch(solid_equilibrium, "solve_mixed")
     counter.watch(complementarity, "_solve_active")
     iterations, _ = path(small_solid, 5.0, 0.25 * 2.0 * np.pi / 42)
     made = counter.taken()
-    assert near(made["RingFactor"], SOLID_FACTORISATIONS)
+    assert near(made["DenseCyclicFactor"], SOLID_FACTORISATIONS)
     assert near(made["_solve_active"], SOLID_ACTIVE_SETS)
     # the deflection has no tooth contact, the search knows no other system
-    assert made["RingFactor"] - made["solve_mixed"] == iterations[0]
-    assert made["RingFactor"] >= sum(iterations)
+    assert made["DenseCyclicFactor"] - made["solve_mixed"] == iterations[0]
+    assert made["DenseCyclicFactor"] >= sum(iterations)

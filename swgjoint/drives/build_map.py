@@ -43,7 +43,7 @@ def build_map(
         angles: Number of wave-generator positions over one pitch of the fixed member
             (for ``ring``: of ball positions over one ball passage); None takes the
             default of :func:`swgjoint.fe.common.sampling.sample_map` or
-            :func:`swgjoint.fe.rings.sampling.sample_rings`.
+            :func:`swgjoint.fe.rings.sampling.sample_thin_rings`.
         progress: Called with the stage, the number of finished solves and their total.
         cache: Whether to read and write the map cache. With the cache, an interrupted
             computation resumes where it stopped, with bit-identical results.
@@ -73,7 +73,7 @@ def build_map(
             hint = "takes about 20 min; 2d and ring are faster"
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
-            samples = thin_ring.sample_rings(
+            samples = thin_ring.sample_thin_rings(
                 design, angles=angles, progress=progress, keep=keep
             )
             return _without_losses(design, fit_map(samples))

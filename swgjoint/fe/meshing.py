@@ -11,8 +11,8 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import Half, can_halve, check_modelled, ring_model
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.drive2d import Half, can_halve, check_modelled, sector_model
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima
 from swgjoint.gear.catalogue import ratings_of
@@ -93,13 +93,13 @@ def simulate_meshing(
         )
     check_modelled(design, model)
     begin = time.perf_counter()
-    ring = ring_model(
+    drive = sector_model(
         design,
         half=half,
         nonlinear=nonlinear,
         elastic_circular_spline=elastic_circular_spline,
     )
-    follow = Continuation(model=ring, ratio=design.ratio, layout=design.drive.layout)
+    follow = Continuation(model=drive, ratio=design.ratio, layout=design.drive.layout)
     series = series_compliance(design, cup=True)
 
     def checked(state: State, what: str) -> State:
@@ -110,9 +110,9 @@ def simulate_meshing(
         return state
 
     state = checked(follow.deflect(), "deflection by the wave generator")
-    setup = [SetupState.from_state(ring, "wave_generator", state)]
+    setup = [SetupState.from_state(drive, "wave_generator", state)]
     state = checked(follow.engage(state), "engagement of the teeth")
-    setup.append(SetupState.from_state(ring, "meshed", state))
+    setup.append(SetupState.from_state(drive, "meshed", state))
     if torque == 0.0:
         small = 0.01 * ratings_of(design).rated_torque
         unloaded = follow.unload(state, small)
@@ -120,7 +120,7 @@ def simulate_meshing(
     else:
         state = follow.to_torque(state, torque)
     checked(state, f"loading to {overload(design, torque) or f'{torque:g} N·m'}")
-    setup.append(SetupState.from_state(ring, "torque", state))
+    setup.append(SetupState.from_state(drive, "torque", state))
 
     rows = []
     for k in range(steps):
@@ -138,11 +138,11 @@ def simulate_meshing(
             checked(current, f"the input position {angle / deg:g} deg")
         if current.outcome.ok:
             state = current
-        rows.append(_step(ring, follow, current, angle, torque, series))
+        rows.append(_step(drive, follow, current, angle, torque, series))
         progress("meshing", k + 1, steps)
     return MeshingRun(
         design=design,
-        model=ring,
+        model=drive,
         torque=torque,
         steps=tuple(rows),
         setup=tuple(setup),
@@ -151,7 +151,7 @@ def simulate_meshing(
 
 
 def _step(
-    ring: RingModel,
+    model: SectorModel,
     follow: Continuation,
     state: State,
     angle: float,
@@ -172,15 +172,15 @@ def _step(
         tooth_moment=state.tooth_moment,
         energy=state.energy + 0.5 * series * torque**2,
         friction_work=state.friction_work,
-        pairs_in_contact=_pairs(ring, state),
-        contact_nodes=ring.copies * ring.stations.nodes_touching(state.touching),
-        stress=MemberMaxima.from_state(ring, state),
+        pairs_in_contact=_pairs(model, state),
+        contact_nodes=model.copies * model.stations.nodes_touching(state.touching),
+        stress=MemberMaxima.from_state(model, state),
         iterations=len(state.history),
         state=state,
     )
 
 
-def _pairs(model: RingModel, state: State) -> int:
+def _pairs(model: SectorModel, state: State) -> int:
     """Loaded tooth pairs of the whole drive; both flanks of a tooth count once."""
     if state.contacts is None:
         return 0

@@ -14,7 +14,7 @@ from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.meshing_phases import alike, overload, unspread
 from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.plane.fields import root_stress, tooth_forces, wave_generator_contact
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import KINDS, MemberMaxima, StressMaxima
 from swgjoint.fe.plane.superelement import Superelement
@@ -35,7 +35,7 @@ class SetupState:
     stress: MemberMaxima
 
     @classmethod
-    def from_state(cls, model: RingModel, name: str, state: State) -> SetupState:
+    def from_state(cls, model: SectorModel, name: str, state: State) -> SetupState:
         """Recover the stresses of a state.
 
         Args:
@@ -159,18 +159,18 @@ class MeshingRun(Positions):
     """A simulation of meshing."""
 
     design: Design
-    model: RingModel
+    model: SectorModel
     torque: float
     steps: tuple[MeshingStep, ...]
     setup: tuple[SetupState, ...]
     wall_s: float
 
     def _members(self) -> list[tuple[Superelement, int]]:
-        ring = self.model.circular_spline.compliance
+        compliance = self.model.circular_spline.compliance
         flexspline = (self.model.element, self.model.sectors)
-        if ring is None:
+        if compliance is None:
             return [flexspline]
-        return [flexspline, (ring.element, self.model.ring_teeth)]
+        return [flexspline, (compliance.element, self.model.circular_spline_teeth)]
 
     @property
     def nodes(self) -> int:
@@ -191,14 +191,14 @@ class MeshingRun(Positions):
         """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
         elastic = self.model.circular_spline.compliance is not None
         cup = None if self.design.cup is None else "closed-form torsion in series"
-        ring = f"elastic, outside {self.design.circular_spline.outer_rim}"
+        rim = f"elastic, outside {self.design.circular_spline.outer_rim}"
         return {
             "design": self.design.drive.name,
             "label": {
                 "model": "2d",
                 "layout": self.design.drive.layout,
                 "level": "nonlinear" if self.model.nonlinear else "linear",
-                "circular_spline": ring if elastic else "rigid",
+                "circular_spline": rim if elastic else "rigid",
                 "bearing": None if self.model.race is None else "balls roll",
                 "half": self.model.half,
                 "cup": cup,

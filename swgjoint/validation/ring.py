@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import InputError
-from swgjoint.fe.rings.plain_ring import PlainRing, PulledRing, pull_ring
+from swgjoint.fe.rings.free_ring import FreeRing, PulledRing, pull_ring
 from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.units import mm
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
@@ -46,7 +46,7 @@ class RingCase:
     """A ring of one thickness on all meshes."""
 
     name: str
-    ring: PlainRing
+    ring: FreeRing
     pulled: dict[int, PulledRing]
     """By refinement."""
 
@@ -82,7 +82,7 @@ def run_ring(options: StudyOptions) -> StudyResult:
     cases: list[RingCase] = []
     thicknesses = {"ground": GROUND_mm, "nominal": NOMINAL_mm}
     for name, thickness in thicknesses.items():
-        ring = PlainRing(
+        ring = FreeRing(
             outer_radius=0.5 * OUTSIDE_mm * mm,
             thickness=thickness * mm,
             width=1.0 * mm,

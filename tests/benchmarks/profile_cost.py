@@ -44,14 +44,14 @@ timed("map", lambda: build_map(design, model="2d", angles=4, cache=False))
 """,
     "3d run": """
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.stress import SolidMaxima
 design = Design.load("reference-3d-modified").with_changes({
     "drive.teeth_flexspline": 40, "drive.teeth_circular_spline": 42,
     "cup.length_mm": 14.0, "cup.bore_radius_mm": 7.0, "mesh.refinement": 0.5,
 })
-ring = timed("condensation", lambda: solid_ring(design, half=True))
-follow = SolidContinuation(ring=ring, ratio=design.ratio)
+ring = timed("condensation", lambda: solid_sector_model(design, half=True))
+follow = SolidContinuation(model=ring, ratio=design.ratio)
 state = timed("deflection", follow.deflect)
 state = timed("engagement and load", lambda: follow.to_torque(follow.engage(state), 5))
 angle = 0.5 * np.pi / 42

@@ -9,7 +9,7 @@ from solved import coarse
 
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
 
 
@@ -44,7 +44,7 @@ def test_free_output_stands_in_the_middle():
 def test_torque_reverses_through_the_clearance():
     """From one flank to the other at a fixed input, and back to the same place."""
     design = loose(0.9)
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     first = follow.to_torque(follow.engage(follow.deflect()), 10.0)
     other = follow.to_torque(first, -10.0)
     again = follow.to_torque(other, 10.0)

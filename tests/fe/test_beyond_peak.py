@@ -9,7 +9,8 @@ import pytest
 from solved import few_teeth, kept
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common import pattern, sampling
+from swgjoint.fe.common import mesh_cycle as pattern
+from swgjoint.fe.common import sampling
 from swgjoint.fe.common.sampling import effort_of, sample_map
 from swgjoint.fe.common.torque_columns import BEYOND
 from swgjoint.gear.catalogue import ratings_of
@@ -76,13 +77,13 @@ def test_a_failed_solve_beyond_the_peak_leaves_the_map_as_it_is(monkeypatch):
 def test_levels_alone_decide_what_is_shown(monkeypatch):
     """States of the torque beyond the peak are no part of the fields of the drive."""
     seen = []
-    solve = pattern.solve_pattern
+    solve = pattern.solve_mesh_cycle
 
     def kept_pattern(*args, **options):
         seen.append(solve(*args, **options))
         return seen[-1]
 
-    monkeypatch.setattr(sampling, "solve_pattern", kept_pattern)
+    monkeypatch.setattr(sampling, "solve_mesh_cycle", kept_pattern)
     monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
     monkeypatch.setattr(sampling, "UNSEEN", (2, 2))
     given = sample_map(design(), angles=2)

@@ -9,7 +9,7 @@ from swgjoint.fe.plane import linearise
 from swgjoint.fe.plane.bore_contact import DEPTH, NARROW_POINTS, BoreStations
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
 
 RADIUS, STEP = 0.03, 0.01
@@ -83,7 +83,7 @@ def test_input_torque_does_not_feel_the_nodes_of_the_bore():
     design = Design.preset("reference-2d-four-roller").with_changes(
         {"mesh.refinement": 0.6}
     )
-    model = ring_model(design, half=True)
+    model = sector_model(design, half=True)
     follow = Continuation(model=model, ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     per_tooth, angles = model.element.bore_size + 1, 40
@@ -102,7 +102,7 @@ def test_input_torque_does_not_feel_the_nodes_of_the_bore():
 def test_intervals_far_from_contact_decide_nothing(name, monkeypatch):
     """Their stations stay apart; the equilibrium is that with all gaps exact."""
     design = Design.preset(name).with_changes({"mesh.refinement": 0.5})
-    model = ring_model(design, half=True)
+    model = sector_model(design, half=True)
     follow = Continuation(model=model, ratio=design.ratio)
     one = follow.to_torque(follow.engage(follow.deflect()), 15.0)
     coarse, _, _ = linearise._gaps(model, one)
@@ -129,7 +129,7 @@ def test_narrow_contacts_have_stations_enough_for_the_energy(name):
     the peak to peak on this mesh with half as many, 1.8 and 1.2 % now.
     """
     design = Design.preset(name).with_changes({"mesh.refinement": 0.5})
-    model = ring_model(design, half=True)
+    model = sector_model(design, half=True)
     assert model.stations.per_interval == NARROW_POINTS
     follow = Continuation(model=model, ratio=design.ratio)
     torque, angles, found = 1.2, 24, []

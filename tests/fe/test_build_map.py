@@ -14,7 +14,7 @@ from swgjoint.drives import build_map as building
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.common import sampling
-from swgjoint.fe.common.pattern import with_mirrored_torques
+from swgjoint.fe.common.mesh_cycle import with_mirrored_torques
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.fe.plane.continuation import Continuation

@@ -10,14 +10,14 @@ from scipy.sparse.linalg import spsolve
 
 from swgjoint.fe.plane.circular_spline import FlankSplines
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.elasticity import plane_basis, stiffness_matrix
 from swgjoint.gear.design.design import Design
 
 
 @cache
 def ring():
-    return ring_model(Design.load("reference-2d")).circular_spline
+    return sector_model(Design.load("reference-2d")).circular_spline
 
 
 def test_compliance_is_reciprocal():
@@ -102,7 +102,7 @@ def free_rim(rim_mm):
 
 def test_free_rim_becomes_oval_like_a_thin_ring():
     """Two opposite radial forces against the closed form; teeth make it stiffer."""
-    spline = ring_model(free_rim(5.0)).circular_spline
+    spline = sector_model(free_rim(5.0)).circular_spline
     compliance, teeth = spline.compliance, spline.profile.teeth
     force = np.zeros((teeth, spline.flank_dofs))
     nodes = spline.flank_dofs // 4
@@ -124,7 +124,7 @@ def test_free_rim_becomes_oval_like_a_thin_ring():
 
 def test_free_rim_answers_reciprocally():
     """G of tooth k by tooth j is the transpose of G of tooth j by tooth k."""
-    compliance = ring_model(free_rim(5.0)).circular_spline.compliance
+    compliance = sector_model(free_rim(5.0)).circular_spline.compliance
     at = {int(offset): k for k, offset in enumerate(compliance.offsets)}
     largest = np.abs(compliance.flank).max()
     for offset in (0, 1, 17, 60):
@@ -135,7 +135,7 @@ def test_free_rim_answers_reciprocally():
 def test_free_rim_keeps_the_energy_balance():
     """T_wg is the derivative of U + T psi also where the whole ring deforms."""
     design = free_rim(10.0)
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     potential, step = [], 1e-4
     for angle in (0.01 - step, 0.01, 0.01 + step):
@@ -151,6 +151,6 @@ def test_free_rim_keeps_the_energy_balance():
 def test_a_free_rim_that_is_too_soft_is_an_outcome():
     """A 2 mm ring under 20 N·m leaves the range of its linear model."""
     design = free_rim(2.0)
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     assert not state.outcome.ok

@@ -5,7 +5,7 @@ import pytest
 
 from swgjoint.fe.common.contact_patch import PATCH_PARTS, average_spline
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
 
 STATIONS = np.linspace(0.3e-3, 2.2e-3, 21)
@@ -46,7 +46,7 @@ def test_kinematic_error_does_not_depend_on_the_mesh(name, meshes, angles):
     found = []
     for refinement in meshes:
         design = Design.preset(name).with_changes({"mesh.refinement": refinement})
-        follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+        follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
         state = follow.to_torque(follow.engage(follow.deflect()), 0.0)
         error = []
         for angle in 2.0 * np.pi / 122 * np.arange(angles) / angles:

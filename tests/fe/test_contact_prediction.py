@@ -10,10 +10,10 @@ import pytest
 from solved import coarse
 
 from swgjoint.fe.common.sampling import follower_in_plane
-from swgjoint.fe.plane.condensed_ring import (
+from swgjoint.fe.plane.condensed_model import (
     ALIKE,
     REACH,
-    CondensedRing,
+    CondensedModel,
     Supports,
     distinct,
 )
@@ -99,34 +99,36 @@ def test_forces_of_the_teeth_balance_the_torque_where_many_contacts_change():
         contacts=Contacts.join(held, twin),
         tooth_force=np.concatenate([force * 2.0 / 3.0, force / 3.0]),
     )
-    ring = linearise(follow.model, state, state.torque)
+    linear = linearise(follow.model, state, state.torque)
     reach = REACH * follow.model.lobe_height
-    found = ring.search.search(ring.flank, reach, state.contacts)
+    found = linear.search.search(linear.flank, reach, state.contacts)
     contacts, carries = distinct(found, state)
-    drive = CondensedRing(
+    drive = CondensedModel(
         model=follow.model,
         state=state,
-        ring=ring,
-        ring_is_output=False,
+        linear=linear,
+        circular_spline_is_output=False,
         contacts=contacts,
         carries=carries,
     )
-    none = np.zeros((len(ring.gap), ring.gap.shape[1] // ring.stations.per_interval))
-    linear = drive.influence(Supports.from_state(ring, state, none.astype(bool)))
+    none = np.zeros(
+        (len(linear.gap), linear.gap.shape[1] // linear.stations.per_interval)
+    )
+    condensed = drive.influence(Supports.from_state(linear, state, none.astype(bool)))
     arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
     moments, opened = [], []
     torques = state.torque * np.linspace(1.0, 0.4, 13)
     for torque in torques:
-        answer = linear.respond(np.zeros((1, len(contacts))), float(torque))
-        offset = linear.slack + (torque - linear.torque) * linear.by_torque
+        answer = condensed.respond(np.zeros((1, len(contacts))), float(torque))
+        offset = condensed.slack + (torque - condensed.torque) * condensed.by_torque
         active = answer.active[0]
         inside = np.ix_(active, active)
         value = np.zeros(len(offset))
-        value[active] = np.linalg.solve(linear.matrix[inside], -offset[active])
-        slack = offset + linear.matrix @ value
-        force = np.where(linear.closed, slack, value)
+        value[active] = np.linalg.solve(condensed.matrix[inside], -offset[active])
+        slack = offset + condensed.matrix @ value
+        force = np.where(condensed.closed, slack, value)
         moments.append(2.0 * float(force @ arm))
-        opened.append(int((active & linear.closed).sum()))
+        opened.append(int((active & condensed.closed).sum()))
     assert opened[-1] >= 3
     ratio = 1.0 - 1.0 / design.ratio
     assert np.diff(moments) / np.diff(torques) == pytest.approx(ratio, rel=0.01)
@@ -165,16 +167,16 @@ def test_an_exchange_changes_the_gradient_as_the_station_does():
     """Taken in or out of the linearised ring, or linearised anew."""
     _, follow, state = loaded("reference-2d-parabolic", 0.35)
     model = follow.model
-    ring = linearise(model, state, state.torque)
-    near = (np.abs(ring.gap) < 3e-8) | state.touching
+    linear = linearise(model, state, state.torque)
+    near = (np.abs(linear.gap) < 3e-8) | state.touching
     stations = near & (np.random.default_rng(1).random(near.shape) < 0.5)
     assert (stations & state.touching).any() and (stations & ~state.touching).any()
-    found = ring.exchange(stations, state.touching)
+    found = linear.exchange(stations, state.touching)
     other = replace(state, touching=state.touching ^ stations)
     wanted = linearise(model, other, state.torque)
     scale = np.abs(wanted.gradient).max()
     assert np.abs(found.gradient - wanted.gradient).max() < 1e-12 * scale
     # but for the curvature of the outline, a millionth of the stiffness
     size = np.abs(wanted.hessian).max()
-    assert np.abs(ring.hessian - wanted.hessian).max() > 1e-3 * size
+    assert np.abs(linear.hessian - wanted.hessian).max() > 1e-3 * size
     assert np.abs(found.hessian - wanted.hessian).max() < 1e-5 * size

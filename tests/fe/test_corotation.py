@@ -13,14 +13,14 @@ from swgjoint.fe.plane.corotation import (
     sector_frames,
     tangent,
 )
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.elasticity import plane_basis
 from swgjoint.gear.design.design import Design
 
 
 @pytest.fixture(scope="module")
 def element():
-    return ring_model(Design.load("reference-2d"), half=True).element
+    return sector_model(Design.load("reference-2d"), half=True).element
 
 
 def deformed(element, scale, seed=3):

@@ -13,7 +13,7 @@ from solved import PITCH, coarse, kept
 from swgjoint.errors import DesignError
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.gear.design.design import Design
 
@@ -30,7 +30,7 @@ def turned(torque: float, steps: int):
 
 def _turned(torque: float, steps: int):
     design = rubbing()
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     states = [follow.to_torque(follow.engage(follow.deflect()), torque)]
     for k in range(1, 2 * steps + 1):
         states.append(follow.to_angle(states[-1], PITCH * k / steps))
@@ -44,24 +44,24 @@ def series(states, name):
 
 def test_slip_is_differentiated_right():
     """Change of s_f + s_c by the motion of either flank, against differences."""
-    model = ring_model(rubbing(), half=True)
+    model = sector_model(rubbing(), half=True)
     follow = Continuation(model=model, ratio=-60.0)
     state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     ring, c = linearise(model, state, 20.0), state.contacts
     rng, step = np.random.default_rng(1), 1e-8
 
-    def slip(flank, ring_flank):
-        search = replace(ring.search, ring_flank=ring_flank)
+    def slip(flank, circular_spline_flank):
+        search = replace(ring.search, circular_spline_flank=circular_spline_flank)
         found = search.search(flank, 2e-5, c)
         return found.slip[c.nearest_in(found)]
 
-    here, there = ring.flank, ring.search.ring_flank
+    here, there = ring.flank, ring.search.circular_spline_flank
     still = slip(here, there)
     # smooth along the flank: rigid motions of the teeth
     for own, shift in ((True, here), (False, there)):
         push = np.tile(rng.standard_normal((len(shift), 2)), shift.shape[1] // 2)
         moved = (here + step * push, there) if own else (here, there + step * push)
-        rows = c.sliding if own else c.ring_sliding
+        rows = c.sliding if own else c.circular_spline_sliding
         at = c.sector if own else c.tooth
         expected = -np.einsum("kb,kb->k", rows, push[at])
         assert (slip(*moved) - still) / step == pytest.approx(expected, abs=2e-3)
@@ -110,7 +110,7 @@ def test_loop_at_a_locked_input_encloses_the_work():
     """Torque up, down and up again: a closed loop whose area is the friction work."""
     # the ellipse holds the whole rim: its flanks hardly slide under torque
     design = coarse("reference-2d-simplified", **{"friction.tooth_coefficient": 0.1})
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     state = follow.engage(follow.deflect())
     # contacts come and go within a step: 40 steps a leg leave 0.5 %, 160 leave 2e-5
     legs = [np.linspace(a, b, 161)[1:] for a, b in ((0, 20), (20, -20), (-20, 20))]
@@ -136,7 +136,7 @@ def test_layouts_rub_alike(layout, twin):
         design = rubbing(**{"drive.layout": name})
         run = simulate_meshing(design, torque=torque, steps=4, turn=0.01, half=True)
         state = run.steps[-1].state
-        relative = state.wave_generator_angle - state.ring_rotation
+        relative = state.wave_generator_angle - state.circular_spline_rotation
         work.append(abs(state.friction_work / relative))
     # 2 %: positions that differ by a sixtieth, and the torques by 2/120
     assert work[1] == pytest.approx(work[0], rel=0.02)
@@ -150,4 +150,4 @@ def test_a_rigid_circular_spline_cannot_rub():
             "reference-2d", "friction.tooth_coefficient", "0.1", "elastic", "0"
         ),
     ):
-        ring_model(rubbing(), elastic_circular_spline=False)
+        sector_model(rubbing(), elastic_circular_spline=False)

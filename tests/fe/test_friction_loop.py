@@ -15,7 +15,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import friction_loop
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.friction_loop import FIRST_STEPS, friction_loops, loop_torques
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.fit import fit_map
@@ -123,7 +123,7 @@ def test_width_grows_with_a_small_coefficient():
 def test_nothing_is_lost_where_nothing_slips():
     """After a reversal the teeth stick: a small cycle returns and takes no work."""
     design = rubbing(0.1)
-    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design, half=True), ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 30.0)
     small = [follow.to_torque(state, 29.9)]
     for torque in (29.98, 29.9, 29.98, 29.9):

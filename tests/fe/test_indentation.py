@@ -30,7 +30,7 @@ from swgjoint.fe.common.indentation import (
 )
 from swgjoint.fe.common.sampling import follower_in_plane
 from swgjoint.fe.plane.contact_points import Contacts
-from swgjoint.fe.plane.drive2d import ring_model, sector
+from swgjoint.fe.plane.drive2d import sector, sector_model
 from swgjoint.fe.plane.sector_mesh import sector_mesh
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
@@ -308,9 +308,9 @@ def test_indentation_makes_a_drive_softer_and_conserves_its_energy():
 @pytest.mark.fe
 def test_indentation_is_that_of_the_elastic_members():
     """A rigid circular spline halves the softness; the plane's modulus counts."""
-    both = ring_model(coarse()).indentation
-    one = ring_model(coarse(), elastic_circular_spline=False).indentation
-    confined = ring_model(coarse(**{"mesh.stress_state": "plane_strain"})).indentation
+    both = sector_model(coarse()).indentation
+    one = sector_model(coarse(), elastic_circular_spline=False).indentation
+    confined = sector_model(coarse(**{"mesh.stress_state": "plane_strain"})).indentation
     assert both is not None and one is not None and confined is not None
     assert one.softness == pytest.approx(0.5 * both.softness)
     nu = Design.load("reference-2d").material.poisson_ratio

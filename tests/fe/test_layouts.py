@@ -11,7 +11,7 @@ from solved import coarse
 
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
 
 TORQUE = 20.0
@@ -36,7 +36,7 @@ def run(layout):
 def follow(layout):
     design = Design.load("reference-2d")
     return Continuation(
-        model=ring_model(design, half=True), ratio=LAYOUTS[layout][0], layout=layout
+        model=sector_model(design, half=True), ratio=LAYOUTS[layout][0], layout=layout
     )
 
 
@@ -95,7 +95,7 @@ def test_same_state_from_another_member(layout):
     assert other.wave_generator_torque == pytest.approx(
         one.wave_generator_torque, rel=1e-6
     )
-    alpha = other.wave_generator_angle - other.ring_rotation
+    alpha = other.wave_generator_angle - other.circular_spline_rotation
     assert alpha == pytest.approx(one.wave_generator_angle, abs=1e-11)
 
 

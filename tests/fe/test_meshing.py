@@ -18,7 +18,7 @@ from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import elastic_energy
-from swgjoint.fe.plane.drive2d import ring_model, unmodelled_parts
+from swgjoint.fe.plane.drive2d import sector_model, unmodelled_parts
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
 from swgjoint.gear.cup import cup_torsional_stiffness
@@ -49,7 +49,7 @@ def positions(steps, half=True):
 
 @cache
 def follow(half=True):
-    return Continuation(model=ring_model(reference(), half=half), ratio=-60.0)
+    return Continuation(model=sector_model(reference(), half=half), ratio=-60.0)
 
 
 @cache

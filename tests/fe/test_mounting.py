@@ -14,7 +14,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance, torque_shares
 from swgjoint.maps.fit.fit import fit_map
@@ -35,7 +35,7 @@ def mounted(layout, plain=None, **stiffness):
 @cache
 def follower(layout):
     design = mounted(layout)
-    model = ring_model(design, half=True)
+    model = sector_model(design, half=True)
     return Continuation(model=model, ratio=design.ratio, layout=layout)
 
 
@@ -56,7 +56,7 @@ def in_series(layout, theta, torque):
         moment = state.tooth_moment
         flexspline, circular_spline = -generator - moment, moment
         boss = state.rotation + flexspline / BOSS
-        housing = state.ring_rotation + circular_spline / HOUSING
+        housing = state.circular_spline_rotation + circular_spline / HOUSING
         wave = state.wave_generator_angle
         fixed, shaft, output = {
             "circular_spline_fixed": (housing, wave, boss),

@@ -19,7 +19,7 @@ from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.drive2d import (
     can_halve,
     carries_bearing,
-    ring_model,
+    sector_model,
     unmodelled_parts,
 )
 from swgjoint.fe.plane.linearise import linearise
@@ -56,7 +56,7 @@ def small(**changes):
 @cache
 def drive(*, half=True, cage_held=False):
     """Follows its equilibria."""
-    model = ring_model(small(), half=half, cage_held=cage_held)
+    model = sector_model(small(), half=half, cage_held=cage_held)
     return Continuation(model=model, ratio=small().ratio)
 
 
@@ -72,7 +72,7 @@ def turned_on(*, half=True, cage_held=False):
 
 def on_rigid_ring(design, **changes):
     """Half of a drive whose circular spline does not yield."""
-    model = ring_model(design, half=True, elastic_circular_spline=False, **changes)
+    model = sector_model(design, half=True, elastic_circular_spline=False, **changes)
     return Continuation(model=model, ratio=design.ratio)
 
 
@@ -242,8 +242,8 @@ def test_odd_balls_need_the_whole_drive():
             "tolerances",
         ),
     ):
-        ring_model(odd, half=True)
-    assert ring_model(odd, half=True, bearing=False).race is None
+        sector_model(odd, half=True)
+    assert sector_model(odd, half=True, bearing=False).race is None
 
 
 def test_held_cage_repeats_after_a_pitch():
@@ -337,7 +337,7 @@ def test_thin_rings_tell_the_same():
                 {"wave_generator.bearing.clearance_um": clearance}
             )
         # the teeth of the rings have the patch of a contact alone
-        model = replace(ring_model(design), indentation=None)
+        model = replace(sector_model(design), indentation=None)
         follow = Continuation(model=model, ratio=design.ratio)
         state, rings = follow.engage(follow.deflect()), thin_ring(design)
         twin, found, theirs = solve_unloaded(rings, 0.0), [], []
@@ -363,7 +363,7 @@ def test_no_bearing_is_no_change():
     plain = Design.load("reference-2d").with_changes(TEETH)
     states = []
     for design, bearing in ((plain, True), (small(), False)):
-        model = ring_model(design, half=True, bearing=bearing)
+        model = sector_model(design, half=True, bearing=bearing)
         follow = Continuation(model=model, ratio=design.ratio)
         states.append(follow.to_torque(follow.engage(follow.deflect()), TORQUE))
         assert states[-1].race is None
@@ -381,7 +381,7 @@ def test_labels_say_where_the_bearing_is():
     assert unmodelled_parts(small(), bearing=False) == "wave_generator.bearing"
     held = small(**{"drive.layout": "flexspline_fixed"})
     assert unmodelled_parts(held) == "wave_generator.bearing"
-    assert ring_model(held, half=True).race is None
+    assert sector_model(held, half=True).race is None
     run = simulate_meshing(small(), torque=TORQUE, steps=2, turn=0.01, half=True)
     assert run.to_json()["label"]["bearing"] == "balls roll"
     balls = run.steps[1].state.ball_force

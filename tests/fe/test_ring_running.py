@@ -12,7 +12,7 @@ from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.rings import model as rings
 from swgjoint.fe.rings import running as ring_running
 from swgjoint.fe.rings.contacts import linearise, race_on_balls
-from swgjoint.fe.rings.equilibrium import RingSolver, rim_rotation
+from swgjoint.fe.rings.equilibrium import ThinRingSolver, rim_rotation
 from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import thin_ring
@@ -21,7 +21,7 @@ from swgjoint.fe.rings.sliding import weighted_median
 from swgjoint.gear.design.design import Design
 
 ANGLE = 0.3
-ANCHOR = RingSolver().anchor
+ANCHOR = ThinRingSolver().anchor
 TORQUE = 5.0
 TIGHT = {
     "wave_generator.bearing.clearance_um": 0.0,

@@ -7,7 +7,7 @@ import pytest
 from solved import PITCH, coarse
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.fields import flexspline_field
 from swgjoint.fe.plane.shape_fields import plane_surface
 
@@ -33,7 +33,7 @@ def shown(coarse_samples):
 def follow(design):
     """Follows equilibria of the whole drive."""
     return Continuation(
-        model=ring_model(design, half=False, friction=False),
+        model=sector_model(design, half=False, friction=False),
         ratio=design.ratio,
         layout=design.drive.layout,
     )

@@ -14,7 +14,7 @@ from swgjoint.fe.common.stress_state import (
     stress_state_label,
 )
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model, sector
+from swgjoint.fe.plane.drive2d import sector, sector_model
 from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
 from swgjoint.fe.rings.sections import rim_section
 from swgjoint.gear.design.design import Design
@@ -86,7 +86,7 @@ def test_axial_stress_follows_the_plane():
     """It is nu (xx + yy) in plane strain, c nu (xx + yy) with auto, else zero."""
     for kind in KINDS:
         design = design_of(kind)
-        model = ring_model(design, half=True)
+        model = sector_model(design, half=True)
         follow = Continuation(model=model, ratio=design.ratio)
         state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
         assert state.outcome.ok

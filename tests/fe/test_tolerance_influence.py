@@ -10,7 +10,7 @@ from messages import naming
 from solved import coarse
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.tolerances.cycle import MEMBERS, pitch_of, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import Rest, influences
 from swgjoint.fe.tolerances.sampling import full_solves
@@ -136,7 +136,7 @@ def test_a_pitch_on_the_next_teeth_stand_alike(name):
     follow, found = influences(design, phases=1)
     pitches = 5
     moved = full_solves(design, follow, found, np.array([pitches]), (20.0,))
-    model = ring_model(design, friction=False)
+    model = sector_model(design, friction=False)
     turned = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
     there = turned.to_torque(turned.engage(turned.deflect()), 20.0)
     here = turned.output_angle(there)
@@ -161,4 +161,4 @@ def test_flawed_or_half_models_are_refused(reference):
         with pytest.raises(
             ValueError, match=naming("all sectors", "friction", "errors")
         ):
-            influence(model, state, ring_is_output=False)
+            influence(model, state, circular_spline_is_output=False)

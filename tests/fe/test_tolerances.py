@@ -11,7 +11,7 @@ from solved import FEW_PITCH, coarse, few_teeth
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.fe.plane.drive2d import can_halve, sector_model
 from swgjoint.gear.design.design import Design
 
 
@@ -23,7 +23,7 @@ def flawed(**values) -> Design:
 def orders(torque=4.0, positions=16, **values):
     """Amplitudes per turn of the wave generator, whole pitches apart [rad]."""
     design = flawed(**values)
-    follow = Continuation(model=ring_model(design), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design), ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), torque)
     error = []
     for k in range(positions):
@@ -67,11 +67,11 @@ def test_oval_circular_spline_shows_twice_a_turn():
 def test_teeth_shifted_alike_turn_the_member():
     """A common pitch error is a rotation of the member by error over radius."""
     design = coarse()
-    perfect, shift = ring_model(design, half=True), 2e-6
+    perfect, shift = sector_model(design, half=True), 2e-6
     moved = replace(
         perfect,
         tooth_shift=np.tile([-shift, 0.0], (60, 1)),
-        ring_tooth_shift=np.zeros((61, 2)),
+        circular_spline_tooth_shift=np.zeros((61, 2)),
     )
     angles = []
     for model in (perfect, moved):
@@ -91,7 +91,7 @@ def test_errors_keep_the_energy_balance():
         random_pitch_um=2.0,
         circular_spline_ovality_um=5.0,
     )
-    follow = Continuation(model=ring_model(design), ratio=design.ratio)
+    follow = Continuation(model=sector_model(design), ratio=design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     potential, step = [], 1e-4
     for angle in (0.013 - step, 0.013, 0.013 + step):
@@ -112,4 +112,4 @@ def test_errors_need_all_sectors():
         DesignError,
         match=naming("reference-2d", "60/62 teeth", "half model", "even", "tolerances"),
     ):
-        ring_model(design, half=True)
+        sector_model(design, half=True)

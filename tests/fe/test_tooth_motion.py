@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.tooth_motion import conjugate_by_fe, deflected_rim
 from swgjoint.gear.design.design import Design
@@ -55,7 +55,7 @@ def test_conjugate_teeth_just_touch_where_the_elements_put_them():
     """Over a pitch the closest flanks of the deflected drive meet within 0.3 um."""
     drive = design()
     profile = conjugate_by_fe(drive, "circular_spline")
-    model = ring_model(drive, half=True, profiles={"circular_spline": profile})
+    model = sector_model(drive, half=True, profiles={"circular_spline": profile})
     follow = Continuation(model=model, ratio=drive.ratio)
     for angle in 2.0 * np.pi / 122 * np.arange(4) / 4:
         state = follow.deflect(float(angle))

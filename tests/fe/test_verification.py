@@ -9,7 +9,7 @@ from solved import FEW_PITCH as PITCH
 from solved import few_teeth, kept
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 
 TORQUE = 20.0
 
@@ -17,7 +17,7 @@ TORQUE = 20.0
 @cache
 def follow():
     design = few_teeth()
-    return Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    return Continuation(model=sector_model(design, half=True), ratio=design.ratio)
 
 
 @cache

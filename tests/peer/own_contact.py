@@ -26,7 +26,7 @@ from replay import (
 )
 
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
@@ -106,7 +106,7 @@ def ring_strips(
 
 def own_contact(
     design: Design,
-    model: RingModel,
+    model: SectorModel,
     state: State,
     folder: Path,
     *,

@@ -14,7 +14,7 @@ from quadratic_ring import Chain, QuadraticRing, quadratic_ring
 
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.elasticity import stress_maxima
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import flexspline_stress
 from swgjoint.gear.design.design import Design
@@ -40,7 +40,7 @@ class Forces:
     """Tooth forces, right then left (N, 2, k, 2) [N]."""
 
     @classmethod
-    def of(cls, model: RingModel, state: State) -> Forces:
+    def of(cls, model: SectorModel, state: State) -> Forces:
         """Forces of a converged state."""
         mesh = model.element.mesh
         bore = model.wave_generator_force(state) + load_on_bore(model, state)
@@ -68,7 +68,7 @@ class Forces:
         return nodal
 
 
-def load_on_bore(model: RingModel, state: State) -> Array:
+def load_on_bore(model: SectorModel, state: State) -> Array:
     """What the load exerts on the bore nodes, conjugate to their best-fit rotation.
 
     Returns:
@@ -98,7 +98,7 @@ def _seen(values: Array, chain: Chain, parameter: Array) -> Array:
 class Replay:
     """One state in both codes."""
 
-    model: RingModel
+    model: SectorModel
     state: State
     ring: QuadraticRing
     fields: Fields
@@ -177,14 +177,14 @@ class Replay:
         return float(np.einsum("ni,ni->", rotate_right_angle(place), self.nodal))
 
 
-def root_start(model: RingModel) -> float:
+def root_start(model: SectorModel) -> float:
     """Arc length at which the fillet of the flexspline's teeth begins [m]."""
     return model.element.profile.range_of("root", "root")[0]
 
 
 def replay(
     design: Design,
-    model: RingModel,
+    model: SectorModel,
     state: State,
     folder: Path,
     *,

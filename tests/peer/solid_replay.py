@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
 from swgjoint.fe.solid.strip.elasticity import stress_maxima
@@ -40,13 +40,13 @@ class QuarterCup:
     """Node by segment, sector and node of the segment, -1 elsewhere."""
 
     @classmethod
-    def of(cls, ring: SolidRing) -> QuarterCup:
+    def of(cls, model: SolidSectorModel) -> QuarterCup:
         """The quarter x <= 0, y >= 0 of a ring whose lobe lies at +y."""
-        sectors = ring.strip.sectors // 4 + 1
+        sectors = model.strip.sectors // 4 + 1
         points, cells, sizes = [], [], []
-        for segment in ring.strip.mesh.segments:
+        for segment in model.strip.mesh.segments:
             p = np.asarray(segment.mesh.p).T
-            for turn in ring.place[:sectors]:
+            for turn in model.place[:sectors]:
                 cells.append(np.asarray(segment.mesh.t).T + sum(sizes))
                 points.append(p @ turn.T)
                 sizes.append(len(p))
@@ -60,7 +60,7 @@ class QuarterCup:
         number = np.full(len(every), -1)
         number[used] = np.arange(len(used))
         split = np.split(number[leader], np.cumsum(sizes)[:-1])
-        names = [segment.name for segment in ring.strip.mesh.segments]
+        names = [segment.name for segment in model.strip.mesh.segments]
         return cls(
             points=every[used],
             cells=number[corners][:, CORNERS],
@@ -75,7 +75,7 @@ class QuarterCup:
 class SolidReplay:
     """One state in both codes, by segment, sector of the quarter and node."""
 
-    ring: SolidRing
+    model: SolidSectorModel
     state: SolidState
     cup: QuarterCup
     displacement: Array
@@ -87,10 +87,10 @@ class SolidReplay:
     def shape(self) -> dict[str, Array]:
         """CalculiX minus ours, radial, tangential and axial (n, 3) [m]."""
         found = {}
-        ring, loads = self.ring, self.ring.loads(self.state)
-        frames = ring.frames(self.state)
+        model, loads = self.model, self.model.loads(self.state)
+        frames = model.frames(self.state)
         for k, (segment, frame) in enumerate(
-            zip(ring.strip.segments, frames, strict=True)
+            zip(model.strip.segments, frames, strict=True)
         ):
             number = self.cup.numbers[segment.name]
             there = number >= 0
@@ -117,7 +117,7 @@ class SolidReplay:
         The back edge is left out: a re-entrant corner, whose stress grows on finer
         meshes.
         """
-        teeth = self.ring.strip.mesh.teeth
+        teeth = self.model.strip.mesh.teeth
         surface = np.concatenate([teeth.plane.flank_right, teeth.plane.flank_left])
         inside = teeth.nodes[np.abs(teeth.z) <= INSIDE + 1e-9][:, surface]
         ours, theirs = self.stresses("teeth", inside.ravel())
@@ -131,7 +131,7 @@ class SolidReplay:
             nodes: Of its mesh.
         """
         number = self.cup.numbers[name][:, nodes]
-        ours = flexspline_stresses(self.ring, self.state)[name]
+        ours = flexspline_stresses(self.model, self.state)[name]
         ours = ours[: len(number), nodes]
         ours = np.where(number[..., None] >= 0, ours, 0.0)
         theirs = np.where(number[..., None] >= 0, self.stress[number], 0.0)
@@ -140,7 +140,7 @@ class SolidReplay:
 
 def solid_replay(
     design: Design,
-    ring: SolidRing,
+    model: SolidSectorModel,
     state: SolidState,
     folder: Path,
     *,
@@ -150,12 +150,12 @@ def solid_replay(
 
     Args:
         design: The drive.
-        ring: Its model; the teeth must be a multiple of four.
+        model: Its model; the teeth must be a multiple of four.
         state: On the wave generator alone, at angle and rotation zero.
         folder: Where the files of CalculiX go.
         element: C3D8I is of the class of our own element.
     """
-    cup = QuarterCup.of(ring)
+    cup = QuarterCup.of(model)
     points = cup.points / mm
     steel = design.material_of("flexspline")
     deck = "*NODE\n" + calculix.numbered(
@@ -167,13 +167,13 @@ def solid_replay(
         f"{steel.youngs_modulus / MPa:.12g}, {steel.poisson_ratio:.12g}\n"
         "*SOLID SECTION, ELSET=CUP, MATERIAL=STEEL\n"
     )
-    deck += _supports(ring, cup)
+    deck += _supports(model, cup)
     deck += "*STEP, NLGEOM, INC=100\n*STATIC\n1.0, 1.0\n" + calculix.CONTROLS
-    deck += calculix.load_block(_forces(ring, state, cup))
+    deck += calculix.load_block(_forces(model, state, cup))
     deck += "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n"
     found = calculix.run_solid(deck, folder, len(points))
     return SolidReplay(
-        ring=ring,
+        model=model,
         state=state,
         cup=cup,
         displacement=found.displacement * mm,
@@ -181,9 +181,9 @@ def solid_replay(
     )
 
 
-def _supports(ring: SolidRing, cup: QuarterCup) -> str:
+def _supports(model: SolidSectorModel, cup: QuarterCup) -> str:
     """Bore of the diaphragm held, symmetry on both cuts."""
-    last = ring.strip.mesh.segments[-1]
+    last = model.strip.mesh.segments[-1]
     assert last.end is not None
     held = np.unique(cup.numbers[last.name][:, last.end])
     lines = ["*BOUNDARY", *(f"{node + 1}, 1, 3" for node in held[held >= 0])]
@@ -193,12 +193,12 @@ def _supports(ring: SolidRing, cup: QuarterCup) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _forces(ring: SolidRing, state: SolidState, cup: QuarterCup) -> Array:
+def _forces(model: SolidSectorModel, state: SolidState, cup: QuarterCup) -> Array:
     """Nodal forces of the wave generator on the quarter (n, 3) [N]."""
-    number = cup.numbers["teeth"][:, ring.strip.mesh.teeth.bore.ravel()]
-    turn = ring.frames(state)[0].turn[: len(number)]
-    force = ring.strip.teeth.nodal_force(ring.loads(state))
-    force = force[: len(number), ring.strip.flank_dofs :].reshape(len(number), -1, 3)
+    number = cup.numbers["teeth"][:, model.strip.mesh.teeth.bore.ravel()]
+    turn = model.frames(state)[0].turn[: len(number)]
+    force = model.strip.teeth.nodal_force(model.loads(state))
+    force = force[: len(number), model.strip.flank_dofs :].reshape(len(number), -1, 3)
     force = np.einsum("sij,spj->spi", turn, force)
     result = np.zeros_like(cup.points)
     there = number >= 0

@@ -22,8 +22,8 @@ from study import Row, document
 from two_teeth import two_teeth
 
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.drive3d import solid_sector_model
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.files import write_whole
@@ -41,27 +41,31 @@ ORDERS = {
 TEETH = [(1, True), (2, True), (3, False)]
 
 
-def deflected(design: Design, orders: Orders) -> tuple[SolidRing, SolidState, float]:
+def deflected(
+    design: Design, orders: Orders
+) -> tuple[SolidSectorModel, SolidState, float]:
     """On the wave generator alone; seconds of an iteration."""
-    ring = solid_ring(design, half=True, elastic_circular_spline=False, orders=orders)
+    model = solid_sector_model(
+        design, half=True, elastic_circular_spline=False, orders=orders
+    )
     clock = time.process_time()
-    state = SolidContinuation(ring=ring, ratio=design.ratio).deflect()
+    state = SolidContinuation(model=model, ratio=design.ratio).deflect()
     assert state.outcome.ok, state.outcome
-    return ring, state, (time.process_time() - clock) / len(state.history)
+    return model, state, (time.process_time() - clock) / len(state.history)
 
 
 def rows(folder: Path) -> Iterator[Row]:
     """All runs."""
     design = Design.load(DESIGN)
     for label, orders in ORDERS.items():
-        ring, state, seconds = deflected(design, orders)
+        model, state, seconds = deflected(design, orders)
         clock = time.perf_counter()
-        found = solid_replay(design, ring, state, folder)
+        found = solid_replay(design, model, state, folder)
         wall = time.perf_counter() - clock
         radial, tangential = np.concatenate(list(found.shape.values())).T[:2] / um
         ours, theirs = (stress / MPa for stress in found.root_stress)
         by_part = {}
-        for segment in ring.strip.mesh.segments:
+        for segment in model.strip.mesh.segments:
             every = np.arange(segment.mesh.p.shape[1])
             pair = found.stresses(segment.name, every)
             by_part[segment.name] = [float(part[2].max()) / MPa for part in pair]
@@ -69,7 +73,7 @@ def rows(folder: Path) -> Iterator[Row]:
             "compared": "quarter of the cup, refinement 1, C3D8I",
             "orders": label,
             **asdict(orders),
-            "masters": ring.strip.masters.size,
+            "masters": model.strip.masters.size,
             "iteration_s": seconds,
             "radial_max_um": np.abs(radial).max(),
             "radial_rms_um": np.sqrt(np.mean(radial**2)),
@@ -80,7 +84,7 @@ def rows(folder: Path) -> Iterator[Row]:
             "calculix_s": wall,
         }
     for refinement, both in TEETH:
-        teeth = two_teeth(design, ring, state, 0, refinement=refinement)
+        teeth = two_teeth(design, model, state, 0, refinement=refinement)
         ours = teeth.root_stress(teeth.ours(design)) / MPa
         yield {
             "compared": "two teeth, C3D8I",

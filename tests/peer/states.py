@@ -6,8 +6,8 @@ from functools import cache
 from math import pi
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.drive2d import sector_model
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
 
@@ -41,10 +41,10 @@ def torque_of(kind: str) -> float:
 
 
 @cache
-def model_of(kind: str, refinement: int, elastic: bool) -> RingModel:
+def model_of(kind: str, refinement: int, elastic: bool) -> SectorModel:
     """Half of its drive."""
     design = design_of(kind, refinement)
-    return ring_model(design, half=True, elastic_circular_spline=elastic)
+    return sector_model(design, half=True, elastic_circular_spline=elastic)
 
 
 def _follow(kind: str, refinement: int, elastic: bool) -> Continuation:

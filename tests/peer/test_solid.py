@@ -14,7 +14,7 @@ from solid_replay import CORNERS, QuarterCup, solid_replay
 from two_teeth import two_teeth
 
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.strip import elasticity
 from swgjoint.fe.solid.strip.hexahedron import ElementHexIncompatible
 from swgjoint.gear.design.design import Design
@@ -43,7 +43,7 @@ def small_design():
 
 def test_quarter_has_every_node_and_element_once():
     """Elements of ten strips, no two nodes at one place, nothing inside out."""
-    ring = solid_ring(small_design(), half=True, elastic_circular_spline=False)
+    ring = solid_sector_model(small_design(), half=True, elastic_circular_spline=False)
     cup, strip = QuarterCup.of(ring), ring.strip.mesh
     assert len(cup.cells) == 10 * strip.elements
     assert np.unique(np.round(cup.points, 10), axis=0).shape == cup.points.shape
@@ -133,8 +133,8 @@ def test_wave_generator_state_holds_in_calculix(tmp_path, monkeypatch):
     """
     monkeypatch.setattr(elasticity, "ElementHexIncompatible", CentreJacobian)
     design = Design.load("reference-3d-modified").with_changes({"mesh.refinement": 0.5})
-    ring = solid_ring(design, half=True, elastic_circular_spline=False)
-    state = SolidContinuation(ring=ring, ratio=design.ratio).deflect()
+    ring = solid_sector_model(design, half=True, elastic_circular_spline=False)
+    state = SolidContinuation(model=ring, ratio=design.ratio).deflect()
     found = solid_replay(design, ring, state, tmp_path)
     for name, apart in found.shape.items():
         assert np.abs(apart).max() < 0.7 * um, name  # 0.57 at the back, axially

@@ -21,7 +21,7 @@ from skfem import MeshHex
 from solid_replay import CORNERS, INSIDE, MPa
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip.elasticity import solid, stress_maxima
 from swgjoint.fe.solid.strip.masters import Orders, strip_masters
@@ -97,7 +97,7 @@ class TwoTeeth:
 
 def two_teeth(
     design: Design,
-    ring: SolidRing,
+    ring: SolidSectorModel,
     state: SolidState,
     sector: int,
     *,

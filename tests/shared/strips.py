@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.common.indentation import Strips
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 
 
-def open_gaps(model: RingModel, state: State) -> NDArray[np.float64]:
+def open_gaps(model: SectorModel, state: State) -> NDArray[np.float64]:
     """Gaps of the contacts plus the approach of their flanks (n,) [m].
 
     Zero where a strip of contact carries force, and never negative.

@@ -12,7 +12,7 @@ from messages import naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError
-from swgjoint.fe.rings.plain_ring import PlainRing, pull_ring
+from swgjoint.fe.rings.free_ring import FreeRing, pull_ring
 from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.units import mm
 from swgjoint.validation import ring as study
@@ -21,7 +21,7 @@ ANGLES = np.array([0.0, pi / 4, pi / 2])
 
 
 def steel_ring(thickness):
-    return PlainRing(
+    return FreeRing(
         outer_radius=68 * mm,
         thickness=thickness * mm,
         width=10 * mm,

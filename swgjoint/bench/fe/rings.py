@@ -18,10 +18,10 @@ from swgjoint.bench.fe.setting import (
     require_equilibrium,
     rim_shape,
 )
-from swgjoint.fe.rings.equilibrium import RingSolver
+from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design import family
 from swgjoint.gear.design.design import Design
@@ -32,7 +32,7 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 
-def solve_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
+def solve_by_thin_rings(design: Design, setting: FeSetting, begin: float) -> Found:
     """What rings or closed forms say of a design; ``begin``: of the setting [s]."""
     if not setting.refinement:
         return _closed_form(design, begin)
@@ -49,7 +49,7 @@ def solve_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
         race=replace(model.race, elements=count),
         nodes_per_tooth=nodes,
     )
-    rated, solver = ratings_of(design).rated_torque, RingSolver()
+    rated, solver = ratings_of(design).rated_torque, ThinRingSolver()
     series, shape = series_compliance(design, cup=True), np.zeros(RIM)
     error, compliance, tensile = list[float](), list[float](), list[float]()
     for angle in positions(design):
@@ -85,7 +85,7 @@ def bearing_by_rule(design: Design) -> dict[str, float]:
     }
 
 
-def _rim_stress(design: Design, model: ThinRing, state: RingState) -> float:
+def _rim_stress(design: Design, model: ThinRing, state: ThinRingState) -> float:
     r"""Largest tensile stress of the rim between the teeth, no notch [Pa].
 
     .. math:: \sigma = E\,(\varepsilon + y\,\Delta\kappa)

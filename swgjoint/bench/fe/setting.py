@@ -15,12 +15,12 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array
 
-AnyState = TypeVar("AnyState", State, SolidState, RingState)
+AnyState = TypeVar("AnyState", State, SolidState, ThinRingState)
 
 POSITIONS = 4
 """Over one pitch; the same ones in every setting."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swgjoint.bench.fe.rings import solve_by_rings
+from swgjoint.bench.fe.rings import solve_by_thin_rings
 from swgjoint.bench.fe.setting import (
     RIM,
     FeSetting,
@@ -23,14 +23,14 @@ from swgjoint.bench.fe.setting import (
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import can_halve, ring_model
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.drive2d import can_halve, sector_model
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima, StressMaxima
 from swgjoint.fe.rings.loading import SMALL
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.drive3d import solid_sector_model
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import SolidMaxima
 from swgjoint.gear.catalogue import ratings_of
@@ -72,16 +72,16 @@ def solve_setting(design: Design, setting: FeSetting) -> Found:
     """
     begin = time.perf_counter()
     if setting.model == "ring":
-        return solve_by_rings(design, setting, begin)
+        return solve_by_thin_rings(design, setting, begin)
     changed = design.with_changes({"mesh.refinement": setting.refinement})
     # on the rigid wave generator that the levels in space have
     half = can_halve(changed, bearing=False) and not setting.full
     if setting.model == "3d":
-        ring = solid_ring(changed, half=half, nonlinear=setting.nonlinear)
+        ring = solid_sector_model(changed, half=half, nonlinear=setting.nonlinear)
         return _measured(
             changed,
             SolidContinuation(
-                ring=ring, ratio=changed.ratio, layout=changed.drive.layout
+                model=ring, ratio=changed.ratio, layout=changed.drive.layout
             ),
             lambda state: SolidMaxima.from_state(ring, state).flexspline,
             lambda state: _solid_rim(ring, state),
@@ -89,7 +89,7 @@ def solve_setting(design: Design, setting: FeSetting) -> Found:
             nodes=sum(s.mesh.mesh.p.shape[1] for s in ring.strip.segments),
             begin=begin,
         )
-    plane = ring_model(changed, half=half, nonlinear=setting.nonlinear, bearing=False)
+    plane = sector_model(changed, half=half, nonlinear=setting.nonlinear, bearing=False)
     return _measured(
         changed,
         Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),
@@ -146,13 +146,13 @@ def _measured(
     )
 
 
-def _plane_rim(model: RingModel, state: State) -> Array:
+def _plane_rim(model: SectorModel, state: State) -> Array:
     nodes = model.skeleton(state)[:, model.bore_nodes]
     radius = float(np.hypot(*model.element.skeleton[model.bore_nodes[0]]))
     return rim_shape(nodes.reshape(-1, 2), radius, state.wave_generator_angle)
 
 
-def _solid_rim(ring: SolidRing, state: SolidState) -> Array:
+def _solid_rim(ring: SolidSectorModel, state: SolidState) -> Array:
     """Solid rim of the bore at mid-face, between the planes beside it."""
     frame, strip = ring.frames(state)[0], ring.strip
     points = np.einsum("sij,spj->spi", frame.turn, ring.bore_positions(frame, state))

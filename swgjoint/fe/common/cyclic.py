@@ -1,4 +1,4 @@
-"""Direct solution of rings of condensed sectors."""
+"""Direct solution of rings of condensed sectors, and shifts of fields around them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.linalg.lapack import dgbtrf, dgbtrs
 from swgjoint.typing import Array, Index
 
 
-class SingularRingError(ArithmeticError):
+class SingularCyclicError(ArithmeticError):
     """The ring of sectors has a zero pivot."""
 
 
@@ -23,7 +23,7 @@ class Insides:
             face: Number of degrees of freedom of a face.
 
         Raises:
-            SingularRingError: If an interior block is singular.
+            SingularCyclicError: If an interior block is singular.
         """
         n = blocks.shape[1]
         self._face = face
@@ -32,7 +32,7 @@ class Insides:
         try:
             self._inverse = np.linalg.inv(blocks[:, inner, inner])
         except np.linalg.LinAlgError as error:
-            raise SingularRingError from error
+            raise SingularCyclicError from error
         # sector by sector: products of all sectors at once would not fit in the cache
         size = 2 * face
         self._reach = np.empty((len(blocks), n - size, size))
@@ -90,7 +90,7 @@ class CyclicFactor:
             face: Number of degrees of freedom of a face.
 
         Raises:
-            SingularRingError: If a pivot vanishes.
+            SingularCyclicError: If a pivot vanishes.
         """
         n_sectors = len(blocks)
         self._face, self._sectors = face, n_sectors
@@ -132,7 +132,7 @@ class CyclicFactor:
         self._band = band
         self._lu, self._pivots, info = dgbtrf(packed, band, band, overwrite_ab=True)
         if info != 0:
-            raise SingularRingError
+            raise SingularCyclicError
 
     def solve(self, rhs: Array) -> Array:
         """Solve for many right-hand sides.
@@ -149,7 +149,24 @@ class CyclicFactor:
         folded = faces[self._order].reshape(self._sectors * face, -1)
         solved, info = dgbtrs(self._lu, self._band, self._band, folded, self._pivots)
         if info != 0:
-            raise SingularRingError
+            raise SingularCyclicError
         faces = np.empty_like(faces)
         faces[self._order] = solved.reshape(self._sectors, face, -1)
         return self._insides.with_faces(faces, rhs)
+
+
+def shift_rows(values: Array, shift: float) -> Array:
+    """Shift rows around the ring, interpolated by the cubic through four neighbours.
+
+    Args:
+        values: One row per sector (N, ...).
+        shift: Shift in sectors, not necessarily an integer [-].
+    """
+    whole = int(np.floor(shift))
+    t = shift - whole
+    return np.asarray(
+        t * (t + 1) * (t - 1) / 6 * np.roll(values, whole + 2, axis=0)
+        - t * (t - 2) * (t + 1) / 2 * np.roll(values, whole + 1, axis=0)
+        + (t - 1) * (t - 2) * (t + 1) / 2 * np.roll(values, whole, axis=0)
+        - t * (t - 1) * (t - 2) / 6 * np.roll(values, whole - 1, axis=0)
+    )

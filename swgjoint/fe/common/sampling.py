@@ -10,10 +10,10 @@ from math import pi
 from typing import Any
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.pattern import Effort, Pattern, solve_pattern
+from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import carries_bearing, ring_model, unmodelled_parts
+from swgjoint.fe.plane.drive2d import carries_bearing, sector_model, unmodelled_parts
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.shape_fields import (
     SectorFields,
@@ -23,7 +23,7 @@ from swgjoint.fe.plane.shape_fields import (
     plane_surface,
 )
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerances.rest import SMALL
 from swgjoint.fe.tolerances.sampling import STAGES, sample_tolerances
@@ -86,11 +86,11 @@ def sample_map(
 
     Angles and torques of the nonlinear model are added until they predict others,
     within a budget of equilibria, see
-    :func:`swgjoint.fe.common.pattern.solve_pattern`. A few equilibria at other angles
-    and torques are reserved for the validation of the map. With perfect teeth one pitch
-    suffices, and with a symmetric wave generator the negative torques are the mirror
-    image of the positive ones; both properties are checked at rated torque and
-    recorded. Torques at which a solve fails, and larger ones, are omitted, and the
+    :func:`swgjoint.fe.common.mesh_cycle.solve_mesh_cycle`. A few equilibria at other
+    angles and torques are reserved for the validation of the map. With perfect teeth
+    one pitch suffices, and with a symmetric wave generator the negative torques are
+    the mirror image of the positive ones; both properties are checked at rated torque
+    and recorded. Torques at which a solve fails, and larger ones, are omitted, and the
     samples are marked as truncated. Manufacturing errors are superposed, see
     :mod:`swgjoint.fe.tolerances.sampling`; a map with them has a rigid wave generator.
 
@@ -209,11 +209,11 @@ def _solved(
         pattern: Pattern[Any]
         if model == "3d":
             solid = _follower_3d(design)
-            pattern = solve_pattern(solid, period, torques, effort, **settings)
-            surface = solid_surface(solid.ring)
-            return pattern, partial(solid_fields, solid.ring, surface=surface), surface
+            pattern = solve_mesh_cycle(solid, period, torques, effort, **settings)
+            surface = solid_surface(solid.model)
+            return pattern, partial(solid_fields, solid.model, surface=surface), surface
         plane = follower_in_plane(design)
-        pattern = solve_pattern(plane, period, torques, effort, **settings)
+        pattern = solve_mesh_cycle(plane, period, torques, effort, **settings)
         surface = plane_surface(plane.model)
         return pattern, partial(plane_fields, plane.model, surface=surface), surface
     except ComputationError as failure:
@@ -326,7 +326,7 @@ def follower_in_plane(design: Design) -> Continuation:
     """The 2D drive with perfect, frictionless teeth, as it is sampled for maps."""
     perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
-        model=ring_model(
+        model=sector_model(
             perfect,
             half="auto",
             friction=False,
@@ -343,7 +343,7 @@ def _follower_3d(design: Design) -> SolidContinuation:
     """The 3D drive with perfect teeth, as it is sampled for maps."""
     perfect = without_errors(design)
     return SolidContinuation(
-        ring=solid_ring(perfect, half="auto"),
+        model=solid_sector_model(perfect, half="auto"),
         ratio=design.ratio,
         layout=design.drive.layout,
     )

@@ -67,7 +67,9 @@ class Compliance:
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
 
-def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Compliance:
+def circular_spline_compliance(
+    element: Superelement, *, free_rim: bool = False
+) -> Compliance:
     """Compliance of a circular spline under forces on its flanks.
 
     Args:

@@ -30,7 +30,7 @@ class Contacts:
     """Derivative of the gap by the flank displacements (n, 2 n_b)."""
     tooth: Index
     """Tooth of the circular spline (n,)."""
-    ring_weight: Array
+    circular_spline_weight: Array
     """Derivative of the gap by the flank displacements of that tooth (n, 2 n_c); no
     columns if the circular spline is rigid."""
     tangent: Array
@@ -38,7 +38,7 @@ class Contacts:
     sliding: Array
     """Derivative of the motion along the tangent by the flank displacements (n, 2 n_b);
     no columns without friction."""
-    ring_sliding: Array
+    circular_spline_sliding: Array
     """Derivative of the motion along the tangent by the flank displacements of the
     circular spline (n, 2 n_c)."""
     slip: Array
@@ -49,12 +49,13 @@ class Contacts:
         return len(self.sector)
 
     @classmethod
-    def none(cls, flank_dofs: int, ring_dofs: int) -> Contacts:
+    def none(cls, flank_dofs: int, circular_spline_dofs: int) -> Contacts:
         """An empty set of contacts.
 
         Args:
             flank_dofs: Columns of ``weight``, 2 n_b.
-            ring_dofs: Columns of ``ring_weight``, 2 n_c; zero if rigid.
+            circular_spline_dofs: Columns of ``circular_spline_weight``, 2 n_c; zero if
+                the circular spline is rigid.
         """
         empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
         return cls(
@@ -66,10 +67,10 @@ class Contacts:
             point=np.zeros((0, 2)),
             weight=np.zeros((0, flank_dofs)),
             tooth=index,
-            ring_weight=np.zeros((0, ring_dofs)),
+            circular_spline_weight=np.zeros((0, circular_spline_dofs)),
             tangent=np.zeros((0, 2)),
             sliding=np.zeros((0, flank_dofs)),
-            ring_sliding=np.zeros((0, ring_dofs)),
+            circular_spline_sliding=np.zeros((0, circular_spline_dofs)),
             slip=empty,
         )
 
@@ -95,7 +96,7 @@ class Contacts:
             gap=gap,
             normal=self.tangent,
             weight=self.sliding,
-            ring_weight=self.ring_sliding,
+            circular_spline_weight=self.circular_spline_sliding,
         )
 
     def nearest_in(self, others: Contacts) -> Index:

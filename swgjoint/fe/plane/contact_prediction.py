@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.plane.condensed_ring import REACH, CondensedRing, Supports, distinct
+from swgjoint.fe.plane.condensed_model import REACH, CondensedModel, Supports, distinct
 from swgjoint.fe.plane.linearise import linearise
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Mask
 
@@ -19,16 +19,21 @@ FAR = 5.0
 
 
 def predicted_changes(
-    model: RingModel, state: State, *, ring_is_output: bool, low: float, high: float
+    model: SectorModel,
+    state: State,
+    *,
+    circular_spline_is_output: bool,
+    low: float,
+    high: float,
 ) -> ContactChanges | None:
     """Contact changes that the drive condensed at an equilibrium predicts.
 
     Supports that seem to open or close far outside the range keep their state.
 
     Args:
-        model: The ring, without friction.
+        model: The 2D model, without friction.
         state: The equilibrium.
-        ring_is_output: Whether the circular spline is the output.
+        circular_spline_is_output: Whether the circular spline is the output.
         low: Smallest torque of interest [N·m].
         high: Largest one [N·m].
 
@@ -38,25 +43,29 @@ def predicted_changes(
     """
     if state.contacts is None or not len(state.contacts):
         return None
-    ring = linearise(model, state, None if ring_is_output else state.torque)
+    linear = linearise(
+        model, state, None if circular_spline_is_output else state.torque
+    )
     reach = REACH * model.lobe_height
-    candidates = ring.search.search(ring.flank, reach, state.contacts, thorough=False)
+    candidates = linear.search.search(
+        linear.flank, reach, state.contacts, thorough=False
+    )
     contacts, carries = distinct(candidates, state)
-    drive = CondensedRing(
+    drive = CondensedModel(
         model=model,
         state=state,
-        ring=ring,
-        ring_is_output=ring_is_output,
+        linear=linear,
+        circular_spline_is_output=circular_spline_is_output,
         contacts=contacts,
         carries=carries,
     )
     apart = max(high - state.torque, state.torque - low)
-    supports = Supports.from_state(ring, state, _supports_within(drive, FAR * apart))
+    supports = Supports.from_state(linear, state, _supports_within(drive, FAR * apart))
     at = supports.intervals
     numbers = np.concatenate(
         [
             2 * contacts.sector + contacts.side,
-            -1 - at.sector * ring.gap.shape[1] - at.number,
+            -1 - at.sector * linear.gap.shape[1] - at.number,
         ]
     )
     try:
@@ -66,7 +75,7 @@ def predicted_changes(
         return None
 
 
-def _supports_within(drive: CondensedRing, torque: float) -> Mask:
+def _supports_within(drive: CondensedModel, torque: float) -> Mask:
     """Intervals of the bore that open or close within a change of torque [N·m].
 
     The prediction ignores all other contact changes; at most the :data:`MOST_SUPPORTS`
@@ -75,13 +84,13 @@ def _supports_within(drive: CondensedRing, torque: float) -> Mask:
     Returns:
         Mask (N, intervals).
     """
-    ring, state = drive.ring, drive.state
-    p = ring.stations.per_interval
-    shape = (len(ring.gap), -1, p)
-    gap, touching = ring.gap.reshape(shape), state.touching.reshape(shape)
-    slope = (ring.gap_after(drive.torque_response()) - ring.gap).reshape(shape)
+    linear, state = drive.linear, drive.state
+    p = linear.stations.per_interval
+    shape = (len(linear.gap), -1, p)
+    gap, touching = linear.gap.reshape(shape), state.touching.reshape(shape)
+    slope = (linear.gap_after(drive.torque_response()) - linear.gap).reshape(shape)
     closed = touching.any(axis=2)
-    k = np.where(touching, ring.stations.stiffness.reshape(shape[1:]), 0.0)
+    k = np.where(touching, linear.stations.stiffness.reshape(shape[1:]), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         lasts = np.abs((k * gap).sum(axis=2) / (k * slope).sum(axis=2))
         comes = np.where(gap / slope < np.inf, np.abs(gap / slope), np.inf)

@@ -10,7 +10,7 @@ from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.contact_prediction import predicted_changes
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.newton_step import Load
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.tolerances.influence import influence
 from swgjoint.gear.kinematics import Layout
@@ -26,14 +26,14 @@ class Continuation(Follower[State]):
     flexspline is prescribed: it is zero or, with the wave generator fixed, the input.
     """
 
-    model: RingModel
+    model: SectorModel
     ratio: float
     """Signed gear ratio i [-]."""
     layout: Layout = "circular_spline_fixed"
     solver: NewtonSolver = field(default_factory=NewtonSolver)
 
     @property
-    def ring_is_output(self) -> bool:
+    def circular_spline_is_output(self) -> bool:
         """Whether the circular spline turns."""
         return self.layout != "circular_spline_fixed"
 
@@ -56,15 +56,19 @@ class Continuation(Follower[State]):
 
     def output_angle(self, state: State) -> float:
         """Output angle psi [rad]."""
-        return state.ring_rotation if self.ring_is_output else state.rotation
+        return (
+            state.circular_spline_rotation
+            if self.circular_spline_is_output
+            else state.rotation
+        )
 
     def deflect(self, angle: float = 0.0) -> State:
         """Deflect the rim at the ideal member angles, without tooth contact."""
-        alpha, rotation, ring_rotation = self._ideal(angle)
+        alpha, rotation, circular_spline_rotation = self._ideal(angle)
         start = self.model.initial_guess(alpha, rotation)
         load = Load(rotation=rotation, teeth=False)
         state = self.solver(self.model, start, load)
-        return replace(state, ring_rotation=ring_rotation)
+        return replace(state, circular_spline_rotation=circular_spline_rotation)
 
     def load(self, start: State, torque: float, angle: float) -> State:
         """Equilibrium under an output torque.
@@ -74,7 +78,7 @@ class Continuation(Follower[State]):
             torque: Output torque T [N·m].
             angle: Input angle [rad].
         """
-        if not self.ring_is_output:
+        if not self.circular_spline_is_output:
             return self.solver(self.model, start, Load(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.model, start, Load(torque=torque, rotation=held))
@@ -82,7 +86,7 @@ class Continuation(Follower[State]):
     def hold_output(self, state: State) -> State:
         """Equilibrium with the output held in place; the torque is a result."""
         held = self.solver(self.model, state, Load(rotation=state.rotation))
-        if self.ring_is_output:
+        if self.circular_spline_is_output:
             return replace(held, torque=-held.tooth_moment)
         return held
 
@@ -94,9 +98,11 @@ class Continuation(Follower[State]):
             output: New output angle [rad].
         """
         alpha = state.wave_generator_angle
-        if self.ring_is_output:
+        if self.circular_spline_is_output:
             return self.model.predict_field(state, alpha, state.rotation, output)
-        return self.model.predict_field(state, alpha, output, state.ring_rotation)
+        return self.model.predict_field(
+            state, alpha, output, state.circular_spline_rotation
+        )
 
     def predict(self, state: State, angle: float) -> State:
         """Predictor that turns input and output by the ideal ratio.
@@ -106,12 +112,14 @@ class Continuation(Follower[State]):
             angle: New input angle [rad].
         """
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
-        alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
+        alpha, rotation, circular_spline_rotation = (
+            y - x for x, y in zip(was, now, strict=True)
+        )
         return self.model.predict_field(
             state,
             state.wave_generator_angle + alpha,
             state.rotation + rotation,
-            state.ring_rotation + ring_rotation,
+            state.circular_spline_rotation + circular_spline_rotation,
         )
 
     def predicted_changes(
@@ -125,12 +133,18 @@ class Continuation(Follower[State]):
             high: Largest torque of interest [N·m].
         """
         return predicted_changes(
-            self.model, state, ring_is_output=self.ring_is_output, low=low, high=high
+            self.model,
+            state,
+            circular_spline_is_output=self.circular_spline_is_output,
+            low=low,
+            high=high,
         )
 
     def influence(self, state: State) -> Influence:
         """Influence of every tooth gap on the output, linearised at an equilibrium."""
-        return influence(self.model, state, ring_is_output=self.ring_is_output)
+        return influence(
+            self.model, state, circular_spline_is_output=self.circular_spline_is_output
+        )
 
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
@@ -145,7 +159,9 @@ class Continuation(Follower[State]):
         """
         assert not tilt.any()
         model = replace(
-            self.model, tooth_shift=flexspline, ring_tooth_shift=circular_spline
+            self.model,
+            tooth_shift=flexspline,
+            circular_spline_tooth_shift=circular_spline,
         )
         return replace(self, model=model)
 

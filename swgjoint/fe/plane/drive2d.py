@@ -12,10 +12,10 @@ from swgjoint.fe.common.friction import STICK_STIFFNESS, CoulombFriction
 from swgjoint.fe.common.indentation import Indentation, softness_of
 from swgjoint.fe.common.stress_state import confinement
 from swgjoint.fe.plane.bore_contact import NARROW_POINTS, POINTS
-from swgjoint.fe.plane.circular_spline import CircularSpline, ring_compliance
+from swgjoint.fe.plane.circular_spline import CircularSpline, circular_spline_compliance
 from swgjoint.fe.plane.race import PlaneRace
-from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.sector_mesh import sector_mesh
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.superelement import Superelement, condense
 from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.design.check import raise_faults
@@ -127,7 +127,7 @@ def unmodelled_parts(
     return " and ".join(name for name, there in parts.items() if there) or None
 
 
-def ring_model(
+def sector_model(
     design: Design,
     *,
     half: Half = False,
@@ -137,7 +137,7 @@ def ring_model(
     bearing: bool = True,
     cage_held: bool = False,
     profiles: Mapping[MemberName, ToothProfile] | None = None,
-) -> RingModel:
+) -> SectorModel:
     """Build the 2D model of a design.
 
     Args:
@@ -177,15 +177,18 @@ def ring_model(
     for name in members:
         if name not in flanks:
             flanks[name] = tooth_profile(design, name)
-    ring = CircularSpline(profile=flanks["circular_spline"])
+    circular_spline = CircularSpline(profile=flanks["circular_spline"])
     if elastic_circular_spline:
-        element = sector(design, "circular_spline", ring.profile)
+        element = sector(design, "circular_spline", circular_spline.profile)
         free = design.circular_spline.outer_rim == "free"
-        ring = replace(ring, compliance=ring_compliance(element, free_rim=free))
+        circular_spline = replace(
+            circular_spline,
+            compliance=circular_spline_compliance(element, free_rim=free),
+        )
     coefficient = design.friction.tooth_coefficient if friction else 0.0
     law = None
     if coefficient > 0.0:
-        if ring.compliance is None:
+        if circular_spline.compliance is None:
             raise DesignError(
                 f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g} "
                 "needs an elastic circular spline; expected 0 with a rigid one"
@@ -197,13 +200,15 @@ def ring_model(
         )
     shifts: dict[str, Array] = {}
     if has_errors(design):
-        if ring.compliance is None:
+        if circular_spline.compliance is None:
             raise DesignError(
                 f"{design.drive.name}: tolerances need an elastic circular spline"
             )
         shifts = {
             "tooth_shift": tooth_errors(design, "flexspline").shift,
-            "ring_tooth_shift": tooth_errors(design, "circular_spline").shift,
+            "circular_spline_tooth_shift": tooth_errors(
+                design, "circular_spline"
+            ).shift,
             "wave_generator_offset": wave_generator_offset(design),
         }
     element = sector(design, "flexspline", flanks["flexspline"])
@@ -212,13 +217,13 @@ def ring_model(
         raise_faults(bearing_checks(design))
         race = PlaneRace.from_design(design, element, half=half, cage_held=cage_held)
         height = race.on_balls.lobe_height
-    return RingModel(
+    return SectorModel(
         **shifts,
         friction=law,
-        indentation=indentation(design, element, ring),
+        indentation=indentation(design, element, circular_spline),
         element=element,
         wave_generator=flawed_wave_generator(design),
-        circular_spline=ring,
+        circular_spline=circular_spline,
         lobe_height=height,
         half=half,
         nonlinear=nonlinear,
@@ -231,18 +236,18 @@ def ring_model(
 
 
 def indentation(
-    design: Design, element: Superelement, ring: CircularSpline
+    design: Design, element: Superelement, circular_spline: CircularSpline
 ) -> Indentation:
     """Indentation law of the flanks of the elastic members.
 
     Args:
         design: The drive.
         element: Condensed sector of the flexspline.
-        ring: The circular spline, elastic or rigid.
+        circular_spline: The circular spline, elastic or rigid.
     """
     members: list[tuple[MemberName, Superelement]] = [("flexspline", element)]
-    if ring.compliance is not None:
-        members.append(("circular_spline", ring.compliance.element))
+    if circular_spline.compliance is not None:
+        members.append(("circular_spline", circular_spline.compliance.element))
     softness, patch = [], []
     for name, tooth in members:
         material = design.material_of(name)
@@ -253,7 +258,7 @@ def indentation(
         softness.append(softness_of(modulus, design.drive.face_width_mm * mm))
         patch.append(half_length(tooth.spline.x))
     return Indentation.from_members(
-        tuple(softness), tuple(patch), (element.profile, ring.profile)
+        tuple(softness), tuple(patch), (element.profile, circular_spline.profile)
     )
 
 

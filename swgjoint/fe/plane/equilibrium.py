@@ -13,7 +13,7 @@ import numpy as np
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError
-from swgjoint.fe.common.cyclic import SingularRingError
+from swgjoint.fe.common.cyclic import SingularCyclicError
 from swgjoint.fe.common.friction import SlipHistory, dissipated_work, spring_energy
 from swgjoint.fe.common.indentation import strain_energy
 from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
@@ -22,12 +22,12 @@ from swgjoint.fe.plane.newton_step import (
     Load,
     NewtonStep,
     solve_newton_step,
-    wrong_stations,
 )
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
+from swgjoint.typing import Array
 
-RING_RANGE = 0.2
+CIRCULAR_SPLINE_RANGE = 0.2
 """Largest displacement of the circular spline for which its linear model is accepted,
 in lobe heights [-]. At half of it the input torque still agrees with the derivative of
 the energy to seven digits."""
@@ -59,14 +59,14 @@ class NewtonSolver:
     longer one."""
     largest_step: float = 0.1
     """Increment beyond which the search is abandoned as diverged [m]."""
-    ring_range: float = RING_RANGE
+    circular_spline_range: float = CIRCULAR_SPLINE_RANGE
     """Largest accepted displacement of the circular spline, in lobe heights [-]."""
 
-    def __call__(self, model: RingModel, start: State, load: Load) -> State:
+    def __call__(self, model: SectorModel, start: State, load: Load) -> State:
         """Find the equilibrium at the wave-generator angle of ``start``.
 
         Args:
-            model: The ring.
+            model: The 2D model.
             start: Start of the search.
             load: Prescribed torque or rotation.
 
@@ -78,24 +78,24 @@ class NewtonSolver:
         tried: set[bytes] = set()
         try:
             for iteration in range(self.max_iterations):
-                ring = linearise(model, state, load.on_flexspline)
+                linear = linearise(model, state, load.on_flexspline)
                 thorough = bool(history) and history[-1] < self.thorough_below
                 # after three steps, or a short one, only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
-                contacts = ring.no_contacts
+                contacts = linear.no_contacts
                 if load.teeth:
-                    contacts = ring.search.search(
-                        ring.flank, reach, state.contacts, thorough=thorough
+                    contacts = linear.search.search(
+                        linear.flank, reach, state.contacts, thorough=thorough
                     )
-                step = solve_newton_step(model, state, ring, load, contacts)
+                step = solve_newton_step(model, state, linear, load, contacts)
                 for _ in range(self.exchanges):
-                    exchanged = _exchanged(state, ring, step, self.exchange_below)
+                    exchanged = _exchanged(state, linear, step, self.exchange_below)
                     if exchanged is None:
                         break
-                    state, ring = exchanged
+                    state, linear = exchanged
                     step = solve_newton_step(
-                        model, state, ring, load, contacts, step.active
+                        model, state, linear, load, contacts, step.active
                     )
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
@@ -109,7 +109,7 @@ class NewtonSolver:
                 state, settled = _advance(
                     model,
                     state,
-                    ring,
+                    linear,
                     step,
                     damping,
                     one_at_a_time=repeats,
@@ -120,17 +120,19 @@ class NewtonSolver:
                     free = load.torque is not None and load.teeth
                     free &= len(state.tooth_force) == 0
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
-                    return _finished(model, state, outcome, history, self.ring_range)
+                    return _finished(
+                        model, state, outcome, history, self.circular_spline_range
+                    )
         except ActiveSetError as error:
             return replace(start, outcome=error.outcome, history=tuple(history))
-        except SingularRingError:
+        except SingularCyclicError:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
-        return _finished(model, state, outcome, history, self.ring_range)
+        return _finished(model, state, outcome, history, self.circular_spline_range)
 
 
 def _exchanged(
-    state: State, ring: Linearised, step: NewtonStep, below: float
+    state: State, linear: Linearised, step: NewtonStep, below: float
 ) -> tuple[State, Linearised] | None:
     """Switch the contact state of the bore stations that a step closes or opens.
 
@@ -138,20 +140,20 @@ def _exchanged(
         State and linearisation after the switch; None if no station switches, after too
         large a step, or on a race, whose tangent depends on more than the stations.
     """
-    if ring.race_rows is not None or not step.largest < below:
+    if linear.race_rows is not None or not step.largest < below:
         return None
-    bad = wrong_stations(state, ring.gap_after(step.increment)) > TOUCH
+    bad = _wrong_stations(state, linear.gap_after(step.increment)) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():
         return None
-    return replace(state, touching=state.touching ^ bad), ring.exchange(
+    return replace(state, touching=state.touching ^ bad), linear.exchange(
         bad, state.touching
     )
 
 
 def _advance(
-    model: RingModel,
+    model: SectorModel,
     state: State,
-    ring: Linearised,
+    linear: Linearised,
     step: NewtonStep,
     damping: float,
     *,
@@ -162,8 +164,8 @@ def _advance(
     Returns:
         The new state, and whether the bore contact stayed the same.
     """
-    after = ring.gap_after(damping * step.increment)
-    wrong = wrong_stations(state, after)
+    after = linear.gap_after(damping * step.increment)
+    wrong = _wrong_stations(state, after)
     bad = wrong > TOUCH
     # without any contact the rim would spring back: release the worst station only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
@@ -171,8 +173,8 @@ def _advance(
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
     flank_force = np.zeros_like(state.flank_force)
     np.add.at(flank_force, lines.sector, force * lines.weight)
-    ring_force = np.zeros_like(state.ring_force)
-    np.add.at(ring_force, lines.tooth, force * lines.ring_weight)
+    circular_spline_force = np.zeros_like(state.circular_spline_force)
+    np.add.at(circular_spline_force, lines.tooth, force * lines.circular_spline_weight)
     friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
     # first face and bore nodes of each sector; a shared face appears once
     size, inside = model.element.face_size, model.element.bore_size
@@ -185,15 +187,16 @@ def _advance(
         pressure=step.pressure,
         touching=state.touching ^ bad,
         flank_force=flank_force,
-        ring_force=ring_force,
+        circular_spline_force=circular_spline_force,
         contacts=step.contacts.chosen(step.active),
         tooth_force=step.line_force[step.active],
         friction_force=friction[step.active],
         candidates=SlipHistory(
             contacts=step.contacts, normal=step.line_force[:m], force=friction
         ),
-        rotation=ring.rotation,
-        ring_rotation=state.ring_rotation + damping * step.ring_turn,
+        rotation=linear.rotation,
+        circular_spline_rotation=state.circular_spline_rotation
+        + damping * step.circular_spline_turn,
         compliance=step.compliance,
         torque=step.torque,
         holding_torque=step.holding_torque,
@@ -201,12 +204,26 @@ def _advance(
     return new, not bool(bad.any())
 
 
+def _wrong_stations(state: State, gap: Array) -> Array:
+    """Violation of the assumed contact state at each station.
+
+    Args:
+        state: State whose bore contact is assumed.
+        gap: Gap at each station (N, q) [m].
+
+    Returns:
+        Gap of stations assumed in contact, overlap of the others (N, q) [m]; positive
+        values are violations.
+    """
+    return np.asarray(np.where(state.touching, gap, -gap))
+
+
 def _finished(
-    model: RingModel,
+    model: SectorModel,
     state: State,
     outcome: Outcome,
     history: list[float],
-    ring_range: float,
+    circular_spline_range: float,
 ) -> State:
     """Complete a state with the moments and the energy of the whole drive."""
     frames = model.frames(state)
@@ -222,12 +239,15 @@ def _finished(
             @ np.einsum("ki,ki->k", rotate_right_angle(c.point), c.tangent)
         )
     energy = float(elastic_energy(model.element, frames, state.flank_force).sum())
-    moved = model.ring_displacement(state)
-    energy += 0.5 * float(np.sum(state.ring_force * moved))
+    moved = model.circular_spline_displacement(state)
+    energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
     if model.indentation is not None:
         energy += strain_energy(model.indentation, state.contacts, state.tooth_force)
     # the model of the circular spline is linear: its displacement must stay small
-    if outcome.ok and np.abs(moved).max(initial=0.0) > ring_range * model.lobe_height:
+    if (
+        outcome.ok
+        and np.abs(moved).max(initial=0.0) > circular_spline_range * model.lobe_height
+    ):
         outcome = Outcome.DIVERGED
     energy, balls = model.copies * energy, None
     if model.race is not None and state.race is not None:

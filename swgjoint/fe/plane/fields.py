@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.elasticity import stress_maxima
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import (
     circular_spline_stress,
@@ -53,11 +53,11 @@ class MemberField:
         return stress_maxima(self.stress)
 
 
-def flexspline_field(model: RingModel, state: State) -> MemberField:
+def flexspline_field(model: SectorModel, state: State) -> MemberField:
     """Deformed flexspline and its stress.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
     """
     frames = model.frames(state)
@@ -71,11 +71,11 @@ def flexspline_field(model: RingModel, state: State) -> MemberField:
     )
 
 
-def circular_spline_field(model: RingModel, state: State) -> MemberField | None:
+def circular_spline_field(model: SectorModel, state: State) -> MemberField | None:
     """Deformed circular spline and its stress.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
 
     Returns:
@@ -90,16 +90,16 @@ def circular_spline_field(model: RingModel, state: State) -> MemberField | None:
     return _field(
         model,
         compliance.element,
-        compliance.skeleton_displacement(state.ring_force),
-        state.ring_force,
-        np.asarray(pitch * (np.arange(model.ring_teeth) + 0.5), float)
-        + state.ring_rotation,
+        compliance.skeleton_displacement(state.circular_spline_force),
+        state.circular_spline_force,
+        np.asarray(pitch * (np.arange(model.circular_spline_teeth) + 0.5), float)
+        + state.circular_spline_rotation,
         stress,
     )
 
 
 def _field(
-    model: RingModel,
+    model: SectorModel,
     element: Superelement,
     skeleton: Array,
     flank_force: Array,
@@ -122,18 +122,18 @@ def _field(
     )
 
 
-def _turns(model: RingModel) -> Array:
+def _turns(model: SectorModel) -> Array:
     """Rotations of the copies of the model that form the drive [rad]."""
     return np.asarray(2.0 * pi / model.copies * np.arange(model.copies), float)
 
 
-def tooth_angles(model: RingModel, state: State) -> Array:
+def tooth_angles(model: SectorModel, state: State) -> Array:
     """Angles of the flexspline's teeth from the first lobe.
 
     The teeth are those of the undeformed, turned flexspline.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
 
     Returns:
@@ -144,13 +144,13 @@ def tooth_angles(model: RingModel, state: State) -> Array:
     return _wrapped(place + state.rotation - state.wave_generator_angle, 2.0 * pi)
 
 
-def tooth_forces(model: RingModel, state: State) -> Array:
+def tooth_forces(model: SectorModel, state: State) -> Array:
     """Normal force on the right and on the left flank of every tooth.
 
     The right flank is the clockwise one; seen from the axis, teeth point outwards.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
 
     Returns:
@@ -182,12 +182,12 @@ class WaveGeneratorContact:
 
 
 def wave_generator_contact(
-    model: RingModel, state: State, lobes: int = 2
+    model: SectorModel, state: State, lobes: int = 2
 ) -> WaveGeneratorContact:
     """Contact arcs and forces between wave generator and flexspline.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
         lobes: Number of lobes of the wave generator.
     """
@@ -245,7 +245,7 @@ class RootStress:
 
 
 def root_stress(
-    model: RingModel, states: Sequence[State], lobes: int = 2
+    model: SectorModel, states: Sequence[State], lobes: int = 2
 ) -> RootStress:
     """Stress at the tooth roots over a turn (thesis figures 4.18 to 4.20).
 
@@ -253,7 +253,7 @@ def root_stress(
     the lower half of the dedendum at either side of a tooth.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         states: Equilibria over a turn, at least one.
         lobes: Number of lobes of the wave generator.
     """

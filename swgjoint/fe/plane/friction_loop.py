@@ -11,7 +11,7 @@ import numpy as np
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import SYMMETRIC, maps_bearing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
@@ -82,7 +82,7 @@ def friction_loops(
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]
     bearing = maps_bearing(design)
-    model = ring_model(perfect, half="auto", bearing=bearing, cage_held=True)
+    model = sector_model(perfect, half="auto", bearing=bearing, cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
     torque = loop_torques(top, steps)

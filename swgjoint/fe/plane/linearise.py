@@ -16,7 +16,7 @@ from swgjoint.fe.plane.corotation import (
     rotate_right_angle,
     tangent,
 )
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.plane.tooth_contact import ToothContact
@@ -32,7 +32,7 @@ parabolas and within 0.011 for arcs."""
 class Linearised:
     """The ring linearised at one state, with n degrees of freedom per sector.
 
-    :attr:`RingModel.sector_dofs` counts them. Vectors are in the global frame; at the
+    :attr:`SectorModel.sector_dofs` counts them. Vectors are in the global frame; at the
     end of a half ring they have the opposite sign, so that the shared unknowns agree
     with those of the first sector.
     """
@@ -73,7 +73,7 @@ class Linearised:
     flank: Array
     """Displacement of the flank nodes in the sector frames, including manufacturing
     errors (N, 2 n_b) [m]."""
-    ring_elastic: Array
+    circular_spline_elastic: Array
     """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
     search: ToothContact
     """Search for tooth contacts at the state."""
@@ -81,8 +81,8 @@ class Linearised:
     @property
     def no_contacts(self) -> Contacts:
         """An empty set of candidates."""
-        ring = self.search.circular_spline
-        return Contacts.none(self.flank.shape[1], ring.flank_dofs)
+        circular_spline = self.search.circular_spline
+        return Contacts.none(self.flank.shape[1], circular_spline.flank_dofs)
 
     def anchor_tangent(self) -> Array:
         """Tangent with the anchor spring; fixed components get a diagonal stiffness."""
@@ -165,11 +165,11 @@ class _Bore:
     rows: Array | None = None
 
 
-def linearise(model: RingModel, state: State, torque: float | None) -> Linearised:
+def linearise(model: SectorModel, state: State, torque: float | None) -> Linearised:
     """Linearise the ring at a state.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: Positions, active set and tooth forces.
         torque: Torque T on the load of the whole drive [N·m]; None if the rotation of
             the flexspline is prescribed.
@@ -220,8 +220,8 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
-    angle = frames.angle - state.ring_rotation
-    ring_elastic = model.ring_displacement(state)
+    angle = frames.angle - state.circular_spline_rotation
+    circular_spline_elastic = model.circular_spline_displacement(state)
     flank = frames.displacement @ element.flank_from_skeleton.T
     flank += state.flank_force @ element.flank_compliance
     return Linearised(
@@ -243,19 +243,21 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         anchor=anchor,
         anchor_stiffness=float(np.mean(np.diag(element.stiffness))),
         flank=model.shift_flank(flank, model.tooth_shift),
-        ring_elastic=ring_elastic,
+        circular_spline_elastic=circular_spline_elastic,
         search=ToothContact(
             rubs=model.friction is not None,
             element=element,
             circular_spline=model.circular_spline,
-            ring_flank=model.shift_flank(ring_elastic, model.ring_tooth_shift),
+            circular_spline_flank=model.shift_flank(
+                circular_spline_elastic, model.circular_spline_tooth_shift
+            ),
             angle=angle,
             bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
         ),
     )
 
 
-def _on_surface(model: RingModel, state: State) -> _Bore:
+def _on_surface(model: SectorModel, state: State) -> _Bore:
     """Compress the layer between the bore and a rigid wave generator."""
     stations = model.stations
     gap, normal, curvature = _gaps(model, state)
@@ -274,7 +276,7 @@ def _on_surface(model: RingModel, state: State) -> _Bore:
     return _Bore(gap=gap, normal=normal, gradient=gradient, hessian=hessian)
 
 
-def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
+def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     """Gap, normal and curvature at the stations, see ``wave_generator_gap``.
 
     If no station of an interval touches and the gap in its middle exceeds :data:`FAR`,

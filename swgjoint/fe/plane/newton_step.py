@@ -14,7 +14,7 @@ from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.race import NODE
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Index, Mask
 
@@ -44,7 +44,7 @@ class Load:
         return self.torque if self.rotation is None else None
 
     @property
-    def on_ring(self) -> float | None:
+    def on_circular_spline(self) -> float | None:
         """Torque of the circular spline on a load [N·m]; None if it has no load."""
         return self.torque if self.rotation is not None else None
 
@@ -68,7 +68,7 @@ class NewtonStep:
     """External torque on the flexspline, whole drive [N·m]."""
     compliance: float
     """Tangent compliance -d(output rotation)/dT, whole drive [rad/(N·m)]."""
-    ring_turn: float
+    circular_spline_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
     """Increment of the degrees of freedom of every sector (N, n) [m]."""
@@ -116,7 +116,7 @@ class _Solution:
     """Whether each candidate carries force (m,)."""
     anchor: float
     """Force of the anchor [N]."""
-    ring_turn: float
+    circular_spline_turn: float
     """Rotation increment of the circular spline [rad]."""
     multiplier: float
     """Multiplier of the flexspline's rotation [N·m]."""
@@ -125,9 +125,9 @@ class _Solution:
 
 
 def solve_newton_step(
-    model: RingModel,
+    model: SectorModel,
     state: State,
-    ring: Linearised,
+    linear: Linearised,
     load: Load,
     contacts: Contacts,
     pressing: Index | None = None,
@@ -156,9 +156,9 @@ def solve_newton_step(
     prescribed, respectively.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: State at which the ring was linearised.
-        ring: The linearised ring.
+        linear: The linearised ring.
         load: Prescribed torque or rotation.
         contacts: Candidates for tooth contact, m of them.
         pressing: Candidates that carry force in the first guess; by default those on
@@ -166,21 +166,21 @@ def solve_newton_step(
 
     Raises:
         ActiveSetError: If no set of active contacts is found.
-        SingularRingError: If the tangent of the ring is singular.
+        SingularCyclicError: If the tangent of the ring is singular.
     """
     sliding = _friction_lines(model, state, contacts)
     lines = contacts if sliding is None else sliding.lines
     strips = _strips(model, state, contacts)
-    condensed = _condense(ring, lines, strips)
-    matrix = _condensed_matrix(model, ring, condensed)
-    offset = _condensed_offset(model, state, ring, load, condensed)
+    condensed = _condense(linear, lines, strips)
+    matrix = _condensed_matrix(model, linear, condensed)
+    offset = _condensed_offset(model, state, linear, load, condensed)
     guess = _first_guess(state, contacts, offset, pressing)
     solution = _solve_condensed(matrix, offset, sliding, guess, load)
-    return _substituted(model, state, ring, load, contacts, condensed, solution)
+    return _substituted(model, state, linear, load, contacts, condensed, solution)
 
 
 def _friction_lines(
-    model: RingModel, state: State, contacts: Contacts
+    model: SectorModel, state: State, contacts: Contacts
 ) -> Sliding | None:
     """Normal and tangential lines of force; None without friction or candidates."""
     if model.friction is None or not len(contacts):
@@ -189,7 +189,7 @@ def _friction_lines(
     return Sliding.from_trial(model.friction, contacts, state.slip, last)
 
 
-def _strips(model: RingModel, state: State, contacts: Contacts) -> Strips | None:
+def _strips(model: SectorModel, state: State, contacts: Contacts) -> Strips | None:
     """Indentation strips of the candidates; None without indentation or candidates."""
     if model.indentation is None or not len(contacts):
         return None
@@ -197,16 +197,16 @@ def _strips(model: RingModel, state: State, contacts: Contacts) -> Strips | None
     return Strips.from_contacts(model.indentation, contacts, held, force)
 
 
-def _condense(ring: Linearised, lines: Contacts, strips: Strips | None) -> _Condensed:
+def _condense(linear: Linearised, lines: Contacts, strips: Strips | None) -> _Condensed:
     """Solve the ring for its gradient and for unit loads on lines and constraints."""
-    n, rows = len(lines), ring.gap_gradient(lines)
-    levers = np.zeros((*ring.gradient.shape, n + 2))
+    n, rows = len(lines), linear.gap_gradient(lines)
+    levers = np.zeros((*linear.gradient.shape, n + 2))
     levers[lines.sector, :, np.arange(n)] = rows
-    levers[:, :, n] = ring.anchor
-    levers[:, :, n + 1] = ring.rotation_gradient
-    columns = np.concatenate([-ring.gradient[:, :, None], levers], axis=2)
-    columns[ring.fixed] = 0.0
-    solved = CyclicFactor(ring.anchor_tangent(), ring.face_dofs).solve(columns)
+    levers[:, :, n] = linear.anchor
+    levers[:, :, n + 1] = linear.rotation_gradient
+    columns = np.concatenate([-linear.gradient[:, :, None], levers], axis=2)
+    columns[linear.fixed] = 0.0
+    solved = CyclicFactor(linear.anchor_tangent(), linear.face_dofs).solve(columns)
     return _Condensed(
         lines=lines,
         strips=strips,
@@ -218,7 +218,7 @@ def _condense(ring: Linearised, lines: Contacts, strips: Strips | None) -> _Cond
 
 
 def _condensed_matrix(
-    model: RingModel, ring: Linearised, condensed: _Condensed
+    model: SectorModel, linear: Linearised, condensed: _Condensed
 ) -> Array:
     """Matrix M of the condensed system (n + 3, n + 3)."""
     lines, strips, response = condensed.lines, condensed.strips, condensed.response
@@ -232,10 +232,10 @@ def _condensed_matrix(
     local = lines.weight @ model.element.flank_compliance
     same = lines.sector[:, None] == lines.sector[None, :]
     matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
-    ring_compliance = model.circular_spline.compliance
-    if ring_compliance is not None:
-        matrix[:n, :n] += ring_compliance.contact_compliance(
-            lines.tooth, lines.ring_weight, model.ring_teeth
+    circular_spline_compliance = model.circular_spline.compliance
+    if circular_spline_compliance is not None:
+        matrix[:n, :n] += circular_spline_compliance.contact_compliance(
+            lines.tooth, lines.circular_spline_weight, model.circular_spline_teeth
         )
     if strips is not None:
         m = len(strips.strip)
@@ -246,7 +246,7 @@ def _condensed_matrix(
         "snf,snl->fl", condensed.constraints, response
     )
     matrix[:n, constrained] = matrix[constrained, :n].T
-    matrix[n, n] -= 1.0 / ring.anchor_stiffness
+    matrix[n, n] -= 1.0 / linear.anchor_stiffness
     # turning the circular spline towards the teeth closes the gap by the lever arm
     arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
     matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
@@ -254,7 +254,11 @@ def _condensed_matrix(
 
 
 def _condensed_offset(
-    model: RingModel, state: State, ring: Linearised, load: Load, condensed: _Condensed
+    model: SectorModel,
+    state: State,
+    linear: Linearised,
+    load: Load,
+    condensed: _Condensed,
 ) -> Array:
     """Offset q of the condensed system (n + 3,)."""
     lines, strips, base = condensed.lines, condensed.strips, condensed.base
@@ -262,7 +266,11 @@ def _condensed_offset(
     # gaps without the old tooth forces; the new forces bring their own share
     local = lines.weight @ model.element.flank_compliance
     old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
-    old += np.einsum("kb,kb->k", lines.ring_weight, ring.ring_elastic[lines.tooth])
+    old += np.einsum(
+        "kb,kb->k",
+        lines.circular_spline_weight,
+        linear.circular_spline_elastic[lines.tooth],
+    )
     moved = np.einsum("kn,kn->k", condensed.rows, base[lines.sector])
     offset[:n] = lines.gap - old + moved
     if strips is not None:
@@ -271,8 +279,8 @@ def _condensed_offset(
     # anchor and rotation of the flexspline, torque on the circular spline
     constrained = np.array([n, n + 2])
     offset[constrained] = np.einsum("snf,sn->f", condensed.constraints, base)
-    offset[n + 1] = -(load.on_ring or 0.0) / model.copies
-    offset[n + 2] += ring.rotation - (load.rotation or 0.0)
+    offset[n + 1] = -(load.on_circular_spline or 0.0) / model.copies
+    offset[n + 2] += linear.rotation - (load.rotation or 0.0)
     return offset
 
 
@@ -295,7 +303,7 @@ def _solve_condensed(
     m = len(guess)
     k = m if sliding is None else m + len(sliding.stick)
     used = np.arange(k + 1)
-    if load.on_ring is not None:
+    if load.on_circular_spline is not None:
         used = np.append(used, k + 1)
     if load.rotation is not None:
         used = np.append(used, k + 2)
@@ -320,21 +328,21 @@ def _solve_condensed(
     z = np.zeros(k + 3)
     z[used] = values
     held = np.concatenate([np.flatnonzero(active), used[m:]])
-    anchor, ring_turn, multiplier = z[k:]
+    anchor, circular_spline_turn, multiplier = z[k:]
     return _Solution(
         force=z[:k] if sliding is None else sliding.forces(z[:k]),
         active=active,
         anchor=float(anchor),
-        ring_turn=float(ring_turn),
+        circular_spline_turn=float(circular_spline_turn),
         multiplier=float(multiplier),
         compliance=output_compliance(matrix, held, k, load),
     )
 
 
 def _substituted(
-    model: RingModel,
+    model: SectorModel,
     state: State,
-    ring: Linearised,
+    linear: Linearised,
     load: Load,
     contacts: Contacts,
     condensed: _Condensed,
@@ -345,7 +353,7 @@ def _substituted(
     loads = np.concatenate([force, [solution.anchor, solution.multiplier]])
     increment = condensed.base + condensed.response @ loads
     race_shift = increment[:, model.race_dofs[:-NODE]]
-    push = -model.stations.stiffness * ring.gap_after(increment)
+    push = -model.stations.stiffness * linear.gap_after(increment)
     holding = model.copies * solution.multiplier
     return NewtonStep(
         lines=condensed.lines,
@@ -355,27 +363,13 @@ def _substituted(
         torque=-holding if load.torque is None else load.torque,
         holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
         compliance=solution.compliance / model.copies,
-        ring_turn=solution.ring_turn,
+        circular_spline_turn=solution.circular_spline_turn,
         increment=increment,
-        shift=ring.rotate_to_global(increment),
+        shift=linear.rotate_to_global(increment),
         race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
         pressure=np.where(state.touching, push, 0.0),
         strip_error=0.0 if strips is None else strips.error(force[: len(contacts)]),
     )
-
-
-def wrong_stations(state: State, gap: Array) -> Array:
-    """Violation of the assumed contact state at each station.
-
-    Args:
-        state: State whose bore contact is assumed.
-        gap: Gap at each station (N, q) [m].
-
-    Returns:
-        Gap of stations assumed in contact, overlap of the others (N, q) [m]; positive
-        values are violations.
-    """
-    return np.asarray(np.where(state.touching, gap, -gap))
 
 
 def output_compliance(matrix: Array, held: Index, k: int, load: Load) -> float:
@@ -391,7 +385,7 @@ def output_compliance(matrix: Array, held: Index, k: int, load: Load) -> float:
         Rotation of the output against its load per torque [rad/(N·m)].
     """
     system = matrix[np.ix_(held, held)]
-    if load.on_ring is not None:
+    if load.on_circular_spline is not None:
         unit = (held == k + 1).astype(float)
         return -float(np.linalg.solve(system, unit)[held == k + 1][0])
     held = held[held <= k]

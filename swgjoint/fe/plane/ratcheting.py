@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
@@ -39,7 +39,7 @@ STEP = 0.04
 """Step of the output, in tooth pitches [-]."""
 SHORTEST = 1e-3
 """Step below which the search is abandoned, in tooth pitches [-]."""
-RING_RANGE = 2.0
+CIRCULAR_SPLINE_RANGE = 2.0
 """Largest accepted displacement of the circular spline, in lobe heights [-]. The error
 of its linear model is of second order in its rotation: a displacement of one lobe
 height at the pitch radius is a rotation of 0.02 to 0.04 rad, and its square amounts to
@@ -180,10 +180,10 @@ def path_follower(design: Design) -> Continuation:
         max_iterations=ITERATIONS,
         step_tolerance=small,
         thorough_below=10.0 * small,
-        ring_range=RING_RANGE,
+        circular_spline_range=CIRCULAR_SPLINE_RANGE,
     )
     return Continuation(
-        model=ring_model(perfect, half="auto", friction=False, bearing=False),
+        model=sector_model(perfect, half="auto", friction=False, bearing=False),
         ratio=design.ratio,
         layout=design.drive.layout,
         solver=solver,

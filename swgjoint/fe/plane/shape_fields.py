@@ -16,8 +16,8 @@ import numpy as np
 from swgjoint.fe.common.following import AnyState
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.elasticity import stress_maxima
-from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.sector_mesh import SectorMesh
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import flexspline_stress
 from swgjoint.gear.design.design import Design
@@ -103,7 +103,7 @@ def outline_rows(plane: SectorMesh) -> tuple[Index, Index]:
     return plane.bore[::EVERY], np.concatenate([right[half], left])
 
 
-def plane_surface(model: RingModel) -> ShapeSurface:
+def plane_surface(model: SectorModel) -> ShapeSurface:
     """Displayed surface of a sector of the 2D flexspline."""
     mesh = model.element.mesh
     flat = np.asarray(mesh.mesh.p).T
@@ -111,11 +111,13 @@ def plane_surface(model: RingModel) -> ShapeSurface:
     return surface_of(points, outline_rows(mesh))
 
 
-def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> SectorFields:
+def plane_fields(
+    model: SectorModel, state: State, surface: ShapeSurface
+) -> SectorFields:
     """Fields of an equilibrium of the 2D model.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: The equilibrium.
         surface: Displayed surface of a sector.
     """

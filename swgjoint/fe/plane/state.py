@@ -21,7 +21,7 @@ class StateFigures:
     rotation: float = 0.0
     """Best-fit rotation of the flexspline's bore [rad]; of the bore of the diaphragm in
     a 3D model."""
-    ring_rotation: float = 0.0
+    circular_spline_rotation: float = 0.0
     """Rotation of the circular spline [rad]."""
     torque: float = 0.0
     """Torque T of the output on its load, whole drive [N·m]."""
@@ -58,7 +58,7 @@ class State(StateFigures):
     """Whether each of these stations touches (N, q)."""
     flank_force: Array
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
-    ring_force: Array
+    circular_spline_force: Array
     """Tooth forces on the circular spline as nodal forces in the frames of its teeth
     (N_c, 2 n_c) [N]."""
     race: Array | None = None

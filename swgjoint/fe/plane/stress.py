@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.plane.elasticity import stress_maxima
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.typing import Array
 
 
-def flexspline_stress(model: RingModel, state: State) -> Array:
+def flexspline_stress(model: SectorModel, state: State) -> Array:
     """Nodal stresses of the flexspline.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
 
     Returns:
@@ -29,11 +29,11 @@ def flexspline_stress(model: RingModel, state: State) -> Array:
     )
 
 
-def circular_spline_stress(model: RingModel, state: State) -> Array | None:
+def circular_spline_stress(model: SectorModel, state: State) -> Array | None:
     """Nodal stresses of the circular spline.
 
     Args:
-        model: The ring.
+        model: The 2D model.
         state: An equilibrium.
 
     Returns:
@@ -43,11 +43,11 @@ def circular_spline_stress(model: RingModel, state: State) -> Array | None:
     compliance = model.circular_spline.compliance
     if compliance is None:
         return None
-    teeth = np.arange(model.ring_teeth)
+    teeth = np.arange(model.circular_spline_teeth)
     return _nodal_stress(
         compliance.element,
-        compliance.skeleton_displacement(state.ring_force),
-        state.ring_force,
+        compliance.skeleton_displacement(state.circular_spline_force),
+        state.circular_spline_force,
         np.asarray(2.0 * np.pi / model.circular_spline.profile.teeth * teeth, float),
     )
 
@@ -125,23 +125,27 @@ class MemberMaxima:
     """Stresses of the circular spline; None if it is rigid."""
 
     @classmethod
-    def from_state(cls, model: RingModel, state: State) -> MemberMaxima:
+    def from_state(cls, model: SectorModel, state: State) -> MemberMaxima:
         """Recover the largest stresses of a state.
 
         Args:
-            model: The ring.
+            model: The 2D model.
             state: An equilibrium.
         """
-        ring = circular_spline_stress(model, state)
+        circular_spline = circular_spline_stress(model, state)
         return cls(
             flexspline=StressMaxima.from_stress(flexspline_stress(model, state)),
-            circular_spline=None if ring is None else StressMaxima.from_stress(ring),
+            circular_spline=None
+            if circular_spline is None
+            else StressMaxima.from_stress(circular_spline),
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:
         """Values in MPa by member, null for a rigid circular spline."""
-        ring = self.circular_spline
+        circular_spline = self.circular_spline
         return {
             "flexspline": self.flexspline.to_json(),
-            "circular_spline": None if ring is None else ring.to_json(),
+            "circular_spline": None
+            if circular_spline is None
+            else circular_spline.to_json(),
         }

@@ -62,7 +62,7 @@ class ToothContact:
 
     element: Flanks
     circular_spline: CircularSpline
-    ring_flank: Array
+    circular_spline_flank: Array
     """Displacement of the circular spline's flank nodes in the frames of its teeth,
     including manufacturing errors (N_c, 2 n_c) [m]; no columns if rigid."""
     angle: Array
@@ -74,17 +74,21 @@ class ToothContact:
     """Whether the candidates need derivatives along the flanks, for friction."""
 
     @cached_property
-    def _ring_flanks(self) -> FlankSplines | None:
+    def _circular_spline_flanks(self) -> FlankSplines | None:
         """Displacements of the circular spline's flanks in their mirrored frames.
 
         Flank 2 tooth + side; None for rigid flanks.
         """
-        ring = self.circular_spline
-        if not ring.flank_dofs:
+        circular_spline = self.circular_spline
+        if not circular_spline.flank_dofs:
             return None
-        shaped = self.ring_flank.reshape(-1, 2, ring.flank_dofs // 4, 2)
+        shaped = self.circular_spline_flank.reshape(
+            -1, 2, circular_spline.flank_dofs // 4, 2
+        )
         shaped = shaped * _MIRROR[:, None, :]
-        return FlankSplines.fit(ring.spline, shaped.reshape(-1, *shaped.shape[2:]))
+        return FlankSplines.fit(
+            circular_spline.spline, shaped.reshape(-1, *shaped.shape[2:])
+        )
 
     def search(
         self,
@@ -169,7 +173,7 @@ class ToothContact:
         s = np.linspace(*element.flank_range, per_node * element.flank_size)
         base, outward, _ = element.profile.evaluate(s)
         points = base + element.spline(s) @ sides
-        # a flank can touch only where it reaches beyond the ring's tip circle
+        # a flank can touch only beyond the tip circle of the circular spline
         farthest = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
         deep = farthest > self.circular_spline.profile.addendum_radius
         sector, side = sector[deep], side[deep]
@@ -205,21 +209,22 @@ class ToothContact:
             start: Arc lengths near the feet (n,) [m].
             steps: Newton steps to the foot.
         """
-        ring = self.circular_spline
-        teeth = ring.profile.teeth
+        circular_spline = self.circular_spline
+        teeth = circular_spline.profile.teeth
         pitch = 2.0 * pi / teeth
         sign = np.where(side == 0, 1.0, -1.0)
         # mirrored global frame: the tooth is at sign * angle; a right flank faces the
-        # left flank of the next ring tooth clockwise, half a pitch from the space
+        # left flank of the circular spline's next tooth clockwise, half a pitch from
+        # the space
         space = np.round(sign * self.bearing[sector] / pitch)
         turn = sign * self.angle[sector] - (space - 0.5) * pitch
         seen = rotate(points, turn) * _MIRROR[1]
         facing = rotate(outward, turn) * _MIRROR[1]
-        # ring tooth j is half a pitch counter-clockwise from space j
+        # tooth j of the circular spline is half a pitch counter-clockwise from space j
         tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
-        tooth %= len(self.ring_flank)
-        flanks = None if rigid else self._ring_flanks
-        feet = ring.feet(
+        tooth %= len(self.circular_spline_flank)
+        flanks = None if rigid else self._circular_spline_flanks
+        feet = circular_spline.feet(
             seen,
             flanks,
             2 * tooth + 1 - side,
@@ -321,12 +326,12 @@ class ToothContact:
         tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
         # the mirror between a flank and the one that it faces reverses tangents
         facing, out = _MIRROR[1 - side], seen.feet.normal
-        ring_normal = out * facing
-        ring_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
-        ring_spline = np.zeros((n, 0))
+        circular_spline_normal = out * facing
+        circular_spline_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
+        circular_spline_shapes = np.zeros((n, 0))
         slip, none = np.full(n, np.nan), np.zeros((n, 0))
         if seen.feet.station is not None:
-            ring_spline = self.circular_spline.spline(seen.feet.station)
+            circular_spline_shapes = self.circular_spline.spline(seen.feet.station)
             slip = station + seen.feet.station
         contacts = Contacts(
             sector=sector,
@@ -337,10 +342,14 @@ class ToothContact:
             point=point,
             weight=_on_flank(side, spline, normal),
             tooth=seen.tooth,
-            ring_weight=-_on_flank(1 - side, ring_spline, ring_normal),
+            circular_spline_weight=-_on_flank(
+                1 - side, circular_spline_shapes, circular_spline_normal
+            ),
             tangent=tangent,
             sliding=_on_flank(side, spline, tangent) if self.rubs else none,
-            ring_sliding=-_on_flank(1 - side, ring_spline, ring_tangent)
+            circular_spline_sliding=-_on_flank(
+                1 - side, circular_spline_shapes, circular_spline_tangent
+            )
             if self.rubs
             else none,
             slip=slip,

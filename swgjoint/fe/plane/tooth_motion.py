@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.teeth.conjugate import conjugate_profile
 from swgjoint.gear.teeth.neutral_line import Pose
@@ -80,7 +80,7 @@ def deflected_rim(design: Design) -> DeflectedRim:
         DesignError: If the design cannot be built.
         ComputationError: If the deflection fails.
     """
-    model = ring_model(
+    model = sector_model(
         design,
         half="auto",
         elastic_circular_spline=False,

@@ -11,7 +11,7 @@ from swgjoint.fe.rings.assembly import BandedAssembly
 from swgjoint.fe.rings.facing import Facing, distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.race_on_balls import PressedBalls, pressed_form
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.typing import Array, Index
 
 PARTS = ("rim", "race", "balls", "bore", "teeth")
@@ -19,8 +19,8 @@ PARTS = ("rim", "race", "balls", "bore", "teeth")
 
 
 def linearise(
-    model: ThinRing, state: RingState, *, teeth: bool
-) -> tuple[RingState, BandedAssembly, int]:
+    model: ThinRing, state: ThinRingState, *, teeth: bool
+) -> tuple[ThinRingState, BandedAssembly, int]:
     """Forces and tangent at the positions of a state.
 
     Args:
@@ -54,7 +54,7 @@ def linearise(
     return replace(state, energy=total.energy), total, held
 
 
-def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
+def race_on_balls(model: ThinRing, state: ThinRingState, race: Array) -> PressedBalls:
     """Contact of a state's balls with a race.
 
     Args:
@@ -66,8 +66,8 @@ def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBall
 
 
 def _balls(
-    model: ThinRing, state: RingState, race: Array, total: BandedAssembly
-) -> RingState:
+    model: ThinRing, state: ThinRingState, race: Array, total: BandedAssembly
+) -> ThinRingState:
     pressed = race_on_balls(model, state, race)
     on = np.flatnonzero(pressed.overlap > 0.0)
     near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
@@ -85,8 +85,12 @@ def _balls(
 
 
 def _bore(
-    model: ThinRing, state: RingState, rim: Array, race: Array, total: BandedAssembly
-) -> RingState:
+    model: ThinRing,
+    state: ThinRingState,
+    rim: Array,
+    race: Array,
+    total: BandedAssembly,
+) -> ThinRingState:
     """Unilateral contact of the rim's bore with the race."""
     points = model.bore.points(rim)[0]
     seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
@@ -106,8 +110,8 @@ def _bore(
 
 
 def _teeth(
-    model: ThinRing, state: RingState, rim: Array, total: BandedAssembly
-) -> RingState:
+    model: ThinRing, state: ThinRingState, rim: Array, total: BandedAssembly
+) -> ThinRingState:
     """Contact of the tooth flanks."""
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]

@@ -23,12 +23,12 @@ from swgjoint.errors import Outcome
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.rings.contacts import linearise
 from swgjoint.fe.rings.model import ThinRing
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class RingSolver:
+class ThinRingSolver:
     """Settings of the iteration."""
 
     max_iterations: int = 80
@@ -46,12 +46,12 @@ class RingSolver:
     def __call__(
         self,
         model: ThinRing,
-        start: RingState,
+        start: ThinRingState,
         *,
         torque: float | None = None,
         rotation: float | None = None,
         teeth: bool = True,
-    ) -> RingState:
+    ) -> ThinRingState:
         """Equilibrium at the wave-generator angle of ``start``.
 
         Args:
@@ -134,12 +134,12 @@ def rim_rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
 
 def _finished(
     model: ThinRing,
-    state: RingState,
+    state: ThinRingState,
     outcome: Outcome,
     history: list[float],
     *,
     teeth: bool,
-) -> RingState:
+) -> ThinRingState:
     """The state with forces and energy at its final positions."""
     state, _, _ = linearise(model, state, teeth=teeth)
     psi, _ = rim_rotation(model, state.q, state.rotation)

@@ -6,9 +6,9 @@ from math import pi
 
 import numpy as np
 
-from swgjoint.fe.rings.equilibrium import RingSolver
+from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.model import ThinRing
-from swgjoint.fe.rings.state import RingState, initial_state
+from swgjoint.fe.rings.state import ThinRingState, initial_state
 from swgjoint.typing import Array
 
 SMALL = 0.01
@@ -32,7 +32,7 @@ def positions(model: ThinRing, count: int) -> Array:
     return np.asarray(passage * (k + 0.5) / count + pitch * np.mod(k * GOLDEN, 1.0))
 
 
-def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
+def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRingState:
     """The drive with its output held at the ideal ratio.
 
     Args:
@@ -41,12 +41,12 @@ def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingSta
         phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
     """
     start = initial_state(model, alpha, phase)
-    solver, psi = RingSolver(), start.rotation
+    solver, psi = ThinRingSolver(), start.rotation
     state = solver(model, start, rotation=psi, teeth=False)
     return solver(model, state, rotation=psi) if state.outcome.ok else state
 
 
-def without_torque(model: ThinRing, alpha: float) -> RingState:
+def without_torque(model: ThinRing, alpha: float) -> ThinRingState:
     """The unloaded drive; an output that clearance leaves free is at the ideal ratio.
 
     Args:
@@ -55,11 +55,11 @@ def without_torque(model: ThinRing, alpha: float) -> RingState:
     """
     state = solve_unloaded(model, alpha)
     if state.outcome.ok and state.loaded_teeth:
-        state = RingSolver()(model, state, torque=0.0)
+        state = ThinRingSolver()(model, state, torque=0.0)
     return state
 
 
-def solve_loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
+def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRingState:
     """Equilibrium under a torque, reached in halved steps if the full step fails.
 
     Args:
@@ -71,7 +71,7 @@ def solve_loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
     Returns:
         The equilibrium, or the state of the last failed step.
     """
-    solver = RingSolver()
+    solver = ThinRingSolver()
     begin = state.torque if state.loaded_teeth else 0.0
     done, step, halved = 0.0, 1.0, 0
     while done < 1.0:

@@ -19,7 +19,7 @@ from swgjoint.fe.rings.facing import FacingSurface
 from swgjoint.fe.rings.hermite_ring import GAUSS, HermiteRing
 from swgjoint.fe.rings.race_on_balls import RaceOnBalls
 from swgjoint.fe.rings.sections import rim_section, tooth_pair_stiffness
-from swgjoint.fe.rings.teeth import RingTeeth
+from swgjoint.fe.rings.teeth import ThinRingTeeth
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.design.check import raise_faults
@@ -41,7 +41,7 @@ class ThinRing(RaceOnBalls):
 
     rim: HermiteRing
     nodes_per_tooth: int
-    teeth: RingTeeth
+    teeth: ThinRingTeeth
     press: float
     """Contact stiffness of bore and race per length of the rim's line [N/m^2]."""
 
@@ -140,18 +140,20 @@ def thin_ring(design: Design) -> ThinRing:
     yielding = 0.5 * (
         thickness / rim_steel + bearing.race_thickness / bearing.material.youngs_modulus
     )
-    ring_errors = tooth_errors(design, "circular_spline").shift
+    circular_spline_errors = tooth_errors(design, "circular_spline").shift
     return ThinRing(
         **vars(RaceOnBalls.from_design(design, rim.elements)),
         rim=rim,
         nodes_per_tooth=per_tooth,
-        teeth=RingTeeth(
+        teeth=ThinRingTeeth(
             flexspline=flexspline,
             circular_spline=circular_spline,
             foot_radius=section.neutral_radius,
             stiffness=tooth_pair_stiffness(flexspline_sector, ring_sector),
             shift=tooth_errors(design, "flexspline").shift,
-            ring_shift=ring_errors if ring_errors.any() else None,
+            circular_spline_shift=circular_spline_errors
+            if circular_spline_errors.any()
+            else None,
         ),
         press=bearing.race_width / yielding,
     )

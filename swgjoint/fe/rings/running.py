@@ -33,7 +33,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.sliding import sliding_sums
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array
 
@@ -144,7 +144,7 @@ def running_friction(
 
 def _standing(
     design: Design, model: ThinRing, theta: float, torque: float
-) -> RingState:
+) -> ThinRingState:
     """Equilibrium under a torque at an input angle."""
     state = without_torque(model, theta)
     if state.outcome.ok and torque:

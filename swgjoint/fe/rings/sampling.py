@@ -22,10 +22,10 @@ from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.drive2d import can_halve, unmodelled_parts
 from swgjoint.fe.rings import model as thin
 from swgjoint.fe.rings.contacts import race_on_balls
-from swgjoint.fe.rings.equilibrium import RingSolver
+from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
@@ -101,7 +101,7 @@ def ball_passage(design: Design, model: ThinRing) -> BallPassage:
     )
 
 
-def sample_rings(
+def sample_thin_rings(
     design: Design,
     *,
     angles: int | None = None,
@@ -328,7 +328,7 @@ def _position(
     torque at which a solve fails.
     """
 
-    def row(state: RingState, torque: float) -> list[float]:
+    def row(state: ThinRingState, torque: float) -> list[float]:
         race = state.q[model.rim.size :]
         rolled = race_on_balls(model, state, race).cage_torque
         # torque per input speed at the order of the map
@@ -346,7 +346,7 @@ def _position(
     sides = [solve_loaded(model, rest, t) for t in (small, -small)]
     if not all(side.outcome.ok for side in sides):
         return {}, False
-    solver = RingSolver()
+    solver = ThinRingSolver()
     psi = 0.5 * (sides[0].rotation + sides[1].rotation)
     middle = solver(model, rest, rotation=psi)
     free = not middle.loaded_teeth

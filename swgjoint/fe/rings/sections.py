@@ -13,7 +13,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from swgjoint.fe.plane.circular_spline import ring_compliance
+from swgjoint.fe.plane.circular_spline import circular_spline_compliance
 from swgjoint.fe.plane.superelement import Superelement
 
 
@@ -99,7 +99,7 @@ def tooth_pair_stiffness(
         flexspline: Condensed sector of the flexspline.
         circular_spline: Condensed sector of the circular spline.
     """
-    ring = ring_compliance(circular_spline)
+    ring = circular_spline_compliance(circular_spline)
     same_tooth = ring.flank[int(np.flatnonzero(ring.offsets == 0)[0])]
     total = 0.0
     for element, compliance in (

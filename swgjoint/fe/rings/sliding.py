@@ -7,12 +7,12 @@ import numpy as np
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
-from swgjoint.fe.rings.state import RingState
+from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.typing import Array
 
 
 def sliding_sums(
-    model: ThinRing, first: RingState, last: RingState
+    model: ThinRing, first: ThinRingState, last: ThinRingState
 ) -> tuple[float, float]:
     r"""Sums of N |sigma| of the teeth and of the race between two equilibria [J].
 
@@ -30,7 +30,7 @@ def sliding_sums(
     )
 
 
-def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
+def _teeth(model: ThinRing, state: ThinRingState, other: ThinRingState) -> float:
     """Sum of N |sigma| of one state's contacts as their teeth move to another state."""
     contacts, force = state.contacts, state.tooth_force
     if contacts is None or force is None or not len(force):
@@ -44,14 +44,14 @@ def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
     return float(force @ np.abs(np.einsum("ni,ni->n", moved, along)))
 
 
-def _tooth_frames(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+def _tooth_frames(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
     """Positions of the teeth on the rim (N, 2) [m] and their angles (N,) [rad]."""
     nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     slope = nodes[:, 1]
     return nodes[:, 0], np.arctan2(-slope[:, 1], -slope[:, 0])
 
 
-def _race(model: ThinRing, first: RingState, last: RingState) -> float:
+def _race(model: ThinRing, first: ThinRingState, last: ThinRingState) -> float:
     """Sum of N |sigma| of the bore on the race, which creeps so that it is least."""
     forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
     count = model.race.elements
@@ -63,7 +63,7 @@ def _race(model: ThinRing, first: RingState, last: RingState) -> float:
     return float(weight @ np.abs(slid - weighted_median(slid, weight)))
 
 
-def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+def _pressed(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
     """Forces of the bore's contact points on the race [N], and their feet on it."""
     rim, race = np.split(state.q, [model.rim.size])
     points = model.bore.points(rim)[0]

@@ -14,7 +14,7 @@ from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RingState:
+class ThinRingState:
     """One equilibrium, or the start of the search for one."""
 
     q: Array
@@ -63,7 +63,7 @@ class RingState:
         return 0 if self.tooth_force is None else len(self.tooth_force)
 
 
-def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
+def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRingState:
     """Start of a search: both rings deflected by two lobes without stretch.
 
     Both rings have rotated with the flexspline at the ideal ratio, any number of turns.
@@ -81,7 +81,7 @@ def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> RingStat
     centres, _, _ = model.balls(alpha, phase)
     share = model.race.elements / (2.0 * np.pi)
     angle = np.arctan2(-centres[:, 0], centres[:, 1]) - psi
-    return RingState(
+    return ThinRingState(
         q=np.concatenate(parts),
         ball_feet=np.mod(angle, 2.0 * np.pi) * share,
         bore_feet=model.bore.place.copy(),

@@ -47,7 +47,7 @@ class RigidFlanks:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RingTeeth:
+class ThinRingTeeth:
     """Teeth of both members; the flexspline's are fixed to the mean line of the rim."""
 
     flexspline: ToothProfile
@@ -58,7 +58,7 @@ class RingTeeth:
     """Stiffness of a tooth pair along the common normal [N/m]."""
     shift: Array
     """Errors of the flexspline's teeth in their frames (N, 2) [m]."""
-    ring_shift: Array | None = None
+    circular_spline_shift: Array | None = None
     """Errors of the circular spline's teeth in their frames (N_c, 2) [m]; None without
     errors."""
 
@@ -69,7 +69,7 @@ class RingTeeth:
     @cached_property
     def _facing(self) -> CircularSpline:
         profile = self.circular_spline
-        if self.ring_shift is None:
+        if self.circular_spline_shift is None:
             return CircularSpline(profile=profile)
         return CircularSpline(profile=profile, weights=_flank_spline(profile))
 
@@ -87,13 +87,13 @@ class RingTeeth:
         offset = rotate(foot, -angle)
         offset[:, 1] -= self.foot_radius
         offset = offset + self.shift
-        ring_flank = np.zeros((self.circular_spline.teeth, 0))
-        if self.ring_shift is not None:
-            ring_flank = np.tile(self.ring_shift, 2 * NODES)
+        circular_spline_flank = np.zeros((self.circular_spline.teeth, 0))
+        if self.circular_spline_shift is not None:
+            circular_spline_flank = np.tile(self.circular_spline_shift, 2 * NODES)
         search = ToothContact(
             element=self._flanks,
             circular_spline=self._facing,
-            ring_flank=ring_flank,
+            circular_spline_flank=circular_spline_flank,
             angle=angle,
             bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
         )

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 from swgjoint.fe.solid.linearise import SolidLinearised
-from swgjoint.fe.solid.ring import SolidRing
-from swgjoint.fe.solid.ring_factor import RingFactor
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Array
@@ -38,7 +38,7 @@ class Condensed:
 
 
 def condense(
-    ring: SolidRing,
+    model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
     found: ToothRows | None,
@@ -47,22 +47,22 @@ def condense(
     """Condense the ring to tooth contacts and rotations.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: State at which the ring is linearised.
         linear: The linearised ring.
         found: Tooth contacts; None without.
         rotation: Rotation to which the bore of the diaphragm is brought [rad]; None
             keeps that of the state.
     """
-    masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
-    teeth_dofs, held = ring.dofs(strip.teeth.masters), ring.dofs(masters.held)
+    masters, bore, strip = model.strip.masters, linear.bore, model.strip
+    teeth_dofs, held = model.dofs(strip.teeth.masters), model.dofs(masters.held)
     n_sectors, size = linear.gradient.shape
     n = 0 if found is None else len(found)
     # prescribed motions of the diaphragm's bore: to its position, and by a rotation
     rotation = state.rotation if rotation is None else rotation
-    target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
+    target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), model.reference)
     value = np.zeros((n_sectors, size, 2))
-    still = target - ring.masters(state)
+    still = target - model.masters(state)
     value[:, held, 0] = still[:, masters.held].reshape(n_sectors, -1)
     around = np.stack([-target[..., 1], target[..., 0], 0.0 * target[..., 2]], axis=-1)
     value[:, held, 1] = around[:, masters.held].reshape(n_sectors, -1)
@@ -72,23 +72,27 @@ def condense(
     coupling = np.zeros((n, bore.gap.shape[1]))
     if found is not None and n:
         sector = found.contacts.sector
-        loads = ring.loads(state)
+        loads = model.loads(state)
         flank = strip.flank_dofs
         through = found.weight @ strip.teeth.compliance[:flank]
         at_bore = through[:, flank:].reshape(n, -1, 3)
         coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
         coupling = bore.with_vertices(coupling, sector)
         eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
-        into = ring.contact_dofs
+        into = model.contact_dofs
         rows[:, into] = -np.einsum("kp,kpm->km", eased, bore.rows[sector])
         rows[:, teeth_dofs] += found.rows
         same = sector[:, None] == sector[None, :]
-        local = ring.teeth.compliance(found)
+        local = model.teeth.compliance(found)
         local -= np.where(same, np.einsum("kp,lp->kl", eased, coupling), 0.0)
         old = np.einsum("kb,kb->k", through, loads[sector])
-        if ring.teeth.ring_gear is not None:
-            moved = ring.teeth.ring_gear.displacement(state.ring_force)
-            old += np.einsum("kb,kb->k", found.ring_weight, moved[found.contacts.tooth])
+        if model.teeth.elastic_circular_spline is not None:
+            moved = model.teeth.elastic_circular_spline.displacement(
+                state.circular_spline_force
+            )
+            old += np.einsum(
+                "kb,kb->k", found.circular_spline_weight, moved[found.contacts.tooth]
+            )
         gap = found.contacts.gap - old
         gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
 
@@ -106,11 +110,11 @@ def condense(
     columns[:, held] = 0.0
     if linear.race is not None:
         fixed = np.zeros((n_sectors, size), dtype=bool)
-        fixed[:, ring.race_dofs] = linear.race.fixed
+        fixed[:, model.race_dofs] = linear.race.fixed
         matrix[fixed], columns[fixed] = 0.0, 0.0
         matrix.transpose(0, 2, 1)[fixed] = 0.0
         matrix.reshape(n_sectors, -1)[:, :: size + 1][fixed] = scale
-    solved = _solve_ring(ring, matrix, columns)
+    solved = _solve_sectors(model, matrix, columns)
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
 
@@ -125,7 +129,7 @@ def condense(
         system[:n, : n + 1] = seen
         system[:n, :n] += local
         # turning the circular spline towards the teeth closes the gap by the lever arm
-        system[:n, n + 1] = system[n + 1, :n] = -found.ring_arm
+        system[:n, n + 1] = system[n + 1, :n] = -found.circular_spline_arm
         offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
     system[n], offset[n] = -system[n], -offset[n]
     return Condensed(
@@ -133,13 +137,13 @@ def condense(
     )
 
 
-def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
+def _solve_sectors(model: SolidSectorModel, matrix: Array, columns: Array) -> Array:
     """Solve with the last face of a half model in the frame of the first face."""
-    sign = ring.face_closure
+    sign = model.face_closure
     size = len(sign)
     matrix[-1, -size:] *= sign[:, None]
     matrix[-1, :, -size:] *= sign
     columns[-1, -size:] *= sign[:, None]
-    solved = RingFactor(matrix, size).solve(columns)
+    solved = DenseCyclicFactor(matrix, size).solve(columns)
     solved[-1, -size:] *= sign[:, None]
     return solved

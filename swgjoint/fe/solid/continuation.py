@@ -7,12 +7,12 @@ from math import pi
 
 import numpy as np
 
+from swgjoint.fe.common.cyclic import shift_rows
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.common.influence import Influence
-from swgjoint.fe.plane.ring import shift_rows
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.gear.kinematics import Layout, member_angles
@@ -27,7 +27,7 @@ class SolidContinuation(Follower[SolidState]):
     rotation of the flexspline is that of the diaphragm's bore.
     """
 
-    ring: SolidRing
+    model: SolidSectorModel
     ratio: float
     layout: Layout = "circular_spline_fixed"
     solver: SolidSolver = field(default_factory=SolidSolver)
@@ -35,10 +35,10 @@ class SolidContinuation(Follower[SolidState]):
     @property
     def teeth(self) -> int:
         """Number of teeth of the flexspline."""
-        return self.ring.strip.sectors
+        return self.model.strip.sectors
 
     @property
-    def ring_is_output(self) -> bool:
+    def circular_spline_is_output(self) -> bool:
         """Whether the circular spline is the output."""
         return self.layout != "circular_spline_fixed"
 
@@ -56,7 +56,11 @@ class SolidContinuation(Follower[SolidState]):
 
     def output_angle(self, state: SolidState) -> float:
         """Output angle psi [rad]."""
-        return state.ring_rotation if self.ring_is_output else state.rotation
+        return (
+            state.circular_spline_rotation
+            if self.circular_spline_is_output
+            else state.rotation
+        )
 
     def deflect(self, angle: float = 0.0) -> SolidState:
         """Flexspline deflected by the wave generator, without tooth contact.
@@ -64,11 +68,11 @@ class SolidContinuation(Follower[SolidState]):
         Args:
             angle: Input angle [rad]; the members are at the ideal ratio.
         """
-        alpha, rotation, ring_rotation = self._ideal(angle)
-        start = self.ring.initial_guess(alpha, rotation)
+        alpha, rotation, circular_spline_rotation = self._ideal(angle)
+        start = self.model.initial_guess(alpha, rotation)
         load = SolidLoad(rotation=rotation, teeth=False)
-        state = self.solver(self.ring, start, load)
-        return replace(state, ring_rotation=ring_rotation)
+        state = self.solver(self.model, start, load)
+        return replace(state, circular_spline_rotation=circular_spline_rotation)
 
     def load(self, start: SolidState, torque: float, angle: float) -> SolidState:
         """Equilibrium under a torque at an input angle.
@@ -78,15 +82,15 @@ class SolidContinuation(Follower[SolidState]):
             torque: Output torque [N·m].
             angle: Input angle [rad].
         """
-        if not self.ring_is_output:
-            return self.solver(self.ring, start, SolidLoad(torque=torque))
+        if not self.circular_spline_is_output:
+            return self.solver(self.model, start, SolidLoad(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
-        return self.solver(self.ring, start, SolidLoad(torque=torque, rotation=held))
+        return self.solver(self.model, start, SolidLoad(torque=torque, rotation=held))
 
     def hold_output(self, state: SolidState) -> SolidState:
         """Equilibrium with the output fixed at its angle; the torque is a result."""
-        fixed = self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
-        if self.ring_is_output:
+        fixed = self.solver(self.model, state, SolidLoad(rotation=state.rotation))
+        if self.circular_spline_is_output:
             return replace(fixed, torque=-fixed.tooth_moment)
         return fixed
 
@@ -98,9 +102,9 @@ class SolidContinuation(Follower[SolidState]):
             output: New output angle [rad].
         """
         alpha = state.wave_generator_angle
-        if self.ring_is_output:
+        if self.circular_spline_is_output:
             return self._moved(state, alpha, state.rotation, output)
-        return self._moved(state, alpha, output, state.ring_rotation)
+        return self._moved(state, alpha, output, state.circular_spline_rotation)
 
     def predict(self, state: SolidState, angle: float) -> SolidState:
         """Predictor that moves the displacement field with the wave generator.
@@ -112,17 +116,21 @@ class SolidContinuation(Follower[SolidState]):
             angle: New input angle [rad].
         """
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
-        alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
+        alpha, rotation, circular_spline_rotation = (
+            y - x for x, y in zip(was, now, strict=True)
+        )
         return self._moved(
             state,
             state.wave_generator_angle + alpha,
             state.rotation + rotation,
-            state.ring_rotation + ring_rotation,
+            state.circular_spline_rotation + circular_spline_rotation,
         )
 
     def influence(self, state: SolidState) -> Influence:
         """Influence of the gap of every tooth on the output at an equilibrium."""
-        return influence(self.ring, state, ring_is_output=self.ring_is_output)
+        return influence(
+            self.model, state, circular_spline_is_output=self.circular_spline_is_output
+        )
 
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
@@ -135,34 +143,41 @@ class SolidContinuation(Follower[SolidState]):
             tilt: Slope of the circular spline's axis (2,) [rad].
         """
         teeth = replace(
-            self.ring.teeth, shift=flexspline, ring_shift=circular_spline, tilt=tilt
+            self.model.teeth,
+            shift=flexspline,
+            circular_spline_shift=circular_spline,
+            tilt=tilt,
         )
-        return replace(self, ring=replace(self.ring, teeth=teeth))
+        return replace(self, model=replace(self.model, teeth=teeth))
 
     def _ideal(self, theta: float) -> tuple[float, float, float]:
         """Angles of wave generator, flexspline and circular spline."""
         return member_angles(self.layout, theta, theta / self.ratio)
 
     def _moved(
-        self, state: SolidState, alpha: float, rotation: float, ring_rotation: float
+        self,
+        state: SolidState,
+        alpha: float,
+        rotation: float,
+        circular_spline_rotation: float,
     ) -> SolidState:
-        ring, strip = self.ring, self.ring.strip
+        model, strip = self.model, self.model.strip
         d_alpha = alpha - state.wave_generator_angle
         shift = (d_alpha - (rotation - state.rotation)) / (2.0 * pi / strip.sectors)
-        teeth = ring.teeth.circular_spline.profile.teeth
+        teeth = model.teeth.circular_spline.profile.teeth
         size = strip.masters.face_size
         last = strip.masters.size - size
         still = strip.masters.position[:last]
-        there = about_z(np.array(state.rotation)) @ ring.place
+        there = about_z(np.array(state.rotation)) @ model.place
         local = np.concatenate([state.faces, state.inside], axis=1)
         local = np.einsum("sji,saj->sai", there, local) - still
         moved = shift_rows(local, shift) + still
-        now = about_z(np.array(rotation)) @ ring.place
+        now = about_z(np.array(rotation)) @ model.place
         x = np.einsum("sij,saj->sai", now, moved)
         race = state.race
-        if ring.race is not None and race is not None:
-            moved = shift_rows(ring.race.displacements(race, state.rotation), shift)
-            race = ring.race.coordinates(moved, rotation)
+        if model.race is not None and race is not None:
+            moved = shift_rows(model.race.displacements(race, state.rotation), shift)
+            race = model.race.coordinates(moved, rotation)
         return replace(
             state,
             faces=x[:, :size],
@@ -173,11 +188,12 @@ class SolidContinuation(Follower[SolidState]):
             shared=np.roll(state.shared, round(shift), axis=0),
             bore_force=shift_rows(state.bore_force, shift),
             flank_force=shift_rows(state.flank_force, shift),
-            ring_force=shift_rows(
-                state.ring_force,
-                (d_alpha - (ring_rotation - state.ring_rotation)) / (2.0 * pi / teeth),
+            circular_spline_force=shift_rows(
+                state.circular_spline_force,
+                (d_alpha - (circular_spline_rotation - state.circular_spline_rotation))
+                / (2.0 * pi / teeth),
             ),
             wave_generator_angle=alpha,
             rotation=rotation,
-            ring_rotation=ring_rotation,
+            circular_spline_rotation=circular_spline_rotation,
         )

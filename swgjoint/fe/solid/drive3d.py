@@ -8,9 +8,9 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.common.contact_patch import average_spline
 from swgjoint.fe.plane.circular_spline import CircularSpline
 from swgjoint.fe.plane.drive2d import Half, can_halve
+from swgjoint.fe.solid.circular_spline import condense_circular_spline
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
-from swgjoint.fe.solid.ring import SolidRing
-from swgjoint.fe.solid.ring_gear import ring_gear
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.strip.strip import flexspline
@@ -30,7 +30,7 @@ Bearing = Literal["free", "held"]
 """Whether the ball grooves leave the race free along the axis or hold it."""
 
 
-def solid_ring(
+def solid_sector_model(
     design: Design,
     *,
     half: Half = False,
@@ -38,7 +38,7 @@ def solid_ring(
     elastic_circular_spline: bool = True,
     orders: Orders | None = None,
     bearing: Bearing | None = None,
-) -> SolidRing:
+) -> SolidSectorModel:
     """3D model of a design.
 
     Args:
@@ -72,13 +72,15 @@ def solid_ring(
     facing = tooth_profile(design, "circular_spline")
     orders = orders or Orders()
     mesh = flexspline_strip(design, profile)
-    ring = circular_spline_strip(design, facing) if elastic_circular_spline else None
+    spline_mesh = (
+        circular_spline_strip(design, facing) if elastic_circular_spline else None
+    )
     sectors = design.drive.teeth_flexspline // (2 if half else 1)
-    require_solid_memory(name, required_memory(mesh, ring, sectors, orders))
+    require_solid_memory(name, required_memory(mesh, spline_mesh, sectors, orders))
     strip = flexspline(design, profile, mesh, orders=orders)
     gear, surface = None, CircularSpline(profile=facing)
-    if ring is not None:
-        gear = ring_gear(design, facing, ring)
+    if spline_mesh is not None:
+        gear = condense_circular_spline(design, facing, spline_mesh)
         stations = gear.mesh.teeth.plane.flank_stations[:-1]
         surface = CircularSpline(profile=facing, weights=average_spline(stations))
     shape, errors = design.micro_geometry, dict[str, Array]()
@@ -89,17 +91,18 @@ def solid_ring(
             )
         errors = {
             "shift": tooth_errors(design, "flexspline").shift,
-            "ring_shift": tooth_errors(design, "circular_spline").shift,
+            "circular_spline_shift": tooth_errors(design, "circular_spline").shift,
             "tilt": axis_tilt(design),
         }
-    return SolidRing(
+    return SolidSectorModel(
         strip=strip,
         wave_generator=WaveGeneratorSurface.from_design(design),
         teeth=SolidTeeth(
             strip=strip,
             circular_spline=surface,
-            ring_gear=gear,
-            ring_teeth=design.drive.teeth_circular_spline // (2 if half else 1),
+            elastic_circular_spline=gear,
+            circular_spline_teeth=design.drive.teeth_circular_spline
+            // (2 if half else 1),
             crowning=FlankCrowning(
                 height=shape.flexspline_crowning_um * um,
                 width=design.drive.face_width_mm * mm,

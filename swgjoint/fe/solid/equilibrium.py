@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
-from swgjoint.fe.common.cyclic import SingularRingError
+from swgjoint.fe.common.cyclic import SingularCyclicError
 from swgjoint.fe.solid.condensation import condense
 from swgjoint.fe.solid.corotation import energies
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
@@ -67,12 +67,12 @@ class SolidSolver:
     """Displacement increment from which the search counts as diverged [m]."""
 
     def __call__(
-        self, ring: SolidRing, start: SolidState, load: SolidLoad
+        self, model: SolidSectorModel, start: SolidState, load: SolidLoad
     ) -> SolidState:
         """Equilibrium at the wave-generator angle of ``start``.
 
         Args:
-            ring: The ring.
+            model: The 3D model.
             start: State from which the search starts.
             load: Prescribed torque and rotation.
 
@@ -86,26 +86,26 @@ class SolidSolver:
         released = np.zeros(start.shared.shape, int)
         try:
             for iteration in range(self.max_iterations):
-                linear = linearise(ring, state, kept=released >= RELEASES)
-                reach = (0.02 if iteration > 2 else 0.1) * ring.lobe_height
+                linear = linearise(model, state, kept=released >= RELEASES)
+                reach = (0.02 if iteration > 2 else 0.1) * model.lobe_height
                 # once thorough, always thorough: contacts that only this search finds
                 # would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
-                step = _solve_linear(ring, state, linear, load, reach, thorough)
+                step = _solve_linear(model, state, linear, load, reach, thorough)
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
                 longest = 0.5 if _takes_back(step.increment, last) else 1.0
-                damping = min(longest, self.stride * ring.lobe_height / step.largest)
+                damping = min(longest, self.stride * model.lobe_height / step.largest)
                 last = step.increment
                 # a set of contacts that repeats would repeat for ever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
                 shared = state.shared
                 state, settled = _advance(
-                    ring, state, linear, step, damping, one_at_a_time=repeats
+                    model, state, linear, step, damping, one_at_a_time=repeats
                 )
                 released += shared & ~state.shared
                 small = step.largest < self.step_tolerance and damping == 1.0
@@ -113,13 +113,13 @@ class SolidSolver:
                     free = load.torque is not None and load.teeth
                     free &= len(state.tooth_force) == 0
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
-                    return _finished(ring, state, outcome, history)
+                    return _finished(model, state, outcome, history)
         except ActiveSetError as error:
             return replace(start, outcome=error.outcome, history=tuple(history))
-        except SingularRingError:
+        except SingularCyclicError:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
-        return _finished(ring, state, outcome, history)
+        return _finished(model, state, outcome, history)
 
 
 def _takes_back(increment: Array, last: Array | None) -> bool:
@@ -146,7 +146,7 @@ class _Step:
     """Increment of the masters in the global frame (N, n) [m]."""
     turn: float
     """Rotation increment of the bore of the diaphragm [rad]."""
-    ring_turn: float
+    circular_spline_turn: float
     """Rotation increment of the circular spline [rad]."""
     pressure: Array
     """Forces of the wave generator at the contact points (N, p) [N]."""
@@ -167,7 +167,7 @@ class _Step:
 
 
 def _solve_linear(
-    ring: SolidRing,
+    model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
     load: SolidLoad,
@@ -177,21 +177,21 @@ def _solve_linear(
     """Condense the ring to tooth forces and rotations, solve, and expand the result."""
     candidates = None
     if load.teeth:
-        candidates = ring.teeth.find(
+        candidates = model.teeth.find(
             linear.frames[0],
-            ring.loads(state),
-            state.ring_force,
+            model.loads(state),
+            state.circular_spline_force,
             reach,
             state.held,
             thorough=thorough,
-            ring_rotation=state.ring_rotation,
+            circular_spline_rotation=state.circular_spline_rotation,
         )
-    condensed = condense(ring, state, linear, candidates, load.rotation)
+    condensed = condense(model, state, linear, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
     n = 0 if candidates is None else len(candidates)
     used, output = np.arange(n), n if load.rotation is None else n + 1
     if load.torque is not None:
-        offset[output] -= load.torque / ring.copies
+        offset[output] -= load.torque / model.copies
         used = np.append(used, output)
     unknown, compliance = np.zeros(n + 2), float("nan")
     active = np.zeros(n, dtype=bool)
@@ -205,13 +205,13 @@ def _solve_linear(
         if load.torque is not None:
             acting = np.append(np.flatnonzero(active), output)
             unit = np.zeros(len(acting))
-            unit[-1] = -1.0 / ring.copies
+            unit[-1] = -1.0 / model.copies
             answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
             compliance = float(answer[-1])
-    force, (turn, ring_turn) = unknown[:n], unknown[n:]
+    force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
     increment = condensed.base + condensed.response @ unknown[: n + 1]
     bore = linear.bore
-    moved = increment[:, ring.contact_dofs]
+    moved = increment[:, model.contact_dofs]
     change = np.einsum("spm,sm->sp", bore.rows, moved)
     by_teeth = np.zeros_like(change)
     if candidates is not None:
@@ -222,14 +222,14 @@ def _solve_linear(
     pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
     after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
     rotation = state.rotation if load.rotation is None else load.rotation
-    holding = -ring.copies * float(condensed.offset[n] + system[n] @ unknown)
+    holding = -model.copies * float(condensed.offset[n] + system[n] @ unknown)
     return _Step(
         found=candidates,
         force=force,
         active=np.flatnonzero(active),
         increment=increment,
         turn=rotation + float(turn) - state.rotation,
-        ring_turn=float(ring_turn),
+        circular_spline_turn=float(circular_spline_turn),
         pressure=pressure,
         after=after,
         torque=-holding if output == n or load.torque is None else load.torque,
@@ -239,7 +239,7 @@ def _solve_linear(
 
 
 def _advance(
-    ring: SolidRing,
+    model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
     step: _Step,
@@ -248,7 +248,7 @@ def _advance(
     one_at_a_time: bool,
 ) -> tuple[SolidState, bool]:
     """Move the ring, replace the contact forces and update the touching bore nodes."""
-    bore, masters = linear.bore, ring.strip.masters
+    bore, masters = linear.bore, model.strip.masters
     local = np.einsum("spp->sp", bore.compliance)
     wrong = np.where(bore.active, -step.pressure * local, -step.after)
     bad = bore.present & (wrong > 1e-15)
@@ -261,18 +261,20 @@ def _advance(
     shared = ~bore.found | apart.any(axis=1)
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
-    master_dofs = ring.dofs(np.arange(masters.size))
-    x = ring.masters(state) + moved[:, master_dofs].reshape(len(moved), -1, 3)
+    master_dofs = model.dofs(np.arange(masters.size))
+    x = model.masters(state) + moved[:, master_dofs].reshape(len(moved), -1, 3)
     race = state.race
     if race is not None:
-        race = race + moved[:, ring.race_dofs[:NODE]].reshape(race.shape)
+        race = race + moved[:, model.race_dofs[:NODE]].reshape(race.shape)
     flank_force = np.zeros_like(state.flank_force)
-    ring_force = np.zeros_like(state.ring_force)
+    circular_spline_force = np.zeros_like(state.circular_spline_force)
     kept = None
     if step.found is not None:
         contacts, f = step.found.contacts, step.force[:, None]
         np.add.at(flank_force, contacts.sector, f * step.found.weight)
-        np.add.at(ring_force, contacts.tooth, f * step.found.ring_weight)
+        np.add.at(
+            circular_spline_force, contacts.tooth, f * step.found.circular_spline_weight
+        )
         kept = step.found.chosen(step.active)
     new = replace(
         state,
@@ -284,11 +286,12 @@ def _advance(
         touching=touching,
         shared=shared,
         flank_force=flank_force,
-        ring_force=ring_force,
+        circular_spline_force=circular_spline_force,
         held=kept,
         tooth_force=step.force[step.active],
         rotation=state.rotation + damping * step.turn,
-        ring_rotation=state.ring_rotation + damping * step.ring_turn,
+        circular_spline_rotation=state.circular_spline_rotation
+        + damping * step.circular_spline_turn,
         torque=step.torque,
         holding_torque=step.holding_torque,
         compliance=step.compliance,
@@ -297,31 +300,33 @@ def _advance(
 
 
 def _finished(
-    ring: SolidRing, state: SolidState, outcome: Outcome, history: list[float]
+    model: SolidSectorModel, state: SolidState, outcome: Outcome, history: list[float]
 ) -> SolidState:
     """Energy and moments of the whole drive at the last positions."""
-    frames = ring.frames(state)
+    frames = model.frames(state)
     energy = sum(
         float(energies(segment, frame).sum())
-        for segment, frame in zip(ring.strip.segments, frames, strict=True)
+        for segment, frame in zip(model.strip.segments, frames, strict=True)
     )
-    loads = ring.loads(state)
-    energy += 0.5 * float(np.sum(loads * (loads @ ring.strip.teeth.compliance)))
-    if ring.teeth.ring_gear is not None:
-        moved = ring.teeth.ring_gear.displacement(state.ring_force)
-        energy += 0.5 * float(np.sum(state.ring_force * moved))
+    loads = model.loads(state)
+    energy += 0.5 * float(np.sum(loads * (loads @ model.strip.teeth.compliance)))
+    if model.teeth.elastic_circular_spline is not None:
+        moved = model.teeth.elastic_circular_spline.displacement(
+            state.circular_spline_force
+        )
+        energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
     points = np.einsum(
-        "sij,spj->spi", frames[0].turn, ring.bore_positions(frames[0], state)
+        "sij,spj->spi", frames[0].turn, model.bore_positions(frames[0], state)
     )
     force = np.einsum(
         "sij,spj->spi", frames[0].turn, state.bore_force.reshape(points.shape)
     )
     moment = points[..., 0] * force[..., 1] - points[..., 1] * force[..., 0]
     teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
-    energy, torque = ring.copies * energy, ring.copies * float(moment.sum())
+    energy, torque = model.copies * energy, model.copies * float(moment.sum())
     balls = None
-    if ring.race is not None and state.race is not None:
-        forces = ring.race.forces(state.race, state.wave_generator_angle)
+    if model.race is not None and state.race is not None:
+        forces = model.race.forces(state.race, state.wave_generator_angle)
         energy += forces.energy
         balls, torque = forces.balls.force, forces.balls.input_torque
     # contiguous arrays, so that a state read from a file continues bit for bit
@@ -334,5 +339,5 @@ def _finished(
         ball_force=balls,
         energy=energy,
         wave_generator_torque=torque,
-        tooth_moment=ring.copies * teeth,
+        tooth_moment=model.copies * teeth,
     )

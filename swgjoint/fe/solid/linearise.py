@@ -30,7 +30,7 @@ from swgjoint.fe.solid.corotation import (
     spin,
     tangent,
 )
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.typing import Array, Index, Mask
 
@@ -109,26 +109,26 @@ class SolidLinearised:
 
 
 def linearise(
-    ring: SolidRing, state: SolidState, *, kept: Mask | None = None
+    model: SolidSectorModel, state: SolidState, *, kept: Mask | None = None
 ) -> SolidLinearised:
     """Linearise a ring at a state.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The state.
         kept: Mask of the lines that remain shared if the state shares them, see
             ``shared`` of :class:`SolidState` (N, L); None for all lines.
     """
-    frames = ring.frames(state)
-    n = ring.size
-    gradient, pushed = np.zeros((2, ring.sectors, n))
-    hessian = np.zeros((ring.sectors, n, n))
-    bore = bore_contact(ring, state, frames[0], kept=kept)
-    loads = ring.loads(state)
+    frames = model.frames(state)
+    n = model.size
+    gradient, pushed = np.zeros((2, model.sectors, n))
+    hessian = np.zeros((model.sectors, n, n))
+    bore = bore_contact(model, state, frames[0], kept=kept)
+    loads = model.loads(state)
     for number, (segment, frame) in enumerate(
-        zip(ring.strip.segments, frames, strict=True)
+        zip(model.strip.segments, frames, strict=True)
     ):
-        dofs = ring.dofs(segment.masters)
+        dofs = model.dofs(segment.masters)
         elastic = frame.deformation @ segment.stiffness
         total = elastic
         if number == 0:
@@ -137,14 +137,14 @@ def linearise(
         local = matrices_in_global(frame, tangent(segment, frame, total))
         hessian[:, dofs[:, None], dofs] += local
         if number == 0:
-            into, held = ring.contact_dofs, bore.inverse @ bore.rows
+            into, held = model.contact_dofs, bore.inverse @ bore.rows
             hessian[:, into[:, None], into] += bore.rows.transpose(0, 2, 1) @ held
             pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
     race = None
-    if ring.race is not None and state.race is not None:
+    if model.race is not None and state.race is not None:
         race, dofs = (
-            ring.race.forces(state.race, state.wave_generator_angle),
-            ring.race_dofs,
+            model.race.forces(state.race, state.wave_generator_angle),
+            model.race_dofs,
         )
         gradient[:, dofs] += race.gradient
         hessian[:, dofs[:, None], dofs] += race.hessian
@@ -159,30 +159,34 @@ def linearise(
 
 
 def bore_contact(
-    ring: SolidRing, state: SolidState, frame: SolidFrames, *, kept: Mask | None = None
+    model: SolidSectorModel,
+    state: SolidState,
+    frame: SolidFrames,
+    *,
+    kept: Mask | None = None,
 ) -> BoreContact:
     """Contact points of all sectors.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The state.
         frame: Frames of the toothed segments.
         kept: Mask of the lines that remain shared, see :func:`linearise` (N, L).
     """
-    teeth, first = ring.strip.teeth, ring.strip.flank_dofs
+    teeth, first = model.strip.teeth, model.strip.flank_dofs
     n, p = state.touching.shape
-    b = len(ring.strip.bore)
-    local = ring.bore_positions(frame, state)
+    b = len(model.strip.bore)
+    local = model.bore_positions(frame, state)
     points = np.einsum("sij,spj->spi", frame.turn, local)
-    if ring.race is not None and state.race is not None:
-        gap, normal, by_race = ring.race.gap(state.race, points, ring.bore_places)
+    if model.race is not None and state.race is not None:
+        gap, normal, by_race = model.race.gap(state.race, points, model.bore_places)
     else:
-        gap, normal, _ = ring.wave_generator.gap(
+        gap, normal, _ = model.wave_generator.gap(
             points.reshape(-1, 3), state.wave_generator_angle
         )
         gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
     normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
-    vertex, found, bend, covered = _vertices(ring, gap, state, kept)
+    vertex, found, bend, covered = _vertices(model, gap, state, kept)
     # derivative by the masters in the frame: motion of the teeth and of the frame
     carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
     carried = np.einsum("spi,pim->spm", normal, carry)
@@ -207,13 +211,13 @@ def bore_contact(
     present = np.ones((n, p), dtype=bool)
     present[:, at], present[:, rolls] = found, False
     present[:, :b] = ~covered
-    if ring.race is not None:
-        present[:, :b] &= ring.race.covers(ring.strip.bore[:, 2])
+    if model.race is not None:
+        present[:, :b] &= model.race.covers(model.strip.bore[:, 2])
     active = state.touching & present
     active[:, rolls] = active[:, at] & (state.pressure[:, at] > 0.0)
     loaded = np.where(active[:, rolls], state.pressure[:, at], 1.0)
     w[:, rolls, rolls] += bend / loaded
-    moved = ring.loads(state) @ teeth.compliance[:, first:]
+    moved = model.loads(state) @ teeth.compliance[:, first:]
     free = gap - np.einsum("spi,spi->sp", normal, moved.reshape(n, b, 3))
     on = active[:, :, None] & active[:, None, :]
     size = np.mean(np.einsum("spp->sp", w))
@@ -238,7 +242,7 @@ def bore_contact(
 
 
 def _vertices(
-    ring: SolidRing, gap: Array, state: SolidState, kept: Mask | None
+    model: SolidSectorModel, gap: Array, state: SolidState, kept: Mask | None
 ) -> tuple[Array, Mask, Array, Mask]:
     """Vertices of the gap along the axis.
 
@@ -248,9 +252,9 @@ def _vertices(
         nodes that the vertices replace (N, b).
     """
     n, b = gap.shape
-    planes = ring.strip.planes
+    planes = model.strip.planes
     lines = b // planes
-    crown = crown_bend(ring.wave_generator.crowning, ring.strip.mesh.teeth.z)
+    crown = crown_bend(model.wave_generator.crowning, model.strip.mesh.teeth.z)
 
     def over(nodal: NDArray[Any]) -> NDArray[Any]:
         return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
@@ -261,8 +265,8 @@ def _vertices(
     flat[shared] *= WIDE
     flat[shared & (True if kept is None else kept.ravel())] = inf
     seen = vertices(over(gap), flat)
-    if ring.race is not None:  # no vertex outside the width of the race
-        beside = ~ring.race.covers(ring.strip.mesh.teeth.z @ seen.weight)
+    if model.race is not None:  # no vertex outside the width of the race
+        beside = ~model.race.covers(model.strip.mesh.teeth.z @ seen.weight)
         seen.found[beside], seen.covered[:, beside] = False, False
     means = np.zeros((n, 2, lines, planes, lines))
     line = np.arange(lines)

@@ -20,13 +20,13 @@ OFFSETS = 9
 
 
 def required_memory(
-    strip: StripMesh, ring: StripMesh | None, sectors: int, orders: Orders
+    strip: StripMesh, circular_spline: StripMesh | None, sectors: int, orders: Orders
 ) -> float:
     """Estimate of the peak memory [B]; measured peaks are 50 to 100 % of it.
 
     Args:
         strip: Mesh of the flexspline.
-        ring: Mesh of the circular spline; None if it is rigid.
+        circular_spline: Mesh of the circular spline; None if it is rigid.
         sectors: Teeth of the flexspline in the model.
         orders: Polynomial degrees of the displacements of faces and sections.
     """
@@ -38,14 +38,14 @@ def required_memory(
     size = 3 * strip_masters(strip, orders).size
     solving = BYTES * sectors * size * (size + CONTACTS) * COPIES
     stresses = BYTES * sectors * nodes * (3 + 2 * 6 + 9)
-    if ring is not None:
-        ring_nodes = ring.teeth.segment.mesh.p.shape[1]
-        flank = 2 * ring.teeth.flank.size
-        face = 6 * len(ring.teeth.segment.first)
-        building = 2 * 3 * ring_nodes * (flank + face) + FILL * (3 * ring_nodes) ** (
-            4 / 3
-        )
-        held = OFFSETS * (3 * ring_nodes * flank + flank**2)
+    if circular_spline is not None:
+        spline_nodes = circular_spline.teeth.segment.mesh.p.shape[1]
+        flank = 2 * circular_spline.teeth.flank.size
+        face = 6 * len(circular_spline.teeth.segment.first)
+        building = 2 * 3 * spline_nodes * (flank + face) + FILL * (
+            3 * spline_nodes
+        ) ** (4 / 3)
+        held = OFFSETS * (3 * spline_nodes * flank + flank**2)
         kept += BYTES * held
         condensing = max(condensing, BYTES * building)
     return float(INTERPRETER + kept + max(condensing, solving + stresses))

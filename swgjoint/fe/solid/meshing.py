@@ -18,9 +18,9 @@ from swgjoint.fe.meshing_run import Position, Positions
 from swgjoint.fe.plane.stress import KINDS
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
+from swgjoint.fe.solid.drive3d import check_modelled, solid_sector_model
 from swgjoint.fe.solid.figures.axial_section import coning
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import SolidMaxima, StressPlace
 from swgjoint.fe.solid.strip.masters import Orders
@@ -54,7 +54,7 @@ class SolidRun(Positions):
     """A 3D simulation of meshing."""
 
     design: Design
-    model: SolidRing
+    model: SolidSectorModel
     torque: float
     steps: tuple[SolidStep, ...]
     setup: tuple[SolidSetup, ...]
@@ -64,25 +64,25 @@ class SolidRun(Positions):
     def nodes(self) -> int:
         """Nodes of the deformable members before condensation."""
         total = _nodes(self.model)
-        gear = self.model.teeth.ring_gear
+        gear = self.model.teeth.elastic_circular_spline
         if gear is not None:
             face = len(gear.mesh.teeth.segment.first)
-            total += (gear.mesh.nodes - face) * self.model.teeth.ring_teeth
+            total += (gear.mesh.nodes - face) * self.model.teeth.circular_spline_teeth
         return total
 
     @property
     def elements(self) -> int:
         """Elements of the deformable members before condensation."""
         total = self.model.strip.mesh.elements * self.model.sectors
-        gear = self.model.teeth.ring_gear
+        gear = self.model.teeth.elastic_circular_spline
         if gear is not None:
-            total += gear.mesh.elements * self.model.teeth.ring_teeth
+            total += gear.mesh.elements * self.model.teeth.circular_spline_teeth
         return total
 
     def to_json(self) -> dict[str, Any]:
         """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
         solved = [step.stress for step in self.steps if step.stress is not None]
-        elastic = self.model.teeth.ring_gear is not None
+        elastic = self.model.teeth.elastic_circular_spline is not None
         gear = f"elastic, outside {self.design.circular_spline.outer_rim}"
         shapes = self.design.micro_geometry.model_dump(exclude={"crowning_kind"})
         bearing = self.design.wave_generator.bearing is not None
@@ -187,14 +187,14 @@ def simulate_solid_meshing(
             # three states of the set-up, then all positions but the first
             stage = f"resuming the run in {keep}: finished states"
             progress(stage, kept.count, steps + 2)
-    ring = solid_ring(
+    model = solid_sector_model(
         design,
         half=half,
         nonlinear=nonlinear,
         elastic_circular_spline=elastic_circular_spline,
     )
     follow = SolidContinuation(
-        ring=ring, ratio=design.ratio, layout=design.drive.layout
+        model=model, ratio=design.ratio, layout=design.drive.layout
     )
 
     series = series_compliance(design, cup=False)
@@ -218,7 +218,7 @@ def simulate_solid_meshing(
 
     def set_up(name: str, what: str, solve: Callable[[], SolidState]) -> SolidState:
         state = checked(reached(name, solve), what)
-        stress = SolidMaxima.from_state(ring, state)
+        stress = SolidMaxima.from_state(model, state)
         setup.append(SolidSetup(name=name, state=state, stress=stress))
         progress("setting up", len(setup), 3)
         return state
@@ -247,7 +247,7 @@ def simulate_solid_meshing(
         progress("meshing", k + 1, steps)
     return SolidRun(
         design=design,
-        model=ring,
+        model=model,
         torque=torque,
         steps=tuple(rows),
         setup=tuple(setup),
@@ -258,7 +258,7 @@ def simulate_solid_meshing(
 def _step(
     follow: SolidContinuation, state: SolidState, angle: float, series: float
 ) -> SolidStep:
-    ring = follow.ring
+    model = follow.model
     if not state.outcome.ok:
         return SolidStep(input_angle=angle, outcome=state.outcome)
     pairs = set() if state.held is None else set(state.held.contacts.sector.tolist())
@@ -271,18 +271,18 @@ def _step(
         wave_generator_torque=state.wave_generator_torque,
         tooth_moment=state.tooth_moment,
         energy=state.energy + 0.5 * series * state.torque**2,
-        pairs_in_contact=ring.copies * len(pairs),
-        stress=SolidMaxima.from_state(ring, state),
+        pairs_in_contact=model.copies * len(pairs),
+        stress=SolidMaxima.from_state(model, state),
         iterations=len(state.history),
         state=state,
     )
 
 
-def _nodes(ring: SolidRing) -> int:
+def _nodes(model: SolidSectorModel) -> int:
     """Nodes of the flexspline; those on a face count for one sector."""
-    face = sum(len(segment.mesh.first) for segment in ring.strip.segments)
-    rows = [s.begin.shape[1] for s in ring.strip.mesh.cup if s.begin is not None]
-    return int((ring.strip.mesh.nodes - face + sum(rows)) * ring.sectors)
+    face = sum(len(segment.mesh.first) for segment in model.strip.segments)
+    rows = [s.begin.shape[1] for s in model.strip.mesh.cup if s.begin is not None]
+    return int((model.strip.mesh.nodes - face + sum(rows)) * model.sectors)
 
 
 def _place(place: StressPlace) -> dict[str, Any]:

@@ -16,16 +16,16 @@ from swgjoint.fe.plane.shape_fields import (
     surface_of,
 )
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
 from swgjoint.fe.solid.strip.elasticity import stress_maxima
 from swgjoint.typing import Index
 
 
-def solid_surface(ring: SolidRing) -> ShapeSurface:
+def solid_surface(model: SolidSectorModel) -> ShapeSurface:
     """Outer surface of a sector; nodes are numbered segment after segment."""
-    strip = ring.strip.mesh
+    strip = model.strip.mesh
     bore, outline = outline_rows(strip.teeth.plane)
     open_edge, back = strip.teeth.nodes[0], strip.teeth.nodes[-1]
     rows: list[Index] = [open_edge[bore], open_edge[outline], back[outline]]
@@ -39,31 +39,31 @@ def solid_surface(ring: SolidRing) -> ShapeSurface:
 
 
 def solid_fields(
-    ring: SolidRing, state: SolidState, surface: ShapeSurface
+    model: SolidSectorModel, state: SolidState, surface: ShapeSurface
 ) -> SectorFields:
     """Fields of an equilibrium of the 3D model.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
         surface: Surface of a sector, see :func:`solid_surface`.
     """
-    loads, frames = ring.loads(state), ring.frames(state)
+    loads, frames = model.loads(state), model.frames(state)
     # frames of the undeformed teeth, rotated with the flexspline
-    stood = about_z(np.array(state.rotation)) @ ring.place
+    stood = about_z(np.array(state.rotation)) @ model.place
     moved = []
     for number, (segment, frame) in enumerate(
-        zip(ring.strip.segments, frames, strict=True)
+        zip(model.strip.segments, frames, strict=True)
     ):
         u = segment.displacement(frame.displacement, None if number else loads)
         back = np.einsum("sji,sjk->sik", stood, frame.turn)
         rest = np.asarray(segment.mesh.mesh.p).T
         moved.append(np.einsum("sij,snj->sni", back, rest + u) - rest)
-    stress = flexspline_stresses(ring, state)
-    mises = [stress_maxima(stress[s.name])[2] for s in ring.strip.segments]
-    forces = ring.strip.teeth.nodal_force(loads).reshape(len(loads), -1, 3)
+    stress = flexspline_stresses(model, state)
+    mises = [stress_maxima(stress[s.name])[2] for s in model.strip.segments]
+    forces = model.strip.teeth.nodal_force(loads).reshape(len(loads), -1, 3)
     turned = np.einsum("sji,sjk,snk->sni", stood, frames[0].turn, forces)
-    first = ring.strip.flank_dofs // 3
+    first = model.strip.flank_dofs // 3
     return SectorFields(
         displacement=np.concatenate(moved, axis=1)[:, surface.nodes],
         von_mises=np.concatenate(mises, axis=1)[:, surface.nodes],

@@ -35,7 +35,7 @@ class SolidState(StateFigures):
     flank_force: Array
     """Tooth forces as nodal forces in the frames of the flexspline's teeth (N, n_flank)
     [N]."""
-    ring_force: Array
+    circular_spline_force: Array
     """Tooth forces as nodal forces in the frames of the circular spline's teeth
     (N_c, n_c) [N]."""
     race: Array | None = None

@@ -9,34 +9,34 @@ import numpy as np
 
 from swgjoint.fe.plane.stress import StressMaxima
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip.elasticity import COLUMNS, ROWS, stress_maxima
 from swgjoint.typing import Array, Index
 
 
-def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
+def flexspline_stresses(model: SolidSectorModel, state: SolidState) -> dict[str, Array]:
     """Stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa].
 
     Stresses are in the frames of the segments. Nodes on the faces have the mean of
     their two sectors, nodes on the sections that of their two segments.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
     """
     found: dict[str, Array] = {}
-    loads = ring.loads(state)
-    frames = ring.frames(state)
+    loads = model.loads(state)
+    frames = model.frames(state)
     for number, (segment, frame) in enumerate(
-        zip(ring.strip.segments, frames, strict=True)
+        zip(model.strip.segments, frames, strict=True)
     ):
         u = segment.displacement(frame.deformation, None if number else loads)
         stress = segment.stresses(u)
         faces = segment.mesh.first, segment.mesh.last
-        average_faces(stress, frame.turn, *faces, ring.closure)
+        average_faces(stress, frame.turn, *faces, model.closure)
         found[segment.name] = stress
-    for k, (one, other) in enumerate(pairwise(ring.strip.segments)):
+    for k, (one, other) in enumerate(pairwise(model.strip.segments)):
         if one.mesh.end is not None and other.mesh.begin is not None:
             sections = one.mesh.end.ravel(), other.mesh.begin.ravel()
             turns = frames[k].turn, frames[k + 1].turn
@@ -44,26 +44,30 @@ def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
     return found
 
 
-def circular_spline_stresses(ring: SolidRing, state: SolidState) -> Array | None:
+def circular_spline_stresses(
+    model: SolidSectorModel, state: SolidState
+) -> Array | None:
     """Stresses of the circular spline as by :func:`flexspline_stresses`.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
 
     Returns:
         Stress in the frames of its teeth (N_c, n_nodes, 6) [Pa]; None if it is rigid.
     """
-    gear = ring.teeth.ring_gear
+    gear = model.teeth.elastic_circular_spline
     if gear is None:
         return None
-    u = gear.nodal_displacement(state.ring_force)
+    u = gear.nodal_displacement(state.circular_spline_force)
     stress = np.asarray((gear.body.stress @ u.reshape(len(u), -1).T).T)
     stress = np.ascontiguousarray(stress.reshape(len(u), -1, 6))
-    teeth = ring.teeth.circular_spline.profile.teeth
-    turn = about_z(2.0 * np.pi / teeth * np.arange(ring.teeth.ring_teeth, dtype=float))
+    teeth = model.teeth.circular_spline.profile.teeth
+    turn = about_z(
+        2.0 * np.pi / teeth * np.arange(model.teeth.circular_spline_teeth, dtype=float)
+    )
     segment = gear.mesh.teeth.segment
-    average_faces(stress, turn, segment.first, segment.last, ring.closure)
+    average_faces(stress, turn, segment.first, segment.last, model.closure)
     return stress
 
 
@@ -78,7 +82,8 @@ def average_faces(
         turn: Rotations of these frames (N, 3, 3).
         first: Nodes on the first face.
         last: Nodes on the last face, which is the first face of the next sector.
-        closure: Factors of x, y, z that close the ring, see :class:`SolidRing` (3,).
+        closure: Factors of x, y, z between the last sector and the first one, see
+            :class:`SolidSectorModel` (3,).
     """
     after = np.roll(turn, -1, axis=0)
     after[-1] *= closure[:, None]
@@ -146,21 +151,21 @@ class SolidMaxima:
     place: StressPlace
 
     @classmethod
-    def from_state(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
+    def from_state(cls, model: SolidSectorModel, state: SolidState) -> SolidMaxima:
         """Recover the stresses of a state.
 
         Args:
-            ring: The ring.
+            model: The 3D model.
             state: The equilibrium.
         """
         by_part, places = {}, {}
-        for name, stress in flexspline_stresses(ring, state).items():
+        for name, stress in flexspline_stresses(model, state).items():
             maxima = stress_maxima(stress)
             by_part[name] = _largest(maxima)
             worst = np.unravel_index(int(maxima[2].argmax()), maxima[2].shape)
             places[name] = int(worst[0]), int(worst[1])
         worst_part = max(by_part, key=lambda name: by_part[name].von_mises)
-        circular = circular_spline_stresses(ring, state)
+        circular = circular_spline_stresses(model, state)
         return cls(
             flexspline=StressMaxima(
                 tensile=max(part.tensile for part in by_part.values()),
@@ -171,7 +176,7 @@ class SolidMaxima:
             if circular is None
             else _largest(stress_maxima(circular)),
             by_part=by_part,
-            place=_place(ring, worst_part, *places[worst_part]),
+            place=_place(model, worst_part, *places[worst_part]),
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:
@@ -188,9 +193,9 @@ def _largest(maxima: tuple[Array, Array, Array]) -> StressMaxima:
     return StressMaxima(tensile=tensile, compressive=compressive, von_mises=von_mises)
 
 
-def _place(ring: SolidRing, part: str, sector: int, node: int) -> StressPlace:
+def _place(model: SolidSectorModel, part: str, sector: int, node: int) -> StressPlace:
     """Location of a node, with the name of its part."""
-    strip = ring.strip
+    strip = model.strip
     number = [segment.name for segment in strip.segments].index(part)
     mesh = strip.mesh.segments[number].mesh
     x, y, z = (float(value) for value in np.asarray(mesh.p)[:, node])

@@ -14,8 +14,8 @@ from swgjoint.fe.plane.circular_spline import CircularSpline
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.tooth_contact import ToothContact
+from swgjoint.fe.solid.circular_spline import ElasticCircularSpline
 from swgjoint.fe.solid.corotation import SolidFrames, spin
-from swgjoint.fe.solid.ring_gear import RingGear
 from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.fe.solid.wave_generator.surface import crown
 from swgjoint.typing import Array, Index
@@ -53,13 +53,13 @@ class ToothRows:
     """Planes of the contacts (n,)."""
     weight: Array
     """Derivative by the flank nodes in the frames of the teeth (n, n_flank)."""
-    ring_weight: Array
+    circular_spline_weight: Array
     """Derivative by the flank nodes of the circular spline (n, n_ring_flank)."""
     rows: Array
     """Derivative by the masters of the teeth in the global frame (n, 3 m)."""
     arm: Array
     """Derivative by a rotation of the whole flexspline (n,) [m]."""
-    ring_arm: Array
+    circular_spline_arm: Array
     """Negative derivative by a rotation of the circular spline about its own axis (n,)
     [m]."""
 
@@ -83,14 +83,14 @@ class SolidTeeth:
     strip: Strip
     circular_spline: CircularSpline
     """Profile of the circular spline and weights of its flank nodes in a plane."""
-    ring_gear: RingGear | None
+    elastic_circular_spline: ElasticCircularSpline | None
     """Elastic circular spline; None if it is rigid."""
-    ring_teeth: int
+    circular_spline_teeth: int
     """Teeth of the circular spline in the model."""
     crowning: FlankCrowning
     shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
-    ring_shift: Array | None = None
+    circular_spline_shift: Array | None = None
     """Manufacturing errors of the teeth of the circular spline, which must be elastic
     (N_c, 2) [m]."""
     tilt: Array | None = None
@@ -98,20 +98,24 @@ class SolidTeeth:
     intersects that of the drive in the middle of the face width."""
 
     @property
-    def ring_dofs(self) -> int:
+    def circular_spline_dofs(self) -> int:
         """Flank degrees of freedom of a circular spline's tooth; zero if rigid."""
-        return 0 if self.ring_gear is None else self.ring_gear.flank.shape[1]
+        return (
+            0
+            if self.elastic_circular_spline is None
+            else self.elastic_circular_spline.flank.shape[1]
+        )
 
     def find(
         self,
         frame: SolidFrames,
         force: Array,
-        ring_force: Array,
+        circular_spline_force: Array,
         reach: float,
         held: ToothRows | None,
         *,
         thorough: bool,
-        ring_rotation: float = 0.0,
+        circular_spline_rotation: float = 0.0,
     ) -> ToothRows:
         """Candidates at a state.
 
@@ -119,13 +123,13 @@ class SolidTeeth:
             frame: Frames of the toothed segments.
             force: Forces at the loaded degrees of freedom of these segments (N, n_b)
                 [N].
-            ring_force: Forces on the flanks of the circular spline (N_c, n_ring_flank)
-                [N].
+            circular_spline_force: Forces on the flanks of the circular spline
+                (N_c, n_c) [N].
             reach: Largest gap of a candidate [m].
             held: Contacts of the last iteration that carry force; None without.
             thorough: Whether to search between the nodes, see
                 :meth:`ToothContact.search`.
-            ring_rotation: Rotation of the circular spline [rad].
+            circular_spline_rotation: Rotation of the circular spline [rad].
         """
         strip = self.strip
         n, planes, size = len(frame.turn), strip.planes, 2 * strip.flank_size
@@ -141,18 +145,25 @@ class SolidTeeth:
         if self.shift is not None:
             plane_flank = plane_flank + self.shift[:, None, None]
         centre = flat.mean(axis=2)
-        seen = angle - ring_rotation
-        ring = np.zeros((self.ring_teeth, planes, 0))
-        if self.ring_gear is not None:
-            ring = self.ring_gear.displacement(ring_force)
-            ring = ring.reshape(self.ring_teeth, planes, -1)
-        ring = ring + np.tile(self._ring_offset(ring_rotation), ring.shape[2] // 2)
+        seen = angle - circular_spline_rotation
+        displacements = np.zeros((self.circular_spline_teeth, planes, 0))
+        if self.elastic_circular_spline is not None:
+            displacements = self.elastic_circular_spline.displacement(
+                circular_spline_force
+            )
+            displacements = displacements.reshape(
+                self.circular_spline_teeth, planes, -1
+            )
+        displacements = displacements + np.tile(
+            self._circular_spline_offset(circular_spline_rotation),
+            displacements.shape[2] // 2,
+        )
         parts, numbers = [], []
         for p in range(planes):
             search = ToothContact(
                 element=strip,
                 circular_spline=self.circular_spline,
-                ring_flank=ring[:, p],
+                circular_spline_flank=displacements[:, p],
                 angle=seen,
                 bearing=seen - np.arctan2(centre[:, p, 0], centre[:, p, 1]),
             )
@@ -169,20 +180,25 @@ class SolidTeeth:
             contacts = Contacts.join(contacts, part)
         return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
 
-    def ring_place(self, ring_rotation: float) -> Array:
+    def circular_spline_place(self, circular_spline_rotation: float) -> Array:
         """Angles of the teeth of the circular spline (N_c,) [rad]."""
         # tooth j is half a pitch ahead of space j
         pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
-        return np.asarray(pitch * (np.arange(self.ring_teeth) + 0.5) + ring_rotation)
+        return np.asarray(
+            pitch * (np.arange(self.circular_spline_teeth) + 0.5)
+            + circular_spline_rotation
+        )
 
-    def _ring_offset(self, ring_rotation: float) -> Array:
+    def _circular_spline_offset(self, circular_spline_rotation: float) -> Array:
         """Errors of the circular spline's teeth by plane (N_c, n_planes, 2) [m]."""
         planes = self.strip.mesh.teeth.z
-        offset = np.zeros((self.ring_teeth, len(planes), 2))
-        if self.ring_shift is not None:
-            offset += self.ring_shift[:, None]
+        offset = np.zeros((self.circular_spline_teeth, len(planes), 2))
+        if self.circular_spline_shift is not None:
+            offset += self.circular_spline_shift[:, None]
         if self.tilt is not None:
-            turned = rotate(self.tilt, -self.ring_place(ring_rotation))
+            turned = rotate(
+                self.tilt, -self.circular_spline_place(circular_spline_rotation)
+            )
             offset += np.multiply.outer(turned, planes).transpose(0, 2, 1)
         return offset
 
@@ -206,10 +222,10 @@ class SolidTeeth:
         on_side = nodes[sector, plane].reshape(n, 2, size, 3)[np.arange(n), side]
         point[:, 2] = np.einsum("kb,kb->k", spline, on_side[..., 2])
         arm = normal[:, 1] * point[:, 0] - normal[:, 0] * point[:, 1]
-        ring_arm = arm
+        circular_spline_arm = arm
         if self.tilt is not None:
             x, y = np.multiply.outer(self.tilt, strip.mesh.teeth.z[plane])
-            ring_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
+            circular_spline_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
         seen = np.einsum("kji,kj->ki", turn, normal)
         at = np.einsum("kji,kj->ki", turn, point)
         on_nodes = np.zeros((n, strip.planes, 2, size, 3))
@@ -222,17 +238,19 @@ class SolidTeeth:
         turning = np.cross(middle, seen) - np.einsum("km,kmw->kw", carried, s)
         rows = carried + np.einsum("kw,kwm->km", turning, frame.gradient[sector])
         rows = np.einsum("kij,kaj->kai", turn, rows.reshape(n, m, 3))
-        ring = contacts.ring_weight.shape[1]
-        ring_weight = np.zeros((n, strip.planes, ring))
-        ring_weight[np.arange(n), plane] = contacts.ring_weight
+        width = contacts.circular_spline_weight.shape[1]
+        circular_spline_weight = np.zeros((n, strip.planes, width))
+        circular_spline_weight[np.arange(n), plane] = contacts.circular_spline_weight
         return ToothRows(
             contacts=contacts,
             plane=plane,
             weight=weight,
-            ring_weight=ring_weight.reshape(n, strip.planes * ring),
+            circular_spline_weight=circular_spline_weight.reshape(
+                n, strip.planes * width
+            ),
             rows=rows.reshape(n, 3 * m),
             arm=arm,
-            ring_arm=ring_arm,
+            circular_spline_arm=circular_spline_arm,
         )
 
     def compliance(self, found: ToothRows) -> Array:
@@ -242,8 +260,10 @@ class SolidTeeth:
         sector = found.contacts.sector
         same = sector[:, None] == sector[None, :]
         matrix = np.where(same, found.weight @ flank_compliance @ found.weight.T, 0.0)
-        if self.ring_gear is not None:
-            matrix += self.ring_gear.contact_compliance(
-                found.contacts.tooth, found.ring_weight, self.ring_teeth
+        if self.elastic_circular_spline is not None:
+            matrix += self.elastic_circular_spline.contact_compliance(
+                found.contacts.tooth,
+                found.circular_spline_weight,
+                self.circular_spline_teeth,
             )
         return matrix

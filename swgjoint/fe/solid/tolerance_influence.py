@@ -12,7 +12,7 @@ from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.condensation import condense
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Mask
@@ -22,54 +22,60 @@ REACH = 0.03
 flanks, which the 2D model needs, change nothing here."""
 
 
-def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> Influence:
+def influence(
+    model: SolidSectorModel, state: SolidState, *, circular_spline_is_output: bool
+) -> Influence:
     """Condense a drive with perfect teeth at an equilibrium.
 
     Args:
-        ring: Model of all sectors with an elastic circular spline, without errors of
+        model: Model of all sectors with an elastic circular spline, without errors of
             teeth and axis.
         state: The equilibrium.
-        ring_is_output: Whether the circular spline is the output.
+        circular_spline_is_output: Whether the circular spline is the output.
 
     Raises:
         ValueError: If the model does not meet these conditions, or no tooth carries
             force at the equilibrium.
     """
-    teeth = ring.teeth
-    errors = (teeth.shift, teeth.ring_shift, teeth.tilt)
+    teeth = model.teeth
+    errors = (teeth.shift, teeth.circular_spline_shift, teeth.tilt)
     flawed = any(error is not None and error.any() for error in errors)
-    if ring.half or teeth.ring_gear is None or flawed:
+    if model.half or teeth.elastic_circular_spline is None or flawed:
         raise ValueError(
             "the influence needs all sectors, an elastic circular spline and teeth"
             " without errors"
         )
-    linear = linearise(ring, state)
-    contacts, carries = _tooth_contacts(ring, linear, state)
+    linear = linearise(model, state)
+    contacts, carries = _tooth_contacts(model, linear, state)
     n = len(contacts)
-    condensed = condense(ring, state, linear, contacts)
+    condensed = condense(model, state, linear, contacts)
     # the other member is fixed: the bore of the diaphragm or the circular spline
-    used = np.append(np.arange(n), n + 1 if ring_is_output else n)
+    used = np.append(np.arange(n), n + 1 if circular_spline_is_output else n)
     offset = condensed.offset[used]
     offset[n] -= state.torque
     return pivot_system(
         condensed.system[np.ix_(used, used)],
         offset,
-        _gaps(ring, state, contacts, carries),
+        _gaps(model, state, contacts, carries),
         closed_supports=np.zeros(0, dtype=bool),
         free=[n],
         output=n,
         sign=1.0,
-        angle=state.ring_rotation if ring_is_output else state.rotation,
+        angle=state.circular_spline_rotation
+        if circular_spline_is_output
+        else state.rotation,
         torque=state.torque,
     )
 
 
-def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -> Gaps:
+def _gaps(
+    model: SolidSectorModel, state: SolidState, found: ToothRows, carries: Mask
+) -> Gaps:
     contacts, n = found.contacts, len(found)
     flexspline = contacts.weight.reshape(n, -1, 2).sum(axis=1)
-    z = ring.strip.mesh.teeth.z
-    by_plane = found.ring_weight.reshape(n, len(z), -1, 2).sum(axis=2)
-    place = ring.teeth.ring_place(state.ring_rotation)
+    z = model.strip.mesh.teeth.z
+    by_plane = found.circular_spline_weight.reshape(n, len(z), -1, 2).sum(axis=2)
+    place = model.teeth.circular_spline_place(state.circular_spline_rotation)
     leaning = np.einsum("kpi,p->ki", by_plane, z)
     return Gaps(
         sector=contacts.sector,
@@ -81,20 +87,20 @@ def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -
 
 
 def _tooth_contacts(
-    ring: SolidRing, linear: SolidLinearised, state: SolidState
+    model: SolidSectorModel, linear: SolidLinearised, state: SolidState
 ) -> tuple[ToothRows, Mask]:
     """Possible contact points, and a mask of those that carry force at the state."""
     held = state.held
     if held is None or not len(held):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
-    possible = ring.teeth.find(
+    possible = model.teeth.find(
         linear.frames[0],
-        ring.loads(state),
-        state.ring_force,
-        REACH * ring.lobe_height,
+        model.loads(state),
+        state.circular_spline_force,
+        REACH * model.lobe_height,
         held,
         thorough=True,
-        ring_rotation=state.ring_rotation,
+        circular_spline_rotation=state.circular_spline_rotation,
     )
     carries = np.zeros(len(possible), dtype=bool)
     for plane in np.unique(held.plane):

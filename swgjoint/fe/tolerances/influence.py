@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from swgjoint.fe.common.influence import Influence
-from swgjoint.fe.plane.condensed_ring import REACH, CondensedRing, Supports, distinct
+from swgjoint.fe.plane.condensed_model import REACH, CondensedModel, Supports, distinct
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.linearise import Linearised, linearise
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Mask
 
@@ -24,20 +24,22 @@ that do. With two of them the kinematic error of lots deviates from full solves 
 1.04 % of its peak-to-peak value."""
 
 
-def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influence:
+def influence(
+    model: SectorModel, state: State, *, circular_spline_is_output: bool
+) -> Influence:
     """Condense a drive with perfect teeth at an equilibrium.
 
     Args:
         model: Ring model of all sectors with an elastic circular spline and a rigid
             wave generator, without errors of the teeth and without friction.
         state: The equilibrium.
-        ring_is_output: Whether the circular spline is the output.
+        circular_spline_is_output: Whether the circular spline is the output.
 
     Raises:
         ValueError: If the model does not meet these conditions, or no tooth carries
             force at the equilibrium.
     """
-    shifts = (model.tooth_shift, model.ring_tooth_shift)
+    shifts = (model.tooth_shift, model.circular_spline_tooth_shift)
     flawed = any(shift is not None and shift.any() for shift in shifts)
     if model.half or model.friction is not None or flawed:
         raise ValueError(
@@ -46,14 +48,16 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     if model.race is not None:
         raise ValueError("the influence needs a rigid wave generator")
     assert model.circular_spline.compliance is not None
-    ring = linearise(model, state, None if ring_is_output else state.torque)
-    contacts, carries = _tooth_contacts(model, ring, state)
-    supports = Supports.from_state(ring, state, _near_supports(model, ring, state))
-    drive = CondensedRing(
+    linear = linearise(
+        model, state, None if circular_spline_is_output else state.torque
+    )
+    contacts, carries = _tooth_contacts(model, linear, state)
+    supports = Supports.from_state(linear, state, _near_supports(model, linear, state))
+    drive = CondensedModel(
         model=model,
         state=state,
-        ring=ring,
-        ring_is_output=ring_is_output,
+        linear=linear,
+        circular_spline_is_output=circular_spline_is_output,
         contacts=contacts,
         carries=carries,
     )
@@ -63,14 +67,14 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
 
 
 def _tooth_contacts(
-    model: RingModel, ring: Linearised, state: State
+    model: SectorModel, linear: Linearised, state: State
 ) -> tuple[Contacts, Mask]:
     """Possible contact points, and a mask of those that carry force at the state."""
     loaded = state.contacts
     if loaded is None or not len(loaded):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
     reach = REACH * model.lobe_height
-    near = ring.search.search(ring.flank, reach, loaded)
+    near = linear.search.search(linear.flank, reach, loaded)
     stations, step = np.linspace(*model.element.flank_range, STATIONS, retstep=True)
     flanks = np.unique(2 * near.sector + near.side)
     key = np.repeat(flanks, STATIONS)
@@ -81,14 +85,14 @@ def _tooth_contacts(
     more = near.chosen(np.zeros(added.size, dtype=np.int64))
     sector, side = np.divmod(key[added], 2)
     more = replace(more, sector=sector, side=side, station=place[added])
-    possible = ring.search.search(ring.flank, reach, Contacts.join(loaded, more))
+    possible = linear.search.search(linear.flank, reach, Contacts.join(loaded, more))
     return distinct(possible, state)
 
 
-def _near_supports(model: RingModel, ring: Linearised, state: State) -> Mask:
+def _near_supports(model: SectorModel, linear: Linearised, state: State) -> Mask:
     """Mask of the bore intervals that touch, and of some that may (N, intervals)."""
     shape = (model.sectors, -1, model.stations.per_interval)
-    gap = ring.gap.reshape(shape)
+    gap = linear.gap.reshape(shape)
     used = np.asarray(state.touching.reshape(shape).any(axis=2))
     spread = np.arange(SUPPORTS) * used.shape[1] // SUPPORTS
     used[:, spread] |= gap[:, spread].min(axis=2) < REACH * model.lobe_height

@@ -10,9 +10,9 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.following import Follower, Unloaded
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.tolerances.cycle import pitch_of
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
@@ -34,9 +34,9 @@ def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
     """
     perfect, layout = with_perfect_teeth(design), design.drive.layout
     if model == "3d":
-        ring = solid_ring(perfect)
-        return SolidContinuation(ring=ring, ratio=design.ratio, layout=layout)
-    plane = ring_model(perfect, friction=False, bearing=False)
+        solid = solid_sector_model(perfect)
+        return SolidContinuation(model=solid, ratio=design.ratio, layout=layout)
+    plane = sector_model(perfect, friction=False, bearing=False)
     return Continuation(model=plane, ratio=design.ratio, layout=layout)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.fatigue import FatigueLimits, assess, fatigue
 from swgjoint.fe.solid.figures.four_forces import four_forces
 from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
@@ -113,28 +113,28 @@ def _fatigue(task: ArticleTask) -> Found:
 
 def _deflected(task: ArticleTask) -> Found:
     """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
-    ring = solid_ring(task.design, half="auto", elastic_circular_spline=False)
-    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflect()
+    model = solid_sector_model(task.design, half="auto", elastic_circular_spline=False)
+    state = SolidContinuation(model=model, ratio=task.design.ratio).deflect()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")
-    frame, teeth = ring.frames(state)[0], ring.strip.teeth
+    frame, teeth = model.frames(state)[0], model.strip.teeth
     rest = np.asarray(teeth.mesh.mesh.p).T
-    moved = teeth.displacement(frame.displacement, ring.loads(state))
+    moved = teeth.displacement(frame.displacement, model.loads(state))
     points = np.einsum("sij,snj->sni", frame.turn, rest + moved)
     radial = np.hypot(points[..., 0], points[..., 1]) - np.hypot(rest[:, 0], rest[:, 1])
     sector, node = np.unravel_index(int(radial.argmax()), radial.shape)
-    angle = 2.0 * np.pi * np.arange(ring.sectors) / ring.strip.sectors
+    angle = 2.0 * np.pi * np.arange(model.sectors) / model.strip.sectors
     from_major = np.abs((angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
 
-    maxima = SolidMaxima.from_state(ring, state)
+    maxima = SolidMaxima.from_state(model, state)
     by_sector = np.max(
         [
             stress_maxima(part)[2].max(axis=1)
-            for part in flexspline_stresses(ring, state).values()
+            for part in flexspline_stresses(model, state).values()
         ],
         axis=0,
     )
-    middle = ring.strip.mesh.teeth.nodes[np.argmin(np.abs(ring.strip.mesh.teeth.z))]
+    middle = model.strip.mesh.teeth.nodes[np.argmin(np.abs(model.strip.mesh.teeth.z))]
     return {
         "largest_radial_mm": float(radial.max()) / mm,
         "at_mid_face_mm": float(radial[:, middle].max()) / mm,

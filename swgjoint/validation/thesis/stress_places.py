@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.plane.elasticity import stress_maxima
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import KINDS, flexspline_stress
 
@@ -24,7 +24,7 @@ of the contacts are smaller."""
 class StressPlaces:
     """Place of every node of a model's flexspline sector."""
 
-    model: RingModel
+    model: SectorModel
 
     @cached_property
     def _of_node(self) -> NDArray[np.int64]:

@@ -163,10 +163,10 @@ def _exaggerated(ax: Any, design: Design) -> None:
 def _whole(ax: Any, design: Design) -> None:
     """All teeth of both members and the wave generator, to scale."""
     drive = design.drive
-    count, ring_teeth = drive.teeth_flexspline, drive.teeth_circular_spline
+    count, circular_spline_teeth = drive.teeth_flexspline, drive.teeth_circular_spline
     theta = 2.0 * np.pi * np.arange(count) / count
     teeth = np.concatenate(_teeth(design, theta, 14)) / mm
-    ring = np.concatenate(_spaces(design, np.arange(float(ring_teeth)), 14))
+    ring = np.concatenate(_spaces(design, np.arange(float(circular_spline_teeth)), 14))
     ax.plot(*_closed(ring / mm).T, color=_CIRCULAR_SPLINE, lw=0.5)
     ax.plot(*_closed(teeth).T, color=_FLEXSPLINE, lw=0.5)
     for curve in wave_generator(design).outlines(1441):

@@ -13,7 +13,7 @@ from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
     from swgjoint.fe.solid.meshing import SolidRun
-    from swgjoint.fe.solid.ring import SolidRing
+    from swgjoint.fe.solid.sector_model import SolidSectorModel
     from swgjoint.fe.solid.state import SolidState
 
 
@@ -63,19 +63,21 @@ def contact_picture(run: SolidRun, state: SolidState) -> bytes:
     return _png(figure)
 
 
-def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Array]:
+def contact_forces(
+    model: SolidSectorModel, state: SolidState
+) -> tuple[Array, Array, Array]:
     """Forces over the face width, tooth by tooth.
 
     Returns:
         Angle of every tooth of the model from the nearer of two lobes [rad] (N,);
         forces of the circular spline and of the wave generator (N, n_planes) [N].
     """
-    sectors, planes = ring.sectors, ring.strip.planes
-    x = ring.masters(state).mean(axis=1)
+    sectors, planes = model.sectors, model.strip.planes
+    x = model.masters(state).mean(axis=1)
     angle = np.arctan2(-x[:, 0], x[:, 1]) - state.wave_generator_angle
     angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi
-    teeth, first = ring.strip.teeth, ring.strip.flank_dofs
-    nodal = teeth.nodal_force(ring.loads(state))
+    teeth, first = model.strip.teeth, model.strip.flank_dofs
+    nodal = teeth.nodal_force(model.loads(state))
     by_side = nodal[:, :first].reshape(sectors, planes, 2, -1, 3).sum(axis=3)
     flanks = np.linalg.norm(by_side, axis=3).sum(axis=2)
     bore = np.linalg.norm(nodal[:, first:].reshape(sectors, planes, -1, 3), axis=3)

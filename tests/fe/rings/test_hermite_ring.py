@@ -8,8 +8,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from swgjoint.fe.rings.facing import FacingSurface, distances_to_ring
+from swgjoint.fe.rings.free_ring import FreeRing, pull_ring
 from swgjoint.fe.rings.hermite_ring import HermiteRing
-from swgjoint.fe.rings.plain_ring import PlainRing, pull_ring
 from swgjoint.gear.shell_theory import ring_stiffness
 
 RING = HermiteRing(radius=30e-3, elements=24, stretching=2e6, bending=0.1)
@@ -98,7 +98,7 @@ def test_opposite_forces_after_ring_theory(elements):
 
 def test_large_pull_against_plane_elements():
     """Pulled beyond the lobes of a drive it agrees with nonlinear plane elements."""
-    plain = PlainRing(
+    plain = FreeRing(
         outer_radius=30.2e-3,
         thickness=0.4e-3,
         width=10e-3,

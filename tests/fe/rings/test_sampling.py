@@ -17,7 +17,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.rings import sampling
 from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
-from swgjoint.fe.rings.sampling import ball_passage, sample_rings
+from swgjoint.fe.rings.sampling import ball_passage, sample_thin_rings
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit.fit import fit_map
@@ -32,7 +32,7 @@ def sampled(angles):
     """Positions of the balls of one drive."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sampling, "LEVELS", LEVELS)
-        return sample_rings(Design.load("size-25-100"), angles=angles)
+        return sample_thin_rings(Design.load("size-25-100"), angles=angles)
 
 
 @cache
@@ -76,11 +76,11 @@ def test_an_interrupted_ring_map_goes_on_bit_for_bit(monkeypatch, tmp_path):
     keep = Unfinished(folder=tmp_path)
     with hundred_elements():
         with pytest.raises(Stop):
-            sample_rings(design, angles=2, keep=keep, progress=stop)
+            sample_thin_rings(design, angles=2, keep=keep, progress=stop)
         before = len(asked)
-        found = sample_rings(design, angles=2, keep=keep)
+        found = sample_thin_rings(design, angles=2, keep=keep)
         again = asked[before:]
-        whole = sample_rings(design, angles=2)
+        whole = sample_thin_rings(design, angles=2)
     assert (before, len(again)) == (3, 2) and not set(asked[:before]) & set(again)
     took = {"sampling_wall_s": 0.0}
     assert map_bytes(replace(fit_map(found), info=took)) == map_bytes(

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import ring_model, sector
+from swgjoint.fe.plane.drive2d import sector, sector_model
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.newton_step import Load
-from swgjoint.fe.rings.equilibrium import RingSolver
+from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sections import rim_section
@@ -78,12 +78,16 @@ def test_section_scales_with_the_size():
 def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
     """On many stiff balls of a thin race, as on a rigid wave generator."""
     design = Design.load(name)
-    plane = ring_model(design, half=True, elastic_circular_spline=False, bearing=False)
+    plane = sector_model(
+        design, half=True, elastic_circular_spline=False, bearing=False
+    )
     load = Load(rotation=0.0, teeth=False)
     peer = NewtonSolver()(plane, plane.initial_guess(), load)
     assert peer.outcome.ok
     model = on_many_balls(design)
-    state = RingSolver()(model, initial_state(model, 0.0), rotation=0.0, teeth=False)
+    state = ThinRingSolver()(
+        model, initial_state(model, 0.0), rotation=0.0, teeth=False
+    )
     assert state.outcome.ok
     # without its teeth the rim would hold 21 and 38 % less
     assert state.energy == pytest.approx(peer.energy, rel=tolerance)
@@ -96,7 +100,7 @@ def test_rim_and_teeth_yield_as_plane_elements(name):
     """On a nearly rigid cam their part of the compliance is that of the plane model."""
     design = Design.load(name)
     plane = Continuation(
-        model=ring_model(design, half=True, bearing=False),
+        model=sector_model(design, half=True, bearing=False),
         ratio=design.ratio,
         layout=design.drive.layout,
     )

@@ -7,7 +7,7 @@ import pytest
 
 from swgjoint.fe.solid import drive3d
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.gear.design.design import Design
 
@@ -64,13 +64,13 @@ def thin_cup():
 @pytest.fixture(scope="session")
 def small_ring(small_design):
     """Half of it, the circular spline elastic."""
-    return solid_ring(small_design, half=True, orders=ORDERS)
+    return solid_sector_model(small_design, half=True, orders=ORDERS)
 
 
 @pytest.fixture(scope="session")
 def small_drive(small_design, small_ring):
     """Follows its equilibria."""
-    return SolidContinuation(ring=small_ring, ratio=small_design.ratio)
+    return SolidContinuation(model=small_ring, ratio=small_design.ratio)
 
 
 @pytest.fixture(scope="session")
@@ -107,19 +107,19 @@ def small_pattern(few_masters_everywhere, kept_once):
     """
     from swgjoint.fe.common import sampling
 
-    solve_pattern = sampling.solve_pattern
+    solve_mesh_cycle = sampling.solve_mesh_cycle
 
     def pattern(*args, **settings):
         return kept_once(
             f"pattern of the small drive {ORDERS}",
-            lambda: solve_pattern(*args, **{**settings, "tick": nothing}),
+            lambda: solve_mesh_cycle(*args, **{**settings, "tick": nothing}),
         )
 
     def sample(design):
         return sampling.sample_map(design, model="3d", angles=8)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sampling, "solve_pattern", pattern)
+        patch.setattr(sampling, "solve_mesh_cycle", pattern)
         patch.setattr(sampling, "LEVELS", (0.1, 0.35, 1.0))
         patch.setattr(sampling, "FIXED_SOLVES", 4)
         yield sample

@@ -18,7 +18,7 @@ from swgjoint.fe.solid.figures.axial_section import (
 TURN = 0.3
 
 
-def turned(ring, state, angle):
+def turned(model, state, angle):
     """A state turned about the axis of the drive as a whole."""
     matrix = about_z(np.array(angle))
     return replace(
@@ -59,7 +59,7 @@ def test_coning_does_not_depend_on_where_the_drive_stands(small_ring, deflected)
 
 def test_small_coning_is_the_recovered_displacement(small_ring, at_rest, deflected):
     """A thousandth of the deflection, linear frames: displacements of the nodes."""
-    ring = replace(small_ring, nonlinear=False)
+    model = replace(small_ring, nonlinear=False)
     small = 1e-3
 
     def part(name):
@@ -67,16 +67,16 @@ def test_small_coning_is_the_recovered_displacement(small_ring, at_rest, deflect
         return rest + small * (getattr(deflected, name) - rest)
 
     state = replace(at_rest, faces=part("faces"), inside=part("inside"))
-    found = coning(ring, state)
-    teeth, frame = ring.strip.teeth, ring.frames(state)[0]
+    found = coning(model, state)
+    teeth, frame = model.strip.teeth, model.frames(state)[0]
     u = teeth.displacement(frame.displacement)
-    mesh = ring.strip.mesh.teeth
+    mesh = model.strip.mesh.teeth
     points = np.asarray(mesh.segment.mesh.p)
     low = np.flatnonzero(np.abs(points[0]) < 1e-9)
     low = low[np.hypot(*points[:2, low]) < np.hypot(*points[:2, low]).min() + 1e-9]
     low = low[np.argsort(points[2, low])][: len(found.z)]  # the cup goes on behind
     assert points[2, low] == pytest.approx(found.z)
-    both = zip(axis_sectors(ring, state), (found.major, found.minor), strict=True)
+    both = zip(axis_sectors(model, state), (found.major, found.minor), strict=True)
     for sector, radial in both:
         # y is radial in the frame of the tooth; the rest is of second order
         assert radial == pytest.approx(u[sector, low, 1], abs=2e-3 * abs(radial).max())

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.common.cyclic import CyclicFactor
-from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.solid.across import spread_forces
+from swgjoint.fe.solid.circular_spline import condense_circular_spline
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.ring_gear import ring_gear
 from swgjoint.fe.solid.strip.masters import strip_masters
 from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.strip.segment import condense_segment
@@ -164,26 +164,26 @@ def test_free_ring_of_unit_width_is_the_plane_model():
         {"cup": None, "drive.face_width_mm": 1.0, "mesh.refinement": 0.5}
     )
     profile = tooth_profile(design, "flexspline")
-    ring = flexspline(design, profile, flexspline_strip(design, profile))
-    teeth, n, face = ring.teeth, 60, 3 * ring.masters.face_size
+    model = flexspline(design, profile, flexspline_strip(design, profile))
+    teeth, n, face = model.teeth, 60, 3 * model.masters.face_size
     plane_design = design.with_changes({"micro_geometry": None})
-    model = ring_model(plane_design, half=True)
+    model = sector_model(plane_design, half=True)
     element = model.element
 
     angle = 2 * pi / 120 * np.arange(n)
     turn = about_z(angle)
     # radial forces per node of the bore, the same in every plane
-    x, y = ring.bore[:, 0], ring.bore[:, 1]
+    x, y = model.bore[:, 0], model.bore[:, 1]
     out = np.stack([x, y, 0 * x], axis=-1) / np.hypot(x, y)[:, None]
     phi = angle[:, None] + np.arctan2(-x, y)
     force = np.cos(2 * phi)[..., None] * out
-    planes, bore = ring.planes, len(x) // ring.planes
+    planes, bore = model.planes, len(x) // model.planes
     share = np.full(planes, 1.0)
     share[[0, -1]] = 0.5
     share /= share.sum()
     force *= np.repeat(share, bore)[:, None]
     flat = force.reshape(n, -1)
-    pull = flat @ teeth.loaded_from_masters[ring.flank_dofs :]
+    pull = flat @ teeth.loaded_from_masters[model.flank_dofs :]
 
     def everywhere(matrix, size):
         """To the global frame, the last face of the half in the frame of its first."""
@@ -202,8 +202,8 @@ def test_free_ring_of_unit_width_is_the_plane_model():
     u = pinched(blocks, face, push, (0, 2))
     u[-1, -face:] *= sign
     local = np.einsum("sij,si->sj", spread, u)
-    compliance = teeth.compliance[ring.flank_dofs :, ring.flank_dofs :]
-    moved = local @ teeth.loaded_from_masters[ring.flank_dofs :].T + flat @ compliance
+    compliance = teeth.compliance[model.flank_dofs :, model.flank_dofs :]
+    moved = local @ teeth.loaded_from_masters[model.flank_dofs :].T + flat @ compliance
     radial = np.einsum("spi,pi->sp", moved.reshape(n, -1, 3), out)
     ours = radial.reshape(n, planes, bore).mean(axis=1)
 
@@ -238,8 +238,10 @@ def test_ring_gear_is_the_plane_model_without_poisson_ratio():
         }
     )
     profile = tooth_profile(design, "circular_spline")
-    gear = ring_gear(design, profile, circular_spline_strip(design, profile))
-    plane = ring_model(design).circular_spline.compliance
+    gear = condense_circular_spline(
+        design, profile, circular_spline_strip(design, profile)
+    )
+    plane = sector_model(design).circular_spline.compliance
     planes = len(gear.mesh.teeth.z)
     share = np.full(planes, 1.0)
     share[[0, -1]] = 0.5
@@ -259,7 +261,7 @@ def test_ring_gear_is_the_plane_model_without_poisson_ratio():
 
 def test_ring_gear_is_reciprocal(small_ring):
     """A force here moves a flank there as much as the other way round."""
-    gear = small_ring.teeth.ring_gear
+    gear = small_ring.teeth.elastic_circular_spline
     rng = np.random.default_rng(1)
     one, two = rng.normal(size=(2, 21, gear.flank.shape[1]))
     work = np.sum(two * gear.displacement(one))

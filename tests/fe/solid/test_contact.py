@@ -60,15 +60,15 @@ def test_rows_of_the_wave_generator(small_ring, loaded, moved):
 def test_rows_of_the_teeth(small_ring, loaded, moved):
     """The same for the candidates on the flanks, whose feet move along."""
     at, way = moved
-    ring = small_ring
+    model = small_ring
 
     def found(part):
         state = at(part)
-        return ring.teeth.find(
-            ring.frames(state)[0],
-            ring.loads(state),
-            state.ring_force,
-            0.2 * ring.lobe_height,
+        return model.teeth.find(
+            model.frames(state)[0],
+            model.loads(state),
+            state.circular_spline_force,
+            0.2 * model.lobe_height,
             None,
             thorough=False,
         )

@@ -12,7 +12,7 @@ from solved import kept
 
 from swgjoint.errors import InputError
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
 from swgjoint.fe.solid.wave_generator import elastic as module
 from swgjoint.fe.solid.wave_generator.elastic import (
@@ -56,9 +56,9 @@ def design(thin_cup):
 
 
 @pytest.fixture(scope="module")
-def ring(design, few_masters):
+def model(design, few_masters):
     """Half of it, the circular spline rigid."""
-    return solid_ring(
+    return solid_sector_model(
         design, half=True, elastic_circular_spline=False, orders=few_masters
     )
 
@@ -150,7 +150,7 @@ def test_outside_the_range_is_refused(cup):
 
 
 @pytest.mark.fe
-def test_slope_at_rest_is_the_radial_stiffness(design, ring, found, few_masters):
+def test_slope_at_rest_is_the_radial_stiffness(design, model, found, few_masters):
     """Small loads: linear, odd, as stiff as the pinched cup at mid-face."""
     pinched = pinched_cup(design, orders=few_masters).pull(1.0).stiffness
     # 2 % of the lobe height: large rotations add 0.03 %; the force acts on a patch of
@@ -160,7 +160,7 @@ def test_slope_at_rest_is_the_radial_stiffness(design, ring, found, few_masters)
     assert found.force_at(0.5 * small) / (0.5 * small) == pytest.approx(
         pinched, rel=2e-3
     )
-    same = cup_of(ring, design)
+    same = cup_of(model, design)
     assert same.pull(1.0).stiffness == pytest.approx(pinched, rel=1e-3)
     # odd to first order: 1.4 % of the deflection is 1e-3 of the stiffness
     out, back = (same.pull(sign * 1e-2, nonlinear=True) for sign in (1.0, -1.0))
@@ -185,14 +185,14 @@ def test_play_falls_as_flanks_come_nearer(design, found):
 
 
 @pytest.mark.fe
-def test_pads_find_the_teeth_where_the_play_ends(design, ring, found):
+def test_pads_find_the_teeth_where_the_play_ends(design, model, found):
     """No force on the teeth just below the take-up, more and more above it."""
-    cup = cup_of(ring, design)
+    cup = cup_of(model, design)
 
     def on_teeth(w):
         planes = cup.pull(found.force_at(w), nonlinear=True).of_planes
         share = cup.share("mid_face")
-        return force_on_teeth(ring, design.ratio, share, planes)
+        return force_on_teeth(model, design.ratio, share, planes)
 
     # play of 0.02 mrad: 0.3 % of the deflection
     assert on_teeth(0.997 * found.take_up) == pytest.approx(0.0, abs=1e-6)
@@ -204,11 +204,11 @@ def test_pads_find_the_teeth_where_the_play_ends(design, ring, found):
 
 
 @pytest.mark.fe
-def test_a_pad_presses_as_the_load_does(design, ring):
+def test_a_pad_presses_as_the_load_does(design, model):
     """Without teeth its force is that of the load that deflects the cup as much."""
-    cup, share = cup_of(ring, design), cup_of(ring, design).share("mid_face")
+    cup, share = cup_of(model, design), cup_of(model, design).share("mid_face")
     pulled = cup.pull(30.0, nonlinear=True)
-    padded = with_pads(ring, share, pulled.of_planes)
-    state = SolidContinuation(ring=padded, ratio=design.ratio).deflect()
+    padded = with_pads(model, share, pulled.of_planes)
+    state = SolidContinuation(model=padded, ratio=design.ratio).deflect()
     # the pad touches nodes, the load is spread over them
     assert pad_force(padded, state) == pytest.approx(30.0, rel=2e-3)

@@ -10,7 +10,7 @@ import pytest
 
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.equilibrium import SolidLoad
 from swgjoint.fe.solid.linearise import linearise
 from swgjoint.gear.design.design import Design
@@ -70,9 +70,9 @@ def test_input_torque_is_the_slope_of_the_energy_over_a_pitch(small_drive, loade
 
 def test_turning_everything_changes_nothing(small_drive, deflected):
     """Wave generator and bore turned by 0.37 rad: the same energy, the shape turned."""
-    ring, angle = small_drive.ring, 0.37
-    start = ring.initial_guess(angle, angle)
-    turned = small_drive.solver(ring, start, SolidLoad(rotation=angle, teeth=False))
+    model, angle = small_drive.model, 0.37
+    start = model.initial_guess(angle, angle)
+    turned = small_drive.solver(model, start, SolidLoad(rotation=angle, teeth=False))
     assert turned.outcome.ok
     assert turned.energy == pytest.approx(deflected.energy, rel=1e-9)
     expected = deflected.faces @ about_z(np.array(angle)).T
@@ -83,9 +83,9 @@ def test_turning_everything_changes_nothing(small_drive, deflected):
 
 def test_shape_travels_with_the_wave_generator(small_drive, deflected):
     """One tooth pitch on, the bore held: every sector is like the one before it."""
-    ring, pitch = small_drive.ring, 2 * pi / 40
-    start = ring.initial_guess(pitch, 0.0)
-    ahead = small_drive.solver(ring, start, SolidLoad(rotation=0.0, teeth=False))
+    model, pitch = small_drive.model, 2 * pi / 40
+    start = model.initial_guess(pitch, 0.0)
+    ahead = small_drive.solver(model, start, SolidLoad(rotation=0.0, teeth=False))
     assert ahead.energy == pytest.approx(deflected.energy, rel=1e-9)
     expected = deflected.faces[:-1] @ about_z(np.array(pitch)).T
     assert np.abs(ahead.faces[1:] - expected).max() < 1e-9
@@ -100,18 +100,18 @@ def test_bore_of_the_diaphragm_stays_where_it_is_held(small_ring, deflected):
 
 def test_linear_level_keeps_its_stiffness(small_ring, deflected):
     """Far from rest the tangent is that at rest, the forces K (x - X); no more."""
-    ring = replace(small_ring, nonlinear=False)
+    model = replace(small_ring, nonlinear=False)
     untouched = np.zeros_like(deflected.touching)
     state = replace(deflected, touching=untouched)
-    size = ring.strip.masters.face_size
-    last = ring.strip.masters.size - size
+    size = model.strip.masters.face_size
+    last = model.strip.masters.size - size
     rest = replace(
-        state, faces=ring.reference[:, :size], inside=ring.reference[:, size:last]
+        state, faces=model.reference[:, :size], inside=model.reference[:, size:last]
     )
-    at_rest, far = linearise(ring, rest), linearise(ring, state)
+    at_rest, far = linearise(model, rest), linearise(model, state)
     scale = np.abs(at_rest.hessian).max()
     assert np.abs(far.hessian - at_rest.hessian).max() < 1e-12 * scale
-    moved = (ring.masters(state) - ring.reference).reshape(ring.sectors, -1)
+    moved = (model.masters(state) - model.reference).reshape(model.sectors, -1)
     force = np.einsum("sij,sj->si", at_rest.hessian, moved)
     assert np.abs(far.gradient - force).max() < 1e-9 * np.abs(force).max()
     bent = linearise(small_ring, state).hessian
@@ -120,8 +120,8 @@ def test_linear_level_keeps_its_stiffness(small_ring, deflected):
 
 def test_linear_level_finds_its_equilibrium(small_design, small_ring, deflected):
     """With the contact known there is nothing left to iterate; the shape differs."""
-    ring = replace(small_ring, nonlinear=False)
-    follow = SolidContinuation(ring=ring, ratio=small_design.ratio)
+    model = replace(small_ring, nonlinear=False)
+    follow = SolidContinuation(model=model, ratio=small_design.ratio)
     state = follow.deflect()
     assert state.outcome.ok
     # tenths of a millimetre apart: a lobe of a twentieth of the radius
@@ -131,9 +131,9 @@ def test_linear_level_finds_its_equilibrium(small_design, small_ring, deflected)
 @pytest.mark.slow
 def test_half_model_is_the_whole_drive(small_design, small_ring, loaded, small_drive):
     """Energy, moments, output angle and masters of all sectors."""
-    teeth = replace(small_ring.teeth, ring_teeth=42)
+    teeth = replace(small_ring.teeth, circular_spline_teeth=42)
     whole = replace(small_ring, half=False, teeth=teeth)
-    follow = SolidContinuation(ring=whole, ratio=small_design.ratio)
+    follow = SolidContinuation(model=whole, ratio=small_design.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
     state = follow.to_angle(state, loaded.wave_generator_angle)
     assert state.outcome.ok
@@ -166,7 +166,9 @@ def test_crowned_wave_generator_engages_under_a_short_cup():
         }
     )
     # with fewer masters it does not rock
-    follow = SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
+    follow = SolidContinuation(
+        model=solid_sector_model(design, half=True), ratio=design.ratio
+    )
     engaged = follow.engage(follow.deflect())
     assert engaged.outcome.ok
     assert len(engaged.history) < 40

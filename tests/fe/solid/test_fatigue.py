@@ -194,7 +194,7 @@ def test_one_equilibrium_per_torque(monkeypatch, small_ring):
             "material.fatigue_limit_torsion_MPa": 320.0,
         }
     )
-    monkeypatch.setattr(module, "solid_ring", lambda design, half: small_ring)
+    monkeypatch.setattr(module, "solid_sector_model", lambda design, half: small_ring)
     seen = []
     low, high = fatigue(design, [1.0, 5.0], progress=lambda *a: seen.append(a))
     assert (low.torque, high.torque) == (1.0, 5.0)

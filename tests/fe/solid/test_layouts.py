@@ -39,7 +39,7 @@ def driven(follow, loaded):
         inside=loaded.inside @ back,
         wave_generator_angle=loaded.wave_generator_angle - turn,
         rotation=loaded.rotation - turn,
-        ring_rotation=-turn,
+        circular_spline_rotation=-turn,
     )
     return follow.load(start, -loaded.tooth_moment, follow.input_angle(start))
 
@@ -48,7 +48,7 @@ def test_same_state_from_another_member(follow, driven, loaded):
     """The circular-spline-fixed state, turned along, is an equilibrium here too."""
     assert driven.outcome.ok
     assert len(driven.history) < 4
-    alpha = driven.wave_generator_angle - driven.ring_rotation
+    alpha = driven.wave_generator_angle - driven.circular_spline_rotation
     assert alpha == pytest.approx(loaded.wave_generator_angle, abs=1e-11)
     assert driven.energy == pytest.approx(loaded.energy, rel=1e-9)
     assert driven.tooth_force == pytest.approx(loaded.tooth_force, abs=1e-4)

@@ -12,7 +12,7 @@ from messages import naming
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.wave_generator.race import AXIAL, NODE, ROLL, SIGN, SolidRace
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.neutral_line import NeutralLine
@@ -35,9 +35,9 @@ def design(small_design):
 
 
 @pytest.fixture(scope="module")
-def ring(design, few_masters):
+def model(design, few_masters):
     """Half of it."""
-    return solid_ring(
+    return solid_sector_model(
         design,
         half=True,
         bearing="free",
@@ -47,9 +47,9 @@ def ring(design, few_masters):
 
 
 @pytest.fixture(scope="module")
-def drive(design, ring):
+def drive(design, model):
     """Follows its equilibria."""
-    return SolidContinuation(ring=ring, ratio=design.ratio)
+    return SolidContinuation(model=model, ratio=design.ratio)
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +72,9 @@ def at_nodes(sectors):
     return sectors[:, :NODE] + last
 
 
-def test_forces_are_the_slope_of_the_energy(ring, deflected):
+def test_forces_are_the_slope_of_the_energy(model, deflected):
     """Race, balls and roll: gradient and tangent against central differences."""
-    race, rng, h = ring.race, np.random.default_rng(1), 1e-8
+    race, rng, h = model.race, np.random.default_rng(1), 1e-8
     here = deflected.race + 2e-6 * rng.standard_normal(deflected.race.shape)
     way = rng.standard_normal(here.shape)
     way[0, 0, [0, 1, 3]] = 0.0  # held there
@@ -89,17 +89,17 @@ def test_forces_are_the_slope_of_the_energy(ring, deflected):
     assert np.abs(change - seen)[1:].max() < 1e-6 * np.abs(seen).max()
 
 
-def test_gap_changes_as_its_derivatives_say(ring, deflected):
+def test_gap_changes_as_its_derivatives_say(model, deflected):
     """By the points and by the race, crown and roll included."""
-    race, rng, h = ring.race, np.random.default_rng(2), 1e-8
-    frame = ring.frames(deflected)[0]
-    local = ring.bore_positions(frame, deflected)
+    race, rng, h = model.race, np.random.default_rng(2), 1e-8
+    frame = model.frames(deflected)[0]
+    local = model.bore_positions(frame, deflected)
     points = np.einsum("sij,spj->spi", frame.turn, local)
     here = deflected.race + 1e-5 * rng.standard_normal(deflected.race.shape)
     way, moved = (rng.standard_normal(part.shape) for part in (here, points))
-    _, by_point, by_race = race.gap(here, points, ring.bore_places)
+    _, by_point, by_race = race.gap(here, points, model.bore_places)
     low, high = (
-        race.gap(here + s * h * way, points + s * h * moved, ring.bore_places)[0]
+        race.gap(here + s * h * way, points + s * h * moved, model.bore_places)[0]
         for s in (-1.0, 1.0)
     )
     expected = np.einsum("sbi,sbi->sb", by_point, moved)
@@ -108,15 +108,15 @@ def test_gap_changes_as_its_derivatives_say(ring, deflected):
     assert np.abs(by_race[..., AXIAL]).max() == 0.0
 
 
-def test_race_on_the_outline_is_the_rigid_surface(ring, deflected):
+def test_race_on_the_outline_is_the_rigid_surface(model, deflected):
     """Mean line half its thickness inside the outline, no roll: the gap to 0.1 um.
 
     A cubic on 1/40 of a turn misses two lobes of 1 mm by h^4 16 w0/384, 0.03 um, and as
     much again where points see it beyond their own sector. The rigid surface has the
     crown of the race and no slope.
     """
-    race, alpha = ring.race, 0.3
-    surface = replace(ring.wave_generator, slope=0.0)
+    race, alpha = model.race, 0.3
+    surface = replace(model.wave_generator, slope=0.0)
     offset = 0.5 * race.on_balls.bearing.race_thickness
     line = replace(
         race.on_balls.cam,
@@ -134,13 +134,13 @@ def test_race_on_the_outline_is_the_rigid_surface(ring, deflected):
     coordinates[:, 0, :2] = pose(angle)
     slope = (pose(angle + h) - pose(angle - h)) / (2.0 * h)
     coordinates[:, 1, :2] = slope * race.pitch
-    bore = ring.strip.bore
+    bore = model.strip.bore
     phi = race.pitch * np.arange(race.sectors)[:, None]
     outside = pose(phi + np.arctan2(-bore[:, 0], bore[:, 1]))
     points = np.zeros((race.sectors, len(bore), 3))
     points[..., :2] = outside * (1.0 + (offset + 1e-5) / 0.018)
     points[..., 2] = bore[:, 2]
-    gap = race.gap(coordinates, points, ring.bore_places)[0]
+    gap = race.gap(coordinates, points, model.bore_places)[0]
     expected = surface.gap(points.reshape(-1, 3), alpha)[0].reshape(gap.shape)
     assert np.ptp(expected) > 1e-5
     assert gap == pytest.approx(expected, abs=1e-7)
@@ -165,9 +165,9 @@ def out_of_plane_energy(race, *motion):
     return 0.5 * float(np.einsum("si,ij,sj->", both, race.roll.stiffness, both))
 
 
-def test_roll_of_a_ring_has_its_closed_forms(ring):
+def test_roll_of_a_ring_has_its_closed_forms(model):
     """Even roll, two lobes held or free along the axis, and a tilt, which is free."""
-    race, roll = ring.race, 0.01
+    race, roll = model.race, 0.01
     r = race.on_balls.race.radius
     around = 2.0 * pi * r
     even = 0.5 * race.roll.rolling * (roll / r) ** 2 * around
@@ -202,13 +202,13 @@ def test_anchor_gives_way_to_the_softest_roll():
     assert own <= stiff < 1.01 * own
 
 
-def moments(ring, state):
+def moments(model, state):
     """Of the balls on the race and of the race on the bore, whole drive [N·m]."""
-    race = ring.race
+    race = model.race
     balls = race.forces(state.race, state.wave_generator_angle).balls
     centre = race.on_balls.balls(state.wave_generator_angle, race.phase)[0]
-    frame = ring.frames(state)[0]
-    local = ring.bore_positions(frame, state)
+    frame = model.frames(state)[0]
+    local = model.bore_positions(frame, state)
     points, force = (
         np.einsum("sij,spj->spi", frame.turn, part)
         for part in (local, state.bore_force.reshape(local.shape))
@@ -217,13 +217,13 @@ def moments(ring, state):
     return float(np.sum(balls.push * rotate_right_angle(centre))), on_bore
 
 
-def test_balls_teeth_and_load_balance(ring, turned_on):
+def test_balls_teeth_and_load_balance(model, turned_on):
     """Teeth and bore carry T; bore and balls press alike but for what is held.
 
     Between its nodes a race bends as cubics do, so that balls of 1400 N on elements of
     3 mm press a little along it: Q^2 h^2/(400 E I), 1 N, at the node that is held.
     """
-    of_balls, of_bore = moments(ring, turned_on)
+    of_balls, of_bore = moments(model, turned_on)
     assert turned_on.tooth_moment + of_bore == pytest.approx(TORQUE, rel=1e-7)
     assert of_bore == pytest.approx(of_balls, abs=0.005 * TORQUE)
     assert abs(of_bore) > 0.04 * TORQUE
@@ -238,10 +238,10 @@ def test_ball_and_bore_forces_balance(design, few_masters):
     At no position of symmetry, so that 5 N are left; node 0 is held along x, see above.
     """
     odd = design.with_changes({"wave_generator.bearing.balls": 11})
-    whole = solid_ring(
+    whole = solid_sector_model(
         odd, bearing="free", elastic_circular_spline=False, orders=few_masters
     )
-    state = SolidContinuation(ring=whole, ratio=odd.ratio).deflect(0.1)
+    state = SolidContinuation(model=whole, ratio=odd.ratio).deflect(0.1)
     assert state.outcome.ok
     balls = whole.race.forces(state.race, state.wave_generator_angle).balls
     frame = whole.frames(state)[0]
@@ -254,15 +254,15 @@ def test_ball_and_bore_forces_balance(design, few_masters):
 
 
 @pytest.mark.parametrize(("clearance", "figure"), [(0.0, 4.37), (5e-6, 5.0)])
-def test_rigid_race_after_stribeck(ring, clearance, figure):
+def test_rigid_race_after_stribeck(model, clearance, figure):
     """A round race moved over a round cam: Q = 4.37 P/Z without clearance, 5 with."""
-    own = ring.race.on_balls
+    own = model.race.on_balls
     bearing = replace(own.bearing, clearance=clearance, balls=24)
     centres = bearing.raceways[0] + 0.5 * bearing.ball_diameter
     circle = Elliptical(major=centres, minor=centres)
     cam = NeutralLine(outline=circle, lobes=2, radius=centres, offset=0.0)
     race = replace(
-        ring.race, half=False, on_balls=replace(own, bearing=bearing, cam=cam)
+        model.race, half=False, on_balls=replace(own, bearing=bearing, cam=cam)
     )
     moved = np.zeros((race.sectors, 2, 4))
     moved[:, 0, 1] = -10e-6
@@ -283,13 +283,13 @@ def test_rigid_race_after_stribeck(ring, clearance, figure):
     assert -held[free] == pytest.approx(resultant[free], abs=0.02 * abs(resultant[1]))
 
 
-def test_contact_is_on_the_race_alone(ring, turned_on):
+def test_contact_is_on_the_race_alone(model, turned_on):
     """Beside the race nothing presses; on it nothing overlaps, nothing pulls."""
     from swgjoint.fe.solid.linearise import bore_contact
 
-    contact = bore_contact(ring, turned_on, ring.frames(turned_on)[0])
-    count = len(ring.strip.bore)
-    on = ring.race.covers(ring.strip.bore[:, 2])
+    contact = bore_contact(model, turned_on, model.frames(turned_on)[0])
+    count = len(model.strip.bore)
+    on = model.race.covers(model.strip.bore[:, 2])
     assert 0 < on.sum() < count
     assert np.abs(turned_on.pressure[:, :count][:, ~on]).max() == 0.0
     assert contact.gap[contact.present].min() > -1e-9
@@ -297,10 +297,10 @@ def test_contact_is_on_the_race_alone(ring, turned_on):
     assert turned_on.pressure.max() > 100.0
 
 
-def test_input_torque_is_the_slope_of_the_energy(ring, drive, turned_on):
+def test_input_torque_is_the_slope_of_the_energy(model, drive, turned_on):
     """T_wg and the work on what is held are d(U + T psi)/d alpha; finer steps agree."""
     alpha, torque = turned_on.wave_generator_angle, turned_on.wave_generator_torque
-    of_balls, of_bore = moments(ring, turned_on)
+    of_balls, of_bore = moments(model, turned_on)
     held = (of_balls - of_bore) / turned_on.race[0, 0, 1]  # along x at node 0
     errors = []
     for step in (2e-2, 2e-3):
@@ -314,10 +314,10 @@ def test_input_torque_is_the_slope_of_the_energy(ring, drive, turned_on):
     assert errors[1] < 0.5 * errors[0]
 
 
-def test_race_rolls_with_the_cone_unless_its_warping_is_held(ring, design, deflected):
+def test_race_rolls_with_the_cone_unless_its_warping_is_held(model, design, deflected):
     """At a lobe the edge towards the closed end goes in; held axially by less."""
-    stiff = replace(ring, race=replace(ring.race, axially_free=False))
-    held = SolidContinuation(ring=stiff, ratio=design.ratio).deflect()
+    stiff = replace(model, race=replace(model.race, axially_free=False))
+    held = SolidContinuation(model=stiff, ratio=design.ratio).deflect()
     assert held.outcome.ok
     free, less = (state.race[0, 0, 2] for state in (deflected, held))
     assert free < 1.2 * less < 0.0
@@ -327,7 +327,7 @@ def test_race_rolls_with_the_cone_unless_its_warping_is_held(ring, design, defle
 
 def test_bearing_is_absent_unless_asked_for(design, few_masters):
     """A design with a bearing keeps its rigid wave generator."""
-    plain = solid_ring(
+    plain = solid_sector_model(
         design, half=True, elastic_circular_spline=False, orders=few_masters
     )
     assert plain.race is None
@@ -348,4 +348,4 @@ def test_bearing_is_absent_unless_asked_for(design, few_masters):
 def test_what_is_not_modelled_is_refused(design, changes, wanted):
     """One line that says what."""
     with pytest.raises(DesignError, match=naming("reference-3d-modified", *wanted)):
-        solid_ring(design.with_changes(changes), half=True, bearing="free")
+        solid_sector_model(design.with_changes(changes), half=True, bearing="free")

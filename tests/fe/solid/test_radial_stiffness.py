@@ -18,7 +18,7 @@ from swgjoint.gear.shell_theory import ring_stiffness
 FORCE = 120.0  # deflects the small cup by about its lobe height [N]
 
 
-def ring(width):
+def model(width):
     """The smooth wall of XB1-100-80 as a free tube, and its closed form per length."""
     changes = {"cup": None, "drive.face_width_mm": width, "mesh.refinement": 0.5}
     design = Design.load("xb1-100-80").with_changes(changes)
@@ -36,7 +36,7 @@ def small_cup(thin_cup, few_masters):
 
 def test_narrow_free_tube_is_the_ring():
     """A ring of 0.5 mm of width: the inextensional closed form within 0.1 %."""
-    cup, closed = ring(0.5)
+    cup, closed = model(0.5)
     # 1.7 % of thickness over radius: shear and stretch are 1e-4
     for place in PLACES:
         assert cup.pull(1.0, place).stiffness == pytest.approx(closed, rel=1e-3)
@@ -44,7 +44,7 @@ def test_narrow_free_tube_is_the_ring():
 
 def test_wide_free_tube_keeps_its_generators_straight():
     """A tube 47 walls wide, loaded evenly: nearly 1/(1 - nu^2) of the ring."""
-    cup, closed = ring(32.0)
+    cup, closed = model(32.0)
     stiff = cup.pull(1.0, "face_width").stiffness / closed
     assert 1.05 < stiff < 1.0 / (1.0 - 0.3**2)
     assert cup.pull(1.0, "open_edge").stiffness < 0.8 * closed

@@ -9,7 +9,7 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.fe.common.pattern import Effort, solve_pattern
+from swgjoint.fe.common.mesh_cycle import Effort, solve_mesh_cycle
 from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.maps.unfinished import Unfinished
@@ -105,7 +105,7 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
             raise Stop
 
     def solve(tick, **options):
-        return solve_pattern(
+        return solve_mesh_cycle(
             small_drive,
             period,
             [5.0],

@@ -12,7 +12,7 @@ from solved import kept
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of, shift_errors
@@ -69,14 +69,14 @@ def none(follow, at):
 def test_leaning_changes_gaps_by_its_height(reference):
     """In a plane at z the circular spline stands off by z times the slope."""
     follow, state, _ = reference
-    ring, tilt = follow.ring, LEAN * np.array([0.6, 0.8])
+    model, tilt = follow.model, LEAN * np.array([0.6, 0.8])
 
     def found(teeth):
         return teeth.find(
-            ring.frames(state)[0],
-            ring.loads(state),
-            state.ring_force,
-            0.03 * ring.lobe_height,
+            model.frames(state)[0],
+            model.loads(state),
+            state.circular_spline_force,
+            0.03 * model.lobe_height,
             state.held,
             thorough=True,
         )
@@ -86,13 +86,13 @@ def test_leaning_changes_gaps_by_its_height(reference):
         every = list(zip(c.sector, c.side, rows.plane, strict=True))
         return {key: k for k, key in enumerate(every) if every.count(key) == 1}
 
-    straight, leans = found(ring.teeth), found(replace(ring.teeth, tilt=tilt))
+    straight, leans = found(model.teeth), found(replace(model.teeth, tilt=tilt))
     here, there = keys(straight), keys(leans)
     both = [(k, there[key]) for key, k in here.items() if key in there]
     assert len(both) > 5
-    turn = ring.frames(state)[0].turn
+    turn = model.frames(state)[0].turn
     angle = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
-    contacts, z = straight.contacts, ring.strip.mesh.teeth.z
+    contacts, z = straight.contacts, model.strip.mesh.teeth.z
     normal = rotate(contacts.normal, angle[contacts.sector])
     wanted = -z[straight.plane] * (normal @ tilt)
     change = np.array(
@@ -217,7 +217,7 @@ def test_a_pitch_on_the_next_teeth_stand_alike(design, reference, layout):
     moved = perfect.with_errors(*errors)
     there = moved.to_torque(rest, TORQUE)
     assert there.outcome.ok
-    turned = replace(perfect, ring=solid_ring(flawed))
+    turned = replace(perfect, model=solid_sector_model(flawed))
     state = turned.to_torque(rest, TORQUE)
     angle = pitches * pitch_of(flawed)
     here = turned.output_angle(state)
@@ -249,16 +249,18 @@ def test_flawed_half_or_rigid_models_are_refused(design, reference):
     with pytest.raises(ValueError, match=naming("all sectors", "elastic", "errors")):
         flawed.influence(state)
     with pytest.raises(ValueError, match=naming("all sectors", "elastic", "errors")):
-        influence(replace(follow.ring, half=True), state, ring_is_output=False)
+        influence(
+            replace(follow.model, half=True), state, circular_spline_is_output=False
+        )
     leaning = design.with_changes({"tolerances.misalignment_arcmin": 2.0})
     with pytest.raises(
         DesignError, match=naming("reference-3d", "tolerances", "elastic")
     ):
-        solid_ring(leaning, elastic_circular_spline=False)
+        solid_sector_model(leaning, elastic_circular_spline=False)
     with pytest.raises(
         DesignError, match=naming("reference-3d", "half model", "--half")
     ):
-        solid_ring(leaning, half=True)
+        solid_sector_model(leaning, half=True)
 
 
 @pytest.mark.parametrize("layout", ["circular_spline_fixed", "flexspline_fixed"])
@@ -278,7 +280,7 @@ def test_errors_keep_the_balance_of_energy(design, reference, layout):
     )
     perfect, rest, _ = reference
     follow = replace(
-        perfect, ring=solid_ring(flawed), layout=layout, ratio=flawed.ratio
+        perfect, model=solid_sector_model(flawed), layout=layout, ratio=flawed.ratio
     )
     start = follow.to_torque(rest, TORQUE)
     theta, step = 0.4 * pitch_of(flawed), 3e-4

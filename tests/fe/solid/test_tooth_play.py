@@ -10,7 +10,7 @@ import pytest
 from swgjoint.fe.common.following import is_free
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.tooth_play import play
 
 pytestmark = pytest.mark.fe
@@ -19,17 +19,17 @@ pytestmark = pytest.mark.fe
 @pytest.fixture(scope="module")
 def drive(small_design, few_masters):
     """The small gear, its circular spline rigid."""
-    ring = solid_ring(
+    model = solid_sector_model(
         small_design, half=True, elastic_circular_spline=False, orders=few_masters
     )
-    return SolidContinuation(ring=ring, ratio=small_design.ratio)
+    return SolidContinuation(model=model, ratio=small_design.ratio)
 
 
 @pytest.fixture(scope="module")
 def found(drive):
     """On its wave generator, and its play."""
-    state, ring = drive.deflect(), drive.ring
-    return state, play(ring, ring.frames(state)[0], ring.loads(state), drive.ratio)
+    state, model = drive.deflect(), drive.model
+    return state, play(model, model.frames(state)[0], model.loads(state), drive.ratio)
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -46,16 +46,16 @@ def test_the_solved_output_is_free_over_the_play(drive, found, side):
 def test_play_does_not_depend_on_where_in_it_the_output_stands(drive, found):
     """Turned by a tenth of the play, the other side is so much farther."""
     state, free = found
-    ring = drive.ring
-    frame = ring.frames(state)[0]
+    model = drive.model
+    frame = model.frames(state)[0]
     turn = about_z(np.array(0.1 * free)) @ frame.turn
-    there = play(ring, replace(frame, turn=turn), ring.loads(state), drive.ratio)
+    there = play(model, replace(frame, turn=turn), model.loads(state), drive.ratio)
     assert there == pytest.approx(free, rel=1e-6)
 
 
 def test_teeth_that_are_far_have_no_end_of_play(drive, found):
     """A flexspline 3 mm smaller passes the circular spline without touching."""
     state, _ = found
-    frame = drive.ring.frames(state)[0]
+    frame = drive.model.frames(state)[0]
     inside = replace(frame, centre=frame.centre - [0.0, 3e-3, 0.0])
-    assert play(drive.ring, inside, drive.ring.loads(state), drive.ratio) == np.inf
+    assert play(drive.model, inside, drive.model.loads(state), drive.ratio) == np.inf

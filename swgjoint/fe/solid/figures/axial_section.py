@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.typing import Array, Index
 from swgjoint.units import mm
@@ -52,30 +52,32 @@ class Coning:
         }
 
 
-def axis_sectors(ring: SolidRing, state: SolidState) -> tuple[int, int]:
+def axis_sectors(model: SolidSectorModel, state: SolidState) -> tuple[int, int]:
     """Sectors whose teeth are closest to the major and the minor axis.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
     """
-    place = 2.0 * pi / ring.strip.sectors * np.arange(ring.sectors, dtype=float)
+    place = 2.0 * pi / model.strip.sectors * np.arange(model.sectors, dtype=float)
     angle = place + state.rotation - state.wave_generator_angle
     from_major = np.abs((angle + 0.5 * pi) % pi - 0.5 * pi)
     return int(from_major.argmin()), int(from_major.argmax())
 
 
-def sector_points(ring: SolidRing, state: SolidState, sector: int) -> list[Array]:
+def sector_points(
+    model: SolidSectorModel, state: SolidState, sector: int
+) -> list[Array]:
     """Deflected nodes of a sector's segments in the global frame, each (n, 3) [m].
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
         sector: Number of the sector.
     """
-    force, points = ring.loads(state)[sector, None], []
+    force, points = model.loads(state)[sector, None], []
     for number, (segment, frame) in enumerate(
-        zip(ring.strip.segments, ring.frames(state), strict=True)
+        zip(model.strip.segments, model.frames(state), strict=True)
     ):
         d = frame.displacement[sector, None]
         u = segment.displacement(d, None if number else force)[0]
@@ -85,18 +87,18 @@ def sector_points(ring: SolidRing, state: SolidState, sector: int) -> list[Array
 
 
 def axial_sections(
-    ring: SolidRing, state: SolidState, sector: int
+    model: SolidSectorModel, state: SolidState, sector: int
 ) -> tuple[AxialSection, ...]:
     """All segments of a sector, cut through the axis of its tooth.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
         sector: Number of the sector.
     """
     sections = []
-    points = sector_points(ring, state, sector)
-    for segment, moved in zip(ring.strip.segments, points, strict=True):
+    points = sector_points(model, state, sector)
+    for segment, moved in zip(model.strip.segments, points, strict=True):
         mesh = segment.mesh.mesh
         rest, facets = np.asarray(mesh.p).T, np.asarray(mesh.facets)
         inside = np.abs(rest[:, 0]) < ON_AXIS
@@ -112,19 +114,19 @@ def axial_sections(
     return tuple(sections)
 
 
-def coning(ring: SolidRing, state: SolidState) -> Coning:
+def coning(model: SolidSectorModel, state: SolidState) -> Coning:
     """Radial displacement of the bore along the face width at both axes.
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
     """
-    teeth = ring.strip.mesh.teeth
+    teeth = model.strip.mesh.teeth
     line = teeth.nodes[:, teeth.plane.bore[len(teeth.plane.bore) // 2]]
     rest = _meridian(np.asarray(teeth.segment.mesh.p).T[line])[:, 1]
     major, minor = (
-        _meridian(sector_points(ring, state, sector)[0][line])[:, 1] - rest
-        for sector in axis_sectors(ring, state)
+        _meridian(sector_points(model, state, sector)[0][line])[:, 1] - rest
+        for sector in axis_sectors(model, state)
     )
     return Coning(z=teeth.z, major=major, minor=minor)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
 from swgjoint.fe.solid.strip.mesh import StripMesh
@@ -164,9 +164,9 @@ def fatigue(
         FatigueLimits.from_design(design),
         ShellDimensions.from_design(design),
     )
-    ring = solid_ring(design, half="auto")
+    model = solid_sector_model(design, half="auto")
     follow = SolidContinuation(
-        ring=ring, ratio=design.ratio, layout=design.drive.layout
+        model=model, ratio=design.ratio, layout=design.drive.layout
     )
     total = 2 + len(torques)
 
@@ -183,8 +183,8 @@ def fatigue(
     for torque in torques:
         state = follow.to_torque(state, torque)
         reached(state, f"loading to {torque:g} N·m", 3 + len(results))
-        stresses = flexspline_stresses(ring, state)
-        results.append(assess(ring.strip.mesh, stresses, torque, limits, shell))
+        stresses = flexspline_stresses(model, state)
+        results.append(assess(model.strip.mesh, stresses, torque, limits, shell))
     return results
 
 

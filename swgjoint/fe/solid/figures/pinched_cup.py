@@ -31,8 +31,8 @@ from swgjoint.fe.solid.corotation import (
     spin,
     tangent,
 )
+from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
-from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.stress import average_faces
 from swgjoint.fe.solid.strip.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.strip.mesh import StripMesh, flexspline_strip
@@ -251,7 +251,7 @@ class PinchedCup:
         matrix[-1, -size:] *= sign[:, None]
         matrix[-1, :, -size:] *= sign
         out[-1, -size:] *= sign
-        solved = RingFactor(matrix, size).solve(out[..., None])[..., 0]
+        solved = DenseCyclicFactor(matrix, size).solve(out[..., None])[..., 0]
         solved[-1, -size:] *= sign
         return np.asarray(solved)
 

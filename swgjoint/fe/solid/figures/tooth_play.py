@@ -8,7 +8,7 @@ from math import inf, nan
 import numpy as np
 
 from swgjoint.fe.solid.corotation import SolidFrames, about_z
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.typing import Array
 
 REACH = 0.5
@@ -22,7 +22,9 @@ TOUCHES = 1e-10
 """Rotation below which a tooth touches [rad]."""
 
 
-def play(ring: SolidRing, frame: SolidFrames, load: Array, ratio: float) -> float:
+def play(
+    model: SolidSectorModel, frame: SolidFrames, load: Array, ratio: float
+) -> float:
     r"""Rotation of the output between the contacts of its two directions [rad].
 
     The deflected flexspline is rotated as a whole until a tooth touches. This rotates
@@ -30,7 +32,7 @@ def play(ring: SolidRing, frame: SolidFrames, load: Array, ratio: float) -> floa
     times as large.
 
     Args:
-        ring: Model of half of the drive or of the whole drive.
+        model: Model of half of the drive or of the whole drive.
         frame: Frames of its toothed segments without tooth contact.
         load: Forces at their loaded degrees of freedom (N, n_b) [N].
         ratio: Signed ratio i [-].
@@ -39,16 +41,18 @@ def play(ring: SolidRing, frame: SolidFrames, load: Array, ratio: float) -> floa
         Play [rad]; negative if flanks overlap, infinite if no flanks are close, NaN if
         teeth overlap that no rotation can separate.
     """
-    profile = ring.strip.profile
+    profile = model.strip.profile
     reach = REACH * 2.0 * profile.pitch_radius / profile.teeth
     flat = FLAT * profile.pitch_radius
-    still = np.zeros((ring.teeth.ring_teeth, ring.teeth.ring_dofs))
+    still = np.zeros(
+        (model.teeth.circular_spline_teeth, model.teeth.circular_spline_dofs)
+    )
     sides = []
     for sign in (1.0, -1.0):
         angle = 0.0
         for _ in range(TURNS):
             turned = replace(frame, turn=about_z(np.array(angle)) @ frame.turn)
-            rows = ring.teeth.find(turned, load, still, reach, None, thorough=True)
+            rows = model.teeth.find(turned, load, still, reach, None, thorough=True)
             gap, arm = rows.contacts.gap, sign * rows.arm
             if (gap[np.abs(arm) < flat] < 0.0).any():
                 return nan

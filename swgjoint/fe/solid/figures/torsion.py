@@ -9,8 +9,8 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import Bearing, solid_ring
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.drive3d import Bearing, solid_sector_model
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -65,7 +65,7 @@ def solid_torsion(
         design: The drive, with a cup.
         torques: Torques T, positive and increasing [N·m].
         bearing: Axial support of the outer race, see
-            :func:`swgjoint.fe.solid.drive3d.solid_ring`; None for a rigid wave
+            :func:`swgjoint.fe.solid.drive3d.solid_sector_model`; None for a rigid wave
             generator.
         progress: Called after every torque.
 
@@ -73,9 +73,9 @@ def solid_torsion(
         DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If a solve fails.
     """
-    ring = solid_ring(design, half="auto", bearing=bearing)
+    model = solid_sector_model(design, half="auto", bearing=bearing)
     follow = SolidContinuation(
-        ring=ring, ratio=design.ratio, layout=design.drive.layout
+        model=model, ratio=design.ratio, layout=design.drive.layout
     )
     state = follow.engage(follow.deflect())
     series = series_compliance(design, cup=False)
@@ -94,9 +94,9 @@ def solid_torsion(
             [
                 series * torque - follow.output_angle(state),
                 state.compliance + series,
-                _tooth_centre(ring, state) / width,
-                ring.copies * float(forces.sum()),
-                bore_centre(ring, state) / width,
+                _tooth_centre(model, state) / width,
+                model.copies * float(forces.sum()),
+                bore_centre(model, state) / width,
                 0 if state.ball_force is None else np.sum(state.ball_force > 0.0),
             ]
         )
@@ -111,21 +111,21 @@ def solid_torsion(
     )
 
 
-def _tooth_centre(ring: SolidRing, state: SolidState) -> float:
+def _tooth_centre(model: SolidSectorModel, state: SolidState) -> float:
     """Axial centre of the tooth forces [m]."""
     if state.held is None:
         return float("nan")
-    z = ring.strip.mesh.teeth.z[state.held.plane]
+    z = model.strip.mesh.teeth.z[state.held.plane]
     return float(state.tooth_force @ z / state.tooth_force.sum())
 
 
-def bore_centre(ring: SolidRing, state: SolidState) -> float:
+def bore_centre(model: SolidSectorModel, state: SolidState) -> float:
     """Axial centre of the forces on the bore [m].
 
     Args:
-        ring: The ring.
+        model: The 3D model.
         state: The equilibrium.
     """
-    force = state.bore_force.reshape(ring.sectors, -1, 3)
+    force = state.bore_force.reshape(model.sectors, -1, 3)
     size = np.linalg.norm(force, axis=2)
-    return float(np.sum(size * ring.strip.bore[:, 2]) / np.sum(size))
+    return float(np.sum(size * model.strip.bore[:, 2]) / np.sum(size))

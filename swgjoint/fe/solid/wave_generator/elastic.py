@@ -29,10 +29,10 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.pinched_cup import PinchedCup
 from swgjoint.fe.solid.figures.tooth_play import play
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.wave_generator.lobe_pads import force_on_teeth
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
@@ -217,17 +217,17 @@ def lobe_characteristic(
             features that the 3D model lacks.
         ComputationError: If a solve fails or the model does not fit in memory.
     """
-    ring = solid_ring(design, half=True)
-    cup, height = cup_of(ring, design), lobe_height(design)
+    model = solid_sector_model(design, half=True)
+    cup, height = cup_of(model, design), lobe_height(design)
     stiffness = cup.pull(1.0, place).stiffness
     total = len(heights) + len(BEYOND)
     rows = [(0.0, 0.0, nan)]  # undeflected, the teeth of every drive overlap
     for k, share in enumerate(heights):
         pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
         frame = cup.frames(pulled.masters, nonlinear=True)[0]
-        load = np.zeros((ring.sectors, len(pulled.load)))
+        load = np.zeros((model.sectors, len(pulled.load)))
         load[0] = pulled.load
-        free = play(ring, frame, load, design.ratio)
+        free = play(model, frame, load, design.ratio)
         rows.append((pulled.force, pulled.deflection, free))
         progress("lobe force", k + 1, total)
     force, deflection, plays = np.array(rows).T
@@ -249,7 +249,7 @@ def lobe_characteristic(
             break
         pulled = cup.pull(free_teeth.force_at(w), place, nonlinear=True)
         try:
-            taken = force_on_teeth(ring, design.ratio, planes, pulled.of_planes)
+            taken = force_on_teeth(model, design.ratio, planes, pulled.of_planes)
         except ComputationError:
             break  # the range ends here
         pressed.append((pulled.deflection, taken))
@@ -258,17 +258,17 @@ def lobe_characteristic(
     return replace(free_teeth, pressed_deflection=beyond, pressed_force=taken_by_teeth)
 
 
-def cup_of(ring: SolidRing, design: Design) -> PinchedCup:
+def cup_of(model: SolidSectorModel, design: Design) -> PinchedCup:
     """The flexspline of a half model, with loads on its bore.
 
     Args:
-        ring: Half model of the drive.
+        model: Half model of the drive.
         design: The drive.
     """
-    strip, flank = ring.strip, ring.strip.flank_dofs // 3
+    strip, flank = model.strip, model.strip.flank_dofs // 3
     return PinchedCup(
         name=design.drive.name,
-        sectors=ring.sectors,
+        sectors=model.sectors,
         strip=strip.mesh,
         masters=strip.masters,
         segments=strip.segments,

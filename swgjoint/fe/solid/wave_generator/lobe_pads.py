@@ -15,7 +15,7 @@ import numpy as np
 from swgjoint.errors import ComputationError
 from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 from swgjoint.typing import Array
@@ -55,38 +55,40 @@ class LobePads(WaveGeneratorSurface):
         return gap, normal, np.where(on, 1.0 / radius, 0.0)
 
 
-def with_pads(ring: SolidRing, share: Array, deflection: Array) -> SolidRing:
+def with_pads(
+    model: SolidSectorModel, share: Array, deflection: Array
+) -> SolidSectorModel:
     """The drive with pads instead of its wave generator.
 
     Args:
-        ring: Half model of the drive.
+        model: Half model of the drive.
         share: Part of the load in every plane (n_planes,) [-], see
             :meth:`swgjoint.fe.solid.figures.pinched_cup.PinchedCup.share`.
         deflection: Deflection of the lobe in every plane (n_planes,) [m].
     """
-    bore = float(np.hypot(ring.strip.bore[:, 0], ring.strip.bore[:, 1]).min())
-    z, loaded = ring.strip.mesh.teeth.z, share > 0.0
+    bore = float(np.hypot(model.strip.bore[:, 0], model.strip.bore[:, 1]).min())
+    z, loaded = model.strip.mesh.teeth.z, share > 0.0
     # contact acts on displacements averaged over a part of the width
     deflection = spread_forces(z, 1).T @ deflection
     pads = LobePads(
-        outline=ring.wave_generator.outline,
-        width=ring.wave_generator.width,
+        outline=model.wave_generator.outline,
+        width=model.wave_generator.width,
         planes=z[loaded],
         radius=bore + deflection[loaded],
-        half=NEAR * 2.0 * np.pi * bore / ring.strip.sectors,
+        half=NEAR * 2.0 * np.pi * bore / model.strip.sectors,
         reach=0.25 * float(np.diff(z).min()),
     )
     height = float(share @ deflection)
-    return replace(ring, wave_generator=pads, lobe_height=height)
+    return replace(model, wave_generator=pads, lobe_height=height)
 
 
 def force_on_teeth(
-    ring: SolidRing, ratio: float, share: Array, deflection: Array
+    model: SolidSectorModel, ratio: float, share: Array, deflection: Array
 ) -> float:
     """Part of the force of a lobe that the teeth carry [N].
 
     Args:
-        ring: Half model of the drive.
+        model: Half model of the drive.
         ratio: Signed ratio i [-].
         share: Part of the load in every plane (n_planes,) [-].
         deflection: Deflection of the lobe in every plane (n_planes,) [m].
@@ -94,22 +96,22 @@ def force_on_teeth(
     Raises:
         ComputationError: If a solve fails.
     """
-    padded = with_pads(ring, share, deflection)
-    follow = SolidContinuation(ring=padded, ratio=ratio)
+    padded = with_pads(model, share, deflection)
+    follow = SolidContinuation(model=padded, ratio=ratio)
     alone = _checked(follow.deflect(), padded.lobe_height)
     meshed = _checked(follow.engage(alone), padded.lobe_height)
     return pad_force(padded, meshed) - pad_force(padded, alone)
 
 
-def pad_force(ring: SolidRing, state: SolidState) -> float:
+def pad_force(model: SolidSectorModel, state: SolidState) -> float:
     """Outward force of a pad on the half model [N].
 
     Args:
-        ring: Half model with pads.
+        model: Half model with pads.
         state: Its equilibrium.
     """
-    turn = ring.frames(state)[0].turn
-    force = state.bore_force.reshape(ring.sectors, -1, 3)
+    turn = model.frames(state)[0].turn
+    force = state.bore_force.reshape(model.sectors, -1, 3)
     return float(np.einsum("sj,spj->", turn[:, 1], force))
 
 

@@ -26,7 +26,7 @@ from swgjoint.typing import Array
 class RaceRoll:
     """Out-of-plane stiffness of the elements of a ring, in SI units."""
 
-    ring: HermiteRing
+    model: HermiteRing
     width: float
     """Width b of the race [m]."""
     rolling: float
@@ -35,20 +35,20 @@ class RaceRoll:
     """Torsional stiffness G J [N m^2]."""
 
     @classmethod
-    def from_bearing(cls, bearing: BallBearing, ring: HermiteRing) -> RaceRoll:
+    def from_bearing(cls, bearing: BallBearing, model: HermiteRing) -> RaceRoll:
         """Out-of-plane stiffness of a bearing's race.
 
         The groove reduces J but not I_z.
 
         Args:
             bearing: The bearing.
-            ring: Its outer race in the plane.
+            model: Its outer race in the plane.
         """
         t, b, steel = bearing.race_thickness, bearing.race_width, bearing.material
         torsion = bearing.groove_inertia_factor * b * t**3 / 3.0 * (1.0 - 0.63 * t / b)
         shear = 0.5 * steel.youngs_modulus / (1.0 + steel.poisson_ratio)
         return cls(
-            ring=ring,
+            model=model,
             width=b,
             rolling=steel.youngs_modulus * t * b**3 / 12.0,
             twisting=shear * torsion,
@@ -59,7 +59,7 @@ class RaceRoll:
         """Stiffness of an element for u and w of its nodes (8, 8) [N/m]."""
         points, weights = np.polynomial.legendre.leggauss(4)
         value, first, second = hermite(0.5 * (points + 1.0))
-        h, r, per_u = self.ring.step, self.ring.radius, 2.0 / self.width
+        h, r, per_u = self.model.step, self.model.radius, 2.0 / self.width
         bent = np.concatenate([per_u * value / r, -second / h**2], axis=1)
         twist = np.concatenate([per_u * first / h, first / (h * r)], axis=1)
         weight = 0.5 * h * weights

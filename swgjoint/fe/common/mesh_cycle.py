@@ -84,7 +84,7 @@ class Pattern(Generic[AnyState]):
     """Results of the checks of periodicity and mirror symmetry, and of the sampling."""
 
 
-def solve_pattern(
+def solve_mesh_cycle(
     follow: Follower[AnyState],
     period: float,
     torques: list[float],

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.common.cyclic import CyclicFactor, SingularRingError
-from swgjoint.fe.solid.ring_factor import RingFactor
+from swgjoint.fe.common.cyclic import CyclicFactor, SingularCyclicError
+from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 
 
 def blocks(sectors, face, inside, seed=1):
@@ -22,7 +22,7 @@ def test_ring_is_solved_as_by_a_band(sectors):
     """Symmetric indefinite rings of three sectors and more, many right-hand sides."""
     matrix = blocks(sectors, 3, 2)
     rhs = np.random.default_rng(2).normal(size=(sectors, 8, 5))
-    ours = RingFactor(matrix, 3).solve(rhs)
+    ours = DenseCyclicFactor(matrix, 3).solve(rhs)
     assert ours == pytest.approx(CyclicFactor(matrix, 3).solve(rhs), rel=1e-9, abs=1e-9)
     # and it is a solution: forces of neighbours on a shared face add up
     force = np.einsum("sij,sjk->sik", matrix, ours) - rhs
@@ -33,5 +33,5 @@ def test_ring_is_solved_as_by_a_band(sectors):
 
 def test_singular_ring_is_reported():
     """A ring without any stiffness."""
-    with pytest.raises(SingularRingError):
-        RingFactor(np.zeros((4, 5, 5)), 2)
+    with pytest.raises(SingularCyclicError):
+        DenseCyclicFactor(np.zeros((4, 5, 5)), 2)

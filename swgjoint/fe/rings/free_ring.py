@@ -33,7 +33,7 @@ RADIAL, AROUND = 2, 32
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlainRing:
+class FreeRing:
     """A ring of rectangular cross-section in plane stress."""
 
     outer_radius: float
@@ -70,7 +70,7 @@ class PulledRing:
 
 
 def pull_ring(
-    ring: PlainRing, roller_travel: Array, angle: Array, *, refinement: int = 1
+    ring: FreeRing, roller_travel: Array, angle: Array, *, refinement: int = 1
 ) -> PulledRing:
     r"""Pull a ring apart by two opposite rollers without friction.
 
@@ -137,7 +137,7 @@ def pull_ring(
     )
 
 
-def _quarter(ring: PlainRing, refinement: int) -> Basis:
+def _quarter(ring: FreeRing, refinement: int) -> Basis:
     """Quadratic elements on the quarter x, y >= 0, finer towards the roller."""
     through = np.linspace(-1.0, 0.0, RADIAL * refinement + 1) * ring.thickness
     share = np.linspace(0.0, 1.0, AROUND * refinement + 1)
@@ -149,7 +149,7 @@ def _quarter(ring: PlainRing, refinement: int) -> Basis:
     return Basis(MeshQuad2(points, mesh.t), ElementVector(ElementQuad2()), intorder=4)
 
 
-def _forms(ring: PlainRing) -> tuple[LinearForm, BilinearForm]:
+def _forms(ring: FreeRing) -> tuple[LinearForm, BilinearForm]:
     """Internal forces and their derivative at ``state``."""
     nu = ring.poisson_ratio
     lame = ring.youngs_modulus * nu / (1.0 - nu**2)

@@ -13,7 +13,7 @@ from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
-from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Index, Mask
 
@@ -25,7 +25,7 @@ length of a patch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CondensedRing:
+class CondensedModel:
     """A ring linearised at an equilibrium and solved for unit forces at its contacts.
 
     The system of the teeth has n + 3 unknowns: n contact forces, the force of the
@@ -33,12 +33,12 @@ class CondensedRing:
     spline.
     """
 
-    model: RingModel
+    model: SectorModel
     state: State
     """The equilibrium."""
-    ring: Linearised
+    linear: Linearised
     """The model linearised there."""
-    ring_is_output: bool
+    circular_spline_is_output: bool
     """Whether the circular spline is the output."""
     contacts: Contacts
     """Tooth contacts, n of them."""
@@ -48,42 +48,42 @@ class CondensedRing:
     @cached_property
     def _factor(self) -> CyclicFactor:
         """Factorised tangent with the anchor spring."""
-        return CyclicFactor(self.ring.anchor_tangent(), self.ring.face_dofs)
+        return CyclicFactor(self.linear.anchor_tangent(), self.linear.face_dofs)
 
     @cached_property
     def _rows(self) -> Array:
         """Derivatives of the gaps of the teeth (n, n_dofs)."""
-        return self.ring.gap_gradient(self.contacts)
+        return self.linear.gap_gradient(self.contacts)
 
     @cached_property
     def _loads(self) -> Array:
         """Unit loads on teeth, anchor and flexspline rotation (N, n_dofs, n + 2)."""
-        ring, n = self.ring, len(self.contacts)
-        loads = np.zeros((*ring.gradient.shape, n + 2))
+        linear, n = self.linear, len(self.contacts)
+        loads = np.zeros((*linear.gradient.shape, n + 2))
         loads[self.contacts.sector, :, np.arange(n)] = self._rows
-        loads[:, :, n], loads[:, :, n + 1] = ring.anchor, ring.rotation_gradient
+        loads[:, :, n], loads[:, :, n + 1] = linear.anchor, linear.rotation_gradient
         return loads
 
     @cached_property
     def _response(self) -> Array:
         """Displacements under these loads and the gradient (N, n_dofs, n + 3)."""
         return self._solved(
-            np.concatenate([self._loads, -self.ring.gradient[:, :, None]], axis=2)
+            np.concatenate([self._loads, -self.linear.gradient[:, :, None]], axis=2)
         )
 
     def _solved(self, right: Array) -> Array:
         """Displacements (N, n_dofs, k) under right-hand sides of that shape."""
-        right[self.ring.fixed] = 0.0
+        right[self.linear.fixed] = 0.0
         return self._factor.solve(right)
 
     def torque_response(self) -> Array:
         """Displacements per output torque of the whole drive (N, n_dofs) [m/(N·m)]."""
         system, _ = self._teeth
         n = len(self.contacts)
-        free = [n, n + 1, n + 2] if self.ring_is_output else [n]
+        free = [n, n + 1, n + 2] if self.circular_spline_is_output else [n]
         inside = np.concatenate([np.flatnonzero(self.carries), free])
         z, at = np.zeros(n + 3), np.ix_(inside, inside)
-        if self.ring_is_output:
+        if self.circular_spline_is_output:
             right = (inside == n + 2) / self.model.copies
         else:
             z[n + 1] = -1.0 / self.model.copies
@@ -101,7 +101,7 @@ class CondensedRing:
         Returns:
             Matrix (n + 3, n + 3) and offset (n + 3,).
         """
-        model, state, ring = self.model, self.state, self.ring
+        model, state, linear = self.model, self.state, self.linear
         contacts, element, n = self.contacts, model.element, len(self.contacts)
         system, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
         answers = self._answers(self._response)
@@ -112,16 +112,20 @@ class CondensedRing:
         compliance = model.circular_spline.compliance
         if compliance is not None:
             system[:n, :n] += compliance.contact_compliance(
-                contacts.tooth, contacts.ring_weight, model.ring_teeth
+                contacts.tooth,
+                contacts.circular_spline_weight,
+                model.circular_spline_teeth,
             )
-        system[n, n] -= 1.0 / ring.anchor_stiffness
+        system[n, n] -= 1.0 / linear.anchor_stiffness
         # rotation of the circular spline towards the teeth closes gaps by a lever arm
         arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
         system[:n, n + 2] = system[n + 2, :n] = -arm
         # gaps without the tooth forces of the state
         old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
         old += np.einsum(
-            "kb,kb->k", contacts.ring_weight, ring.ring_elastic[contacts.tooth]
+            "kb,kb->k",
+            contacts.circular_spline_weight,
+            linear.circular_spline_elastic[contacts.tooth],
         )
         offset[:n] += contacts.gap - old
         if model.indentation is not None:
@@ -131,7 +135,7 @@ class CondensedRing:
             compliant, approach = strips.linearise()
             system[:n, :n] += compliant
             offset[:n] += approach
-        if self.ring_is_output:
+        if self.circular_spline_is_output:
             offset[n + 2] = -state.torque / model.copies
         return system, offset
 
@@ -154,7 +158,7 @@ class CondensedRing:
         n, sector = len(self.contacts), supports.intervals.sector
         k = len(sector)
         m = n + k
-        load = np.zeros((*self.ring.gradient.shape, k))
+        load = np.zeros((*self.linear.gradient.shape, k))
         load[sector, :, np.arange(k)] = supports.loads
         supported = self._solved(load)
         teeth = np.r_[0:n, m : m + 3]
@@ -180,16 +184,21 @@ class CondensedRing:
                 sector=contacts.sector,
                 tooth=contacts.tooth,
                 direction=np.stack(
-                    [_by_shift(contacts.weight), _by_shift(contacts.ring_weight)]
+                    [
+                        _by_shift(contacts.weight),
+                        _by_shift(contacts.circular_spline_weight),
+                    ]
                 ),
                 by_tilt=np.zeros((n, 2)),  # a 2D model has no axis to tilt
                 carries=self.carries,
             ),
             closed_supports=supports.closed,
-            free=[m, m + 1, m + 2] if self.ring_is_output else [m],
-            output=m + 2 if self.ring_is_output else m + 1,
-            sign=(1.0 if self.ring_is_output else -1.0) / model.copies,
-            angle=state.ring_rotation if self.ring_is_output else state.rotation,
+            free=[m, m + 1, m + 2] if self.circular_spline_is_output else [m],
+            output=m + 2 if self.circular_spline_is_output else m + 1,
+            sign=(1.0 if self.circular_spline_is_output else -1.0) / model.copies,
+            angle=state.circular_spline_rotation
+            if self.circular_spline_is_output
+            else state.rotation,
             torque=state.torque,
         )
 
@@ -271,31 +280,31 @@ class Supports:
     """Response at the state: F [N] of closed supports, g [m] of open ones (k,)."""
 
     @classmethod
-    def from_state(cls, ring: Linearised, state: State, used: Mask) -> Supports:
+    def from_state(cls, linear: Linearised, state: State, used: Mask) -> Supports:
         """Supports of selected intervals.
 
         Args:
-            ring: The model linearised at the state.
+            linear: The model linearised at the state.
             state: The equilibrium.
             used: Whether to use each interval (N, intervals).
         """
-        p = ring.stations.per_interval
+        p = linear.stations.per_interval
         touching = state.touching.reshape(len(used), -1, p)
         sector, interval = np.nonzero(used)
         touches = touching[sector, interval]
         is_closed = np.asarray(touches.any(axis=1))
         used_there = touches | ~is_closed[:, None]
-        k = used_there * ring.stations.stiffness.reshape(-1, p)[interval]
+        k = used_there * linear.stations.stiffness.reshape(-1, p)[interval]
         stiffness = k.sum(axis=1)
         there = _Intervals(sector=sector, number=interval, share=k / stiffness[:, None])
-        rows = np.zeros((len(sector), ring.gradient.shape[1]))
-        rows[:, ring.gap_dofs] = there.mean(ring.gap_gradients())
+        rows = np.zeros((len(sector), linear.gradient.shape[1]))
+        rows[:, linear.gap_dofs] = there.mean(linear.gap_gradients())
         return cls(
             intervals=there,
             closed=is_closed,
             rows=rows,
             stiffness=stiffness,
-            start=np.where(is_closed, -stiffness, 1.0) * there.mean(ring.gap),
+            start=np.where(is_closed, -stiffness, 1.0) * there.mean(linear.gap),
         )
 
     @property

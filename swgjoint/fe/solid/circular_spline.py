@@ -12,7 +12,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.common.block_circulant import contact_compliance, respond
 from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.ring_factor import RingFactor
+from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 from swgjoint.fe.solid.strip.elasticity import Solid, solid
 from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.gear.design.design import Design
@@ -27,7 +27,7 @@ WINDOW = 12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RingGear:
+class ElasticCircularSpline:
     """Response of the flanks to forces on them, by the offset between teeth.
 
     Forces and displacements are in x and y of the frames of the teeth, plane after
@@ -64,7 +64,9 @@ class RingGear:
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
 
-def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGear:
+def condense_circular_spline(
+    design: Design, profile: ToothProfile, mesh: StripMesh
+) -> ElasticCircularSpline:
     """Condense the circular spline of a design.
 
     Args:
@@ -116,14 +118,14 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
     rhs = np.zeros((WINDOW, n, len(flank)))
     rhs[0] = load
     blocks = np.broadcast_to(0.5 * (stiffness + stiffness.T), (WINDOW, n, n))
-    faces = turn @ RingFactor(blocks, n // 2).solve(rhs)
+    faces = turn @ DenseCyclicFactor(blocks, n // 2).solve(rhs)
     offsets = np.arange(-REACH, REACH + 1)
     nodal = np.zeros((len(offsets), size, len(flank)))
     for k, offset in enumerate(offsets):
         nodal[k][boundary] = faces[offset % WINDOW]
         nodal[k][free] = solved[:, :n] @ faces[offset % WINDOW]
     nodal[REACH][free] += solved[:, n:]
-    return RingGear(
+    return ElasticCircularSpline(
         mesh=mesh,
         body=body,
         offsets=offsets,

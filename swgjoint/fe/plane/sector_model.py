@@ -12,6 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.common.cyclic import shift_rows
 from swgjoint.fe.common.friction import CoulombFriction
 from swgjoint.fe.common.indentation import Indentation
 from swgjoint.fe.plane.bore_contact import POINTS, BoreStations
@@ -34,7 +35,7 @@ at the start of a search [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RingModel:
+class SectorModel:
     """Flexspline ring, wave generator and circular spline of a drive."""
 
     element: Superelement
@@ -52,7 +53,7 @@ class RingModel:
     """Indentation of the flanks; None uses the compliance of the contact patch only."""
     tooth_shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
-    ring_tooth_shift: Array | None = None
+    circular_spline_tooth_shift: Array | None = None
     """Manufacturing errors of the circular spline's teeth in their frames (N_c, 2) [m];
     they need an elastic circular spline."""
     wave_generator_offset: Array | None = None
@@ -70,7 +71,7 @@ class RingModel:
         return self.element.sectors // (2 if self.half else 1)
 
     @property
-    def ring_teeth(self) -> int:
+    def circular_spline_teeth(self) -> int:
         """Number of teeth of the circular spline in the model."""
         return self.circular_spline.profile.teeth // self.copies
 
@@ -250,7 +251,9 @@ class RingModel:
             pressure=np.zeros(touching.shape),
             touching=touching,
             flank_force=np.zeros((self.sectors, 4 * element.flank_size)),
-            ring_force=np.zeros((self.ring_teeth, self.circular_spline.flank_dofs)),
+            circular_spline_force=np.zeros(
+                (self.circular_spline_teeth, self.circular_spline.flank_dofs)
+            ),
             wave_generator_angle=alpha,
             rotation=rotation,
         )
@@ -307,7 +310,11 @@ class RingModel:
         return float(np.arctan2(sine, cosine)), gradient
 
     def predict_field(
-        self, state: State, alpha: float, rotation: float, ring_rotation: float
+        self,
+        state: State,
+        alpha: float,
+        rotation: float,
+        circular_spline_rotation: float,
     ) -> State:
         """Predictor that turns the fields with the wave generator and the members.
 
@@ -318,10 +325,10 @@ class RingModel:
             state: State to start from.
             alpha: New wave-generator angle [rad].
             rotation: New rotation of the flexspline [rad].
-            ring_rotation: New rotation of the circular spline [rad].
+            circular_spline_rotation: New rotation of the circular spline [rad].
         """
         pitch = 2.0 * pi / self.element.sectors
-        ring_pitch = 2.0 * pi / self.circular_spline.profile.teeth
+        circular_spline_pitch = 2.0 * pi / self.circular_spline.profile.teeth
         d_alpha = alpha - state.wave_generator_angle
         shift = (d_alpha - (rotation - state.rotation)) / pitch
         size, inside = self.element.face_size, self.element.bore_size
@@ -347,13 +354,14 @@ class RingModel:
             pressure=shift_rows(state.pressure, shift),
             touching=np.roll(state.touching, round(shift), axis=0),
             flank_force=shift_rows(state.flank_force, shift),
-            ring_force=shift_rows(
-                state.ring_force,
-                (d_alpha - (ring_rotation - state.ring_rotation)) / ring_pitch,
+            circular_spline_force=shift_rows(
+                state.circular_spline_force,
+                (d_alpha - (circular_spline_rotation - state.circular_spline_rotation))
+                / circular_spline_pitch,
             ),
             wave_generator_angle=alpha,
             rotation=rotation,
-            ring_rotation=ring_rotation,
+            circular_spline_rotation=circular_spline_rotation,
         )
 
     def shift_flank(self, flank: Array, shift: Array | None) -> Array:
@@ -367,31 +375,14 @@ class RingModel:
             return flank
         return flank + np.tile(shift, flank.shape[1] // 2)
 
-    def ring_displacement(self, state: State) -> Array:
+    def circular_spline_displacement(self, state: State) -> Array:
         """Flank displacement of the circular spline (N_c, 2 n_c) [m]."""
         compliance = self.circular_spline.compliance
         if compliance is None:
-            return state.ring_force
-        return compliance.displacement(state.ring_force)
+            return state.circular_spline_force
+        return compliance.displacement(state.circular_spline_force)
 
 
 def _pairs(nodes: Index) -> Index:
     """Degrees of freedom x, y of every node, one after the other."""
     return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
-
-
-def shift_rows(values: Array, shift: float) -> Array:
-    """Shift rows around the ring, interpolated by the cubic through four neighbours.
-
-    Args:
-        values: One row per sector (N, ...).
-        shift: Shift in sectors, not necessarily an integer [-].
-    """
-    whole = int(np.floor(shift))
-    t = shift - whole
-    return np.asarray(
-        t * (t + 1) * (t - 1) / 6 * np.roll(values, whole + 2, axis=0)
-        - t * (t - 2) * (t + 1) / 2 * np.roll(values, whole + 1, axis=0)
-        + (t - 1) * (t - 2) * (t + 1) / 2 * np.roll(values, whole, axis=0)
-        - t * (t - 1) * (t - 2) / 6 * np.roll(values, whole - 1, axis=0)
-    )

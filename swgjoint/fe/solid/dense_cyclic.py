@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from swgjoint.fe.common.cyclic import Insides, SingularRingError
+from swgjoint.fe.common.cyclic import Insides, SingularCyclicError
 from swgjoint.typing import Array
 
 
-class RingFactor:
+class DenseCyclicFactor:
     """Factorised ring of symmetric sector matrices.
 
     It solves the same systems as :class:`swgjoint.fe.common.cyclic.CyclicFactor`, but
@@ -29,7 +29,7 @@ class RingFactor:
             face: Number of degrees of freedom of a face.
 
         Raises:
-            SingularRingError: If a pivot vanishes.
+            SingularCyclicError: If a pivot vanishes.
         """
         self._last = last = len(blocks) - 1
         self._insides = Insides(blocks, face)
@@ -81,5 +81,5 @@ class RingFactor:
 def _factor(matrix: Array) -> tuple[Array, Array]:
     lu, pivots = lu_factor(matrix, check_finite=False)
     if not np.abs(np.diag(lu)).min() > 0.0:
-        raise SingularRingError
+        raise SingularCyclicError
     return lu, pivots

@@ -18,7 +18,7 @@ from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SolidRing:
+class SolidSectorModel:
     """Flexspline strips around the wave generator."""
 
     strip: Strip
@@ -192,7 +192,9 @@ class SolidRing:
             shared=np.zeros((self.sectors, n_bore // strip.planes), bool),
             bore_force=np.zeros((self.sectors, 3 * n_bore)),
             flank_force=np.zeros((self.sectors, strip.flank_dofs)),
-            ring_force=np.zeros((self.teeth.ring_teeth, self.teeth.ring_dofs)),
+            circular_spline_force=np.zeros(
+                (self.teeth.circular_spline_teeth, self.teeth.circular_spline_dofs)
+            ),
             wave_generator_angle=alpha,
             rotation=rotation,
         )
