@@ -1,4 +1,4 @@
-"""Where a sweep is computed: this machine, a dask scheduler, or a SLURM cluster."""
+"""Executors of a sweep: this machine, a dask scheduler or a SLURM cluster."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 AHEAD = 3
-"""Tasks at the scheduler for each thread of a worker: one runs, two wait."""
+"""Tasks submitted per worker thread: one runs, two wait."""
 CONNECT_S = 15.0
 ONE_THREAD = tuple(
     f"export {name}_NUM_THREADS=1" for name in ("OMP", "OPENBLAS", "MKL")
@@ -30,10 +30,10 @@ ONE_THREAD = tuple(
 class DaskPool:
     """Workers of a dask scheduler.
 
-    A task whose worker dies goes to another one. The scheduler gives up the tasks that
-    waited at more than ``allowed-failures`` deaths (3, a setting of the scheduler);
-    each of them is tried again alone, and lost if its worker dies then, too. Workers
-    with a nanny, which is dask's default, use one thread of algebra.
+    If a worker dies, its tasks go to another worker. The scheduler gives up tasks that
+    have seen more than ``allowed-failures`` deaths (3, a setting of the scheduler).
+    Each of these is tried again alone; if its worker dies again, the task is lost.
+    Workers with a nanny, which is dask's default, use one thread for linear algebra.
     """
 
     client: Any
@@ -47,26 +47,34 @@ class DaskPool:
     def run(
         self, function: Callable[[Task], Found], tasks: Iterable[Task]
     ) -> Iterator[tuple[Task, Found | Lost]]:
-        """See :class:`swgjoint.pool.Executor`."""
+        """See :class:`swgjoint.pool.Executor`.
+
+        Args:
+            function: Importable function of one task.
+            tasks: Tasks, consumed as workers become free.
+
+        Raises:
+            ComputationError: If the scheduler stops or a worker raises an error.
+        """
         try:
             yield from self._run(function, iter(tasks))
         except OSError as error:
             raise ComputationError(
-                f"the scheduler is gone: {error}; what is finished is kept"
+                f"connection to the scheduler lost: {error}; finished results are kept"
             ) from None
 
     def _run(
         self, function: Callable[[Task], Found], left: Iterator[Task]
     ) -> Iterator[tuple[Task, Found | Lost]]:
         if not self.client.nthreads():
-            warnings.warn("the scheduler has no workers yet: waiting", stacklevel=3)
+            warnings.warn("waiting: the scheduler has no workers yet", stacklevel=3)
         suspects: list[Task] = []
         for task, found in self._run_at(lambda: AHEAD * self.workers, function, left):
             if isinstance(found, Lost):
                 suspects.append(task)
             else:
                 yield task, found
-        # one by one, so that a task that kills its worker takes no other task with it
+        # one by one, so that a task that kills its worker affects no other task
         yield from self._run_at(lambda: 1, function, iter(suspects))
 
     def _run_at(
@@ -89,14 +97,14 @@ class DaskPool:
         hand_out()
         for future in ready:
             if future.status in ("lost", "pending"):
-                # its worker died with the result: the scheduler computes it again
+                # the worker that held the result died: the scheduler computes it again
                 ready.add(future)
                 continue
             task = out.pop(future.key)
             try:
                 found: Found | Lost = future.result()
             except KilledWorker as error:
-                found = Lost(f"its worker died again and again: {error}")
+                found = Lost(f"its workers died repeatedly: {error}")
             except Exception as error:
                 if future.status != "error":  # the scheduler has forgotten it
                     raise ConnectionError(f"task {future.status}") from error
@@ -109,10 +117,14 @@ class DaskPool:
 
 @contextmanager
 def dask_pool(address: str) -> Iterator[DaskPool]:
-    """Workers of the scheduler at an address or of a scheduler file.
+    """Connect to a dask scheduler.
+
+    Args:
+        address: Address such as ``tcp://host:8786``, or path of a scheduler file.
 
     Raises:
-        InputError: If nothing answers there.
+        InputError: If no scheduler answers at the address.
+        MissingExtraError: If dask is not installed.
     """
     try:
         from distributed import Client
@@ -121,7 +133,7 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
     try:
         there = _address(address)
         client = Client(there, timeout=CONNECT_S, set_as_default=False)
-    # no such file or protocol, refused; a file that is nested without end
+    # missing file, unknown protocol, refused connection; too deeply nested JSON
     except (OSError, ValueError, RecursionError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"scheduler {address!r}: {text}") from None
@@ -130,13 +142,13 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
 
 
 def _address(given: str) -> str:
-    """The address given or of a scheduler file.
+    """Check an address, or read it from a scheduler file.
 
-    A client that was made with one that is none waits half a minute for itself.
+    With an invalid address the client of dask would hang for half a minute.
 
     Raises:
-        OSError: If there is no such file.
-        ValueError: If it is no address.
+        OSError: If the scheduler file cannot be read.
+        ValueError: If the address is invalid.
     """
     from distributed.comm import parse_address, parse_host_port
     from distributed.comm.registry import get_backend
@@ -146,20 +158,24 @@ def _address(given: str) -> str:
         content = json.loads(Path(given).read_bytes())
         found = content.get("address") if isinstance(content, dict) else None
         if not isinstance(found, str):
-            raise ValueError("no address in it; accepted: the file of a dask scheduler")
+            raise ValueError("expected a dask scheduler file with an address")
     scheme, location = parse_address(found)
     get_backend(scheme)
     try:
         parse_host_port(location)
     except ValueError:
         raise ValueError(
-            f"no host and port in {found!r}; accepted: such as tcp://host:8786"
+            f"{found!r}: expected host and port, such as tcp://host:8786"
         ) from None
     return str(found)
 
 
 def slurm_cluster(settings: SlurmCluster) -> Any:
-    """The cluster of the settings, with no job submitted yet."""
+    """Create the cluster of the settings; no job is submitted yet.
+
+    Raises:
+        MissingExtraError: If dask-jobqueue is not installed.
+    """
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError:
@@ -174,7 +190,7 @@ def slurm_cluster(settings: SlurmCluster) -> Any:
         job_name="swgjoint-sweep",
         job_script_prologue=[*ONE_THREAD, *settings.prologue],
         job_extra_directives=list(settings.directives),
-        scheduler_options={"dashboard_address": ":0"},  # 8787 may be somebody's
+        scheduler_options={"dashboard_address": ":0"},  # 8787 may be in use
     )
 
 
@@ -188,9 +204,18 @@ def _missing() -> MissingExtraError:
 def chosen_executor(
     file: AskedFile, *, jobs: int | None = None, scheduler: str | None = None
 ) -> Iterator[Executor]:
-    """The scheduler, the number of jobs on this machine, or what the file says.
+    """Choose the executor: scheduler, local jobs, or the cluster of the file.
 
-    Without any of them, one job on every core of this machine.
+    If none of these is specified, one job runs on every core of this machine.
+
+    Args:
+        file: File whose ``cluster`` is used if neither keyword is specified.
+        jobs: Processes on this machine.
+        scheduler: Address or file of a dask scheduler; takes precedence.
+
+    Raises:
+        InputError: If no scheduler answers at the address.
+        MissingExtraError: If dask is needed but not installed.
     """
     if scheduler is not None:
         with dask_pool(scheduler) as pool:

@@ -1,4 +1,4 @@
-"""Figures of one design of a sweep, computed where the executor puts it."""
+"""Figures of one design of a sweep, computed in a process of the executor."""
 
 from __future__ import annotations
 
@@ -37,17 +37,21 @@ MESHING_FIGURES = (
     "wave_generator_torque_pp_Nm",
     STIFFNESS,
 )
-"""Stresses: mean over the positions of the largest one of the flexspline or of the
-circular spline. Errors: peak to peak of the output over the positions, under the torque
-and, in a second simulation, unloaded. Pairs: mean over the positions. Stiffness: one
-over the mean compliance under the torque, that of the cup and the mounting included."""
+"""Figures of the meshing task.
+
+Stresses are the largest stress in the flexspline or circular spline, averaged over the
+positions. Errors are peak-to-peak output errors over the positions: under the torque
+and, in a second simulation, unloaded. The number of pairs is the mean over the
+positions. The stiffness is the reciprocal of the mean compliance under the torque,
+including cup and mounting.
+"""
 SPEC_FIGURES = tuple(
     key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
 )
-"""Keys of the specification sheet that the map of a design tells."""
+"""Keys of the specification sheet that the map of a design provides."""
 SIZE_FIGURES = ("outer_diameter_mm", "length_mm", "volume_cm3")
-"""Of the circular spline with its rim; of the face or, where there is one, of the cup;
-of the cylinder around both."""
+"""Outer diameter of the circular spline including its rim, length of the cup (face
+width for a design without cup), and volume of the cylinder with both dimensions."""
 RUN_FIGURES = (
     "ripple_rms_percent",
     "ripple_pp_percent",
@@ -60,7 +64,7 @@ RUN_FIGURES = (
     "peak_torque_of_rating",
     "cubed_mean_torque_of_rating",
 )
-"""Figures of :class:`swgjoint.explore.compare.compare.Compared`, without run times."""
+"""Figures of :class:`swgjoint.explore.compare.compare.Compared` except run times."""
 
 OK = "ok"
 LOST = "lost"
@@ -68,7 +72,7 @@ LOST = "lost"
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """One design, or scene, and what is computed of it."""
+    """One design or scene, and the tasks to compute for it."""
 
     key: str
     design: Design | None
@@ -81,17 +85,19 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Record:
-    """What came of one design."""
+    """Outcome and figures of one design."""
 
     outcome: str
-    """``ok``; ``refused`` (no drive), ``infeasible`` (cannot be built), ``failed`` (not
-    solved), ``error`` (a fault of the code), ``lost`` (its process died, or the machine
-    had no memory, disk or package for it: not kept, for the next one may)."""
+    """``ok``, ``refused`` (the values give no valid design), ``infeasible`` (cannot be
+    built), ``failed`` (not solved), ``error`` (a bug) or ``lost`` (its process died, or
+    memory, disk space or a package was missing). A lost record is not stored, because
+    another machine may succeed."""
     reason: str = ""
+    """Why there are no figures, or why some are missing."""
     figures: dict[str, float | None] = field(default_factory=dict)
-    """None where the model cannot tell."""
+    """Figures by name; None where the model provides no value."""
     work_s: float = 0.0
-    """Time in the process that computed it."""
+    """Computing time in the process of the design [s]."""
 
     @property
     def ok(self) -> bool:
@@ -100,14 +106,18 @@ class Record:
 
 
 def compute_all(points: Sequence[Point]) -> tuple[str, list[Record]]:
-    """Records of some designs, and the code that computed them."""
+    """Compute the records of a task.
+
+    Returns:
+        Version of the code that computed them, and one record per point with a key.
+    """
     asked = [one for point in points if (one := point.asked) is not None]
-    _load(asked[0])  # all of a sweep ask for the same
+    _load(asked[0])  # all points of a sweep have the same tasks
     return code_version(), [compute(one) for one in asked]
 
 
 def _load(first: Asked) -> None:
-    """Import what the work needs, which is no part of its time."""
+    """Import the modules that the tasks need, so that ``work_s`` excludes imports."""
     from swgjoint.gear.design import feasibility  # noqa: F401
     from swgjoint.maps.sheet.spec_sheet import needs_map
 
@@ -121,7 +131,7 @@ def _load(first: Asked) -> None:
 
 
 def compute(asked: Asked) -> Record:
-    """Figures of one design; whatever goes wrong is part of the record."""
+    """Compute the figures of one design; errors become part of the record."""
     begin = time.perf_counter()
     figures: dict[str, float | None] = {}
     reason = ""
@@ -130,7 +140,7 @@ def compute(asked: Asked) -> Record:
             outcome = "infeasible"
         else:
             found, reason = _figures(asked)
-            # no number is None, as where the model cannot tell
+            # not a number becomes None, like a value that the model does not provide
             figures = {k: v if _finite(v) else None for k, v in found.items()}
             outcome = OK
     except InputError as error:
@@ -154,7 +164,7 @@ def _finite(value: float | None) -> bool:
 
 
 def _infeasible(design: Design) -> str:
-    """Faults of the checks that a design does not pass; empty for a feasible one."""
+    """Faults of the failed feasibility checks; empty for a feasible design."""
     from swgjoint.gear.design.feasibility import design_checks
 
     return "\n".join(check.fault for check in design_checks(design) if not check.ok)
@@ -215,7 +225,7 @@ def _model(design: Design, task: MeshingTask) -> str:
 def _simulated(
     design: Design, task: MeshingTask, torque: float
 ) -> MeshingRun | SolidRun:
-    """A simulation of meshing with every position solved."""
+    """Simulate meshing with every position solved."""
     from swgjoint.fe.meshing import simulate_meshing
 
     turn, model = 1.0 / design.periodicity, _model(design, task)
@@ -239,7 +249,7 @@ def _map(
     from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
-    if not turn and has_errors(design):  # read with the input locked
+    if not turn and has_errors(design):  # measured with the input locked
         design = without_errors(design)
     return build_map(design, model=task.model, angles=task.angles), design
 
@@ -265,7 +275,7 @@ def _spec(
 
 
 def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
-    """Size of the cylinder around the drive."""
+    """Dimensions of the cylinder around the drive."""
     gear, ring = design.drive, design.circular_spline
     teeth, cup = gear.teeth_circular_spline, design.cup
     depth = ring.dedendum_coefficient * gear.module_mm + ring.rim_mm
@@ -282,7 +292,7 @@ def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
 def _run(
     scene: Scene, design: Design | None, task: RunTask
 ) -> tuple[dict[str, float | None], dict[str, str]]:
-    """Figures of the worst joint of a run, and why some of them are not valid."""
+    """Figures of the worst joint of a run, and reasons why some are not valid."""
     from swgjoint.explore.compare.compare import row_of
     from swgjoint.maps.sheet.validity_marks import joint_doubt
     from swgjoint.sim.figures.keys import RIPPLE

@@ -1,4 +1,4 @@
-"""Sweep files: which designs, and what is computed of each."""
+"""Sweep files: the designs of a sweep, and the tasks computed for each."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SweepFile(AskedFile):
     def load(cls, reference: str | Path) -> SweepFile:
         """Read a sweep file, given as a path or as the name of a bundled one.
 
-        Files that it names by a path, as bases or as values, lie relative to it.
+        Paths in the file, of bases or of values, are relative to its folder.
 
         Raises:
             InputError: With one line per fault of the file.
@@ -50,17 +50,25 @@ class _Planned(Protocol):
 
     @property
     def plan(self) -> AnyPlan:
-        """Its parameters."""
+        """Plan with the parameters."""
 
     def model_copy(self, *, update: dict[str, Any]) -> Self:
-        """The file with other fields."""
+        """Copy with other fields."""
 
 
 Planned = TypeVar("Planned", bound=_Planned)
 
 
 def anchor_files(file: Planned, folder: Path) -> Planned:
-    """The file with those that it names relative to a folder."""
+    """Resolve the paths in a file relative to a folder.
+
+    Args:
+        file: File with a plan and bases.
+        folder: Folder that relative paths start from.
+
+    Returns:
+        Copy of the file with absolute paths.
+    """
     parameters = tuple(
         p.model_copy(
             update={"values": tuple(path_in_folder(folder, v) for v in p.values)}
@@ -77,7 +85,12 @@ def anchor_files(file: Planned, folder: Path) -> Planned:
 
 
 def path_in_folder(folder: Path, value: Any) -> Any:
-    """The path of a file in the folder; whatever names none as it is."""
+    """Absolute path if the value names a file in the folder, else the value unchanged.
+
+    Args:
+        folder: Folder that a relative path starts from.
+        value: Any value of a key.
+    """
     if isinstance(value, str) and os.path.isfile(folder / value):
         return str((folder / value).resolve())
     return value

@@ -15,14 +15,19 @@ from swgjoint.gear.design.design import Design
 from swgjoint.sim.scene.scene import Scene
 
 ANY = "*"
-"""Stands for a name that the file chooses, such as that of a joint."""
+"""Placeholder for a name that the file chooses, such as the name of a joint."""
 BASE = "design"
 """The key of the base design itself."""
 _PATHS = (BASE, "arm", "trajectory.file", "defaults.drive", f"joints.{ANY}.drive")
 
 
 def keys_of(model: type[BaseModel], above: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted keys of a file and their fields, through tables of every kind."""
+    """Dotted keys of a model and of its nested tables, with their fields.
+
+    Args:
+        model: Model of a design, of a scene or of one of their tables.
+        above: Prefix of the keys, ending with a dot; empty at the top level.
+    """
     for name, field in model.model_fields.items():
         key = f"{above}{name}"
         yield key, field
@@ -35,7 +40,7 @@ def keys_of(model: type[BaseModel], above: str = "") -> Iterator[tuple[str, Fiel
             None,
         )
         if shape in (list, tuple):
-            continue  # changed whole
+            continue  # only changed as a whole
         if shape is dict:
             key = f"{key}.{ANY}"
             yield key, field
@@ -45,18 +50,23 @@ def keys_of(model: type[BaseModel], above: str = "") -> Iterator[tuple[str, Fiel
 
 @lru_cache
 def known_keys(kind: str) -> dict[str, bool]:
-    """Every key of a ``design`` or ``scene``, and whether it takes whole numbers."""
+    """Every key of a ``design`` or ``scene``, and whether it takes integers."""
     model: type[BaseModel] = Design if kind == "design" else Scene
     found: dict[str, bool] = {}
     for key, field in keys_of(model):
         whole = int in (field.annotation, *get_args(field.annotation))
-        # the same key of two kinds of profile or wave generator
+        # two kinds of profile or wave generator may have the same key
         found[key] = found.get(key, True) and whole
     return found
 
 
 def find_key(key: str, kind: str) -> bool | None:
-    """Whether a key takes whole numbers; None where a design or scene has no such."""
+    """Whether a key takes integers; None if no design or scene has the key.
+
+    Args:
+        key: Dotted key.
+        kind: ``design`` or ``scene``.
+    """
     known = known_keys(kind)
     if key in known:
         return known[key]
@@ -83,14 +93,24 @@ def is_path(key: str) -> bool:
 
 
 def kind_of(key: str, kinds: tuple[str, ...]) -> str | None:
-    """Whether a key is one of the ``design`` or of the ``scene``; None for neither."""
+    """Whether a key belongs to the ``design`` or the ``scene``; None for neither.
+
+    Args:
+        key: Dotted key, or ``design`` for the base design itself.
+        kinds: Kinds that the file has a base for.
+    """
     if key == BASE and BASE in kinds:
         return BASE
     return next((kind for kind in kinds if find_key(key, kind) is not None), None)
 
 
 def unknown(key: Any, kinds: tuple[str, ...]) -> str:
-    """What is wrong with a key that nothing has, and the nearest ones."""
+    """Message for an unknown key, with the most similar known keys.
+
+    Args:
+        key: Unknown key.
+        kinds: Kinds that the file has a base for.
+    """
     every = [k for kind in kinds for k in known_keys(kind)]
     last = str(key).rpartition(".")[2]
     near = get_close_matches(str(key), every, n=3, cutoff=0.75)

@@ -1,4 +1,4 @@
-"""Which values the parameters of a sweep or a search take."""
+"""Plans: the values that the parameters of a sweep or a search take."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from swgjoint.explore.sweep.tasks import Listed, Text
 from swgjoint.faults import Fault, Section, unit_of
 
 MOST = 1_000_000
-"""Designs of one sweep.
+"""Largest number of designs in one sweep.
 
-The process that hands out holds about 1 kB of each, and some 5 kB while it writes the
-tables: 5 GB for so many.
+The main process holds about 1 kB per design, and about 5 kB per design while it writes
+the tables: 5 GB for this number.
 """
 
 Count = Annotated[int, Field(ge=2, le=MOST)]
@@ -22,20 +22,20 @@ Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
 
 
 class Parameter(Section):
-    """Keys that take the same value, and the values that they take."""
+    """Keys that share one value, and the values that they take."""
 
     keys: Annotated[tuple[Text, ...], Listed]
     values: Annotated[tuple[Any, ...], Listed] | None = None
     low: float | int | None = None
     high: float | int | None = None
     count: Count | None = None
-    """Of equally spaced values of a grid."""
+    """Number of equally spaced values in a grid."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Parameter:
         ends = (self.low, self.high)
         if (self.values is None) == (ends == (None, None)):
-            raise Fault(("values", "accepted: values, or low and high, not both"))
+            raise Fault(("values", "accepted: either values or low and high"))
         if self.values is not None:
             if self.count is not None:
                 raise Fault(("count", "unused together with values"))
@@ -72,7 +72,7 @@ class Parameter(Section):
 
 
 def _tabled(value: Any) -> bool:
-    """Whether a value can stand in tables and in JSON: TOML also has times."""
+    """Whether tables and JSON can hold a value; TOML times, for example, they cannot."""
     if isinstance(value, dict):
         return all(map(_tabled, value.values()))
     if isinstance(value, list | tuple):
@@ -80,19 +80,19 @@ def _tabled(value: Any) -> bool:
     return isinstance(value, bool | int | float | str)
 
 
-# not min_length, which would also complain where all parameters are faulty
+# no min_length: it would add a second message if all parameters are faulty
 Parameters = Annotated[tuple[Parameter, ...], Field(strict=False)]
 
 
 class Grid(Section):
-    """Every value with every other; the last parameter changes first."""
+    """All combinations of the values; the last parameter changes fastest."""
 
     kind: Literal["grid"] = "grid"
     parameters: Parameters
 
 
 class LatinHypercube(Section):
-    """One random value in each of the equally probable parts of every parameter."""
+    """Latin hypercube: one random value in each equally probable part of a range."""
 
     kind: Literal["latin_hypercube"] = "latin_hypercube"
     designs: Count
@@ -101,7 +101,7 @@ class LatinHypercube(Section):
 
 
 class List(Section):
-    """The first values of all parameters, then the second ones, and so on."""
+    """The first values of all parameters together, then the second ones, and so on."""
 
     kind: Literal["list"] = "list"
     parameters: Parameters
@@ -120,12 +120,12 @@ class SearchPlan(Section):
 
     kind: Literal["nsga2"] = "nsga2"
     designs: Count = 300
-    """That are tried, those that cannot be built among them."""
+    """Number of designs that are tried, including those that cannot be built."""
     population: Annotated[int, Field(ge=2, le=10_000)] = 24
     seed: Seed = 0
     minutes: Annotated[float, Field(gt=0, le=1e6)] | None = None
-    """After which no further generation begins; without it, the same file gives the
-    same designs on any machine."""
+    """Time after which no further generation starts [min]. Without this limit the same
+    file gives the same designs on any machine."""
     parameters: Parameters
 
 
@@ -133,12 +133,20 @@ AnyPlan = Grid | LatinHypercube | List | SearchPlan
 
 
 def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Keys that exist, each once, with what the plan needs; not too many designs."""
+    """Faults of a plan: unknown or repeated keys, missing values, too many designs.
+
+    Args:
+        plan: Plan to check.
+        kinds: Kinds that the file has a base for: ``design``, ``scene`` or both.
+
+    Returns:
+        Pairs of location in the file and message.
+    """
     faults = []
     if not kinds:
         return [("design", "missing; accepted: a design, a scene or both")]
     if not plan.parameters:
-        return [("plan.parameters", "none; accepted: at least one")]
+        return [("plan.parameters", "expected at least one parameter")]
     seen: set[str] = set()
     for k, parameter in enumerate(plan.parameters):
         where = f"plan.parameters[{k}]"
@@ -174,5 +182,10 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
 
 
 def takes_whole_numbers(parameter: Parameter, kinds: tuple[str, ...]) -> bool:
-    """Whether numbers of a range are rounded for any of the keys."""
+    """Whether any key of a parameter takes integers, so that its range is rounded.
+
+    Args:
+        parameter: Parameter of a plan.
+        kinds: Kinds that the file has a base for.
+    """
     return any(find_key(key, kind) for key in parameter.keys for kind in kinds)

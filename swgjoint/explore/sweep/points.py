@@ -1,4 +1,4 @@
-"""Points of a sweep: values of the parameters, and the design and scene they make."""
+"""Points of a sweep: values of the parameters, with the resulting design and scene."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ Values = dict[str, Any]
 class Point:
     """One row of a sweep.
 
-    Its design is made where it is computed, and not kept: a million would take 30 GB,
-    and making them is work that the process that hands out need not do.
+    The design is built in the process that computes it and is not stored here: a
+    million designs would take 30 GB and keep the main process busy.
     """
 
     values: Values
     key: str | None
-    """Key of its record; None where the values make no design or scene."""
+    """Key of its record; None if the values give no valid design or scene."""
     fault: str = ""
-    """Why they make none."""
+    """Why the values are not valid."""
     bases: Bases = field(repr=False, compare=False)
 
     @property
     def asked(self) -> Asked | None:
-        """The design and scene with what is computed of them; None without a key."""
+        """Design and scene with the tasks to compute; None without a key."""
         if self.key is None:
             return None
         design, scene = self.bases.apply(self.values)
@@ -65,10 +65,10 @@ class Point:
 
 
 class Bases:
-    """Designs, scene and arms that the points of a sweep change, each read once."""
+    """Base designs, scene and arms of a sweep, each read once."""
 
     def __init__(self, file: SweepFile) -> None:
-        """Read the base design and scene; other designs when they are needed."""
+        """Read the base design and scene; other designs are read when needed."""
         self.file = file
         self.scene = None if file.scene is None else Scene.load_file(file.scene)
         self._designs: dict[str, Design] = {}
@@ -82,7 +82,11 @@ class Bases:
         return self._designs[reference]
 
     def apply(self, values: Values) -> tuple[Design | None, Scene | None]:
-        """The design and the scene that the values of a point make, checked."""
+        """Apply the values of a point to the bases; returns checked design and scene.
+
+        Raises:
+            InputError: If the values give no valid design or scene.
+        """
         file, base = self.file, self.file.design
         changes: dict[str, Values] = {"design": {}, "scene": {}}
         for parameter in file.plan.parameters:
@@ -102,9 +106,14 @@ class Bases:
     def arm(
         self, reference: str, tool_site: str, *, balance_inertia: bool = False
     ) -> list[str]:
-        """Content of an arm: its file, and what the engine makes of what it includes.
+        """Hashes of an arm: of its file, and of the compiled model with all includes.
 
-        As it was when the sweep first asked: later sweeps read it again.
+        The arm is read at the first call; later sweeps read it again.
+
+        Args:
+            reference: Bundled name or path of the arm.
+            tool_site: Site of the tool.
+            balance_inertia: Whether implausible inertias are balanced.
         """
         import mujoco
 
@@ -132,7 +141,7 @@ def values_of(file: SweepFile) -> list[Values]:
         generator = np.random.default_rng(plan.seed)
         sampler = qmc.LatinHypercube(len(parameters), seed=generator)
         rows: Sequence[Sequence[Any]] = [
-            [_strewn(p, part, kinds) for p, part in zip(parameters, row, strict=True)]
+            [_sampled(p, part, kinds) for p, part in zip(parameters, row, strict=True)]
             for row in sampler.random(plan.designs).tolist()
         ]
     else:
@@ -145,7 +154,7 @@ def values_of(file: SweepFile) -> list[Values]:
 
 
 def _column(parameter: Parameter, kinds: tuple[str, ...]) -> Sequence[Any]:
-    """Values of a grid or list."""
+    """Values of one parameter of a grid or list."""
     if parameter.values is not None:
         return parameter.values
     assert parameter.count is not None
@@ -157,8 +166,8 @@ def _column(parameter: Parameter, kinds: tuple[str, ...]) -> Sequence[Any]:
     return [round(low + part * (high - low)) for part in parts]
 
 
-def _strewn(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
-    """The value at a part, 0 to 1, of the list or range: all are equally likely."""
+def _sampled(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
+    """Value at a fraction, 0 to 1, of the list or range; all are equally likely."""
     listed, low, high = parameter.values, parameter.low, parameter.high
     if listed is not None:
         return listed[min(int(part * len(listed)), len(listed) - 1)]
@@ -170,15 +179,15 @@ def _strewn(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
 
 
 def _between(parameter: Parameter, part: float) -> float:
-    """The number at a part of the range, 0 to 1."""
+    """Number at a fraction of the range, 0 to 1."""
     low, high = parameter.low, parameter.high
     assert low is not None and high is not None
-    # both ends are what the file says, to the last digit
+    # both ends equal the bounds of the file to the last digit
     return float(low * (1.0 - part) + high * part)
 
 
 def points_of(file: SweepFile) -> list[Point]:
-    """Every point, its design and scene checked.
+    """All points of a sweep, with design and scene checked.
 
     Raises:
         InputError: If the base design or scene cannot be read.
@@ -199,7 +208,7 @@ def _point(bases: Bases, values: Values) -> Point:
 def _parts(
     bases: Bases, design: Design | None, scene: Scene | None
 ) -> Mapping[str, Any]:
-    """Everything that decides the figures of one point."""
+    """Everything that determines the figures of one point."""
     file = bases.file
     parts: dict[str, Any] = {
         "sweep": _own_version(),
@@ -228,7 +237,7 @@ def _parts(
 
 
 def _drives(scene: Scene) -> dict[str, str | None]:
-    """Content of the drives that a scene names; the catalogue is part of the code."""
+    """Content of the drives that a scene names; catalogue drives are part of the code."""
     from swgjoint.drives.references import find_drive
 
     names = {section.drive for section in (scene.defaults, *scene.joints.values())}
@@ -257,9 +266,9 @@ def _own_version() -> str:
 
 @lru_cache
 def _engine_version() -> str:
-    """Hash of the code between a map and the figures of a run, the plugin included.
+    """Hash of the code between a map and the figures of a run, including the plugin.
 
-    A wheel holds the library without its sources.
+    The compiled library is hashed, because a wheel does not contain its sources.
     """
     import mujoco
 

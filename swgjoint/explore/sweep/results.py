@@ -1,4 +1,4 @@
-"""Where the records of a sweep lie: a folder, or any place that fsspec reaches."""
+"""Storage for the records of a sweep: a folder, or any address that fsspec supports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from swgjoint.store import DamagedError, json_content, json_file, warn_ignored
 
 
 class ResultStore(Protocol):
-    """A folder."""
+    """A folder in which results are stored."""
 
     def path_of(self, name: str) -> str:
         """Path of a file."""
@@ -26,10 +26,18 @@ class ResultStore(Protocol):
         """Content of a file; None if there is none."""
 
     def write(self, name: str, data: bytes) -> str:
-        """Write a file whole; returns its path."""
+        """Write a file atomically.
+
+        Args:
+            name: Path relative to the folder.
+            data: Content.
+
+        Returns:
+            Path of the file.
+        """
 
     def remove(self, name: str) -> None:
-        """Take a file away that is there."""
+        """Remove an existing file."""
 
 
 class Folder:
@@ -53,7 +61,15 @@ class Folder:
             raise InputError(f"cannot read {self.path_of(name)}: {why}") from None
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`ResultStore`."""
+        """See :class:`ResultStore`.
+
+        Args:
+            name: Path relative to the folder.
+            data: Content.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
         target = self.path / name
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -82,7 +98,7 @@ class Remote:
             ) from None
         try:
             self._files, self._root = url_to_fs(address)
-        except (ValueError, ImportError) as error:  # unknown protocol, its package
+        except (ValueError, ImportError) as error:  # unknown protocol, missing package
             raise InputError(f"results at {address!r}: {error}") from None
         self._scheme = address.partition("://")[0]
 
@@ -99,7 +115,15 @@ class Remote:
         return data
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`ResultStore`; moved into place: not all systems write whole."""
+        """See :class:`ResultStore`.
+
+        The data are written to a temporary name and moved into place, because not all
+        file systems write atomically.
+
+        Args:
+            name: Path relative to the folder.
+            data: Content.
+        """
         target = f"{self._root}/{name}"
         folder, _, last = target.rpartition("/")
         beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
@@ -114,12 +138,17 @@ class Remote:
 
 
 def place_of(where: str | Path) -> ResultStore:
-    """The folder of a path or of an address with ``://``."""
+    """Store for a local path, or for an address that contains ``://``."""
     return Remote(where) if isinstance(where, str) and "://" in where else Folder(where)
 
 
 def read_record(place: ResultStore, key: str) -> Record | None:
-    """What is kept under a key; a damaged one is none."""
+    """Read a stored record; None if there is none or it is damaged.
+
+    Args:
+        place: Store of the records.
+        key: Key of the record.
+    """
     data = place.read(_name(key))
     if data is None:
         return None
@@ -133,7 +162,14 @@ def read_record(place: ResultStore, key: str) -> Record | None:
 def write_record(
     place: ResultStore, key: str, record: Record, values: Mapping[str, Any]
 ) -> None:
-    """Keep a record, with the values for whoever looks into the folder."""
+    """Store a record, together with its parameter values for human readers.
+
+    Args:
+        place: Store of the records.
+        key: Key of the record.
+        record: Outcome and figures.
+        values: Values of the parameters by column.
+    """
     place.write(_name(key), json_file({**asdict(record), "values": dict(values)}))
 
 
@@ -144,10 +180,15 @@ def _name(key: str) -> str:
 def write_to(
     place: ResultStore, outputs: Mapping[str, Callable[[], bytes | None]]
 ) -> list[str]:
-    """Write the outputs of a result by name; one that fails costs no other.
+    """Write the outputs of a result; if one fails, the others are still written.
+
+    Args:
+        place: Folder of the outputs.
+        outputs: Function that makes the content, by name of the file; an output whose
+            content is None is skipped.
 
     Returns:
-        Paths of those that were written; an output that is None is none.
+        Paths of the written files.
     """
     files: list[str] = []
     for name, make in outputs.items():
@@ -159,7 +200,7 @@ def write_to(
 
 
 def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
-    """Rows with the same keys as Parquet; None where pyarrow is not installed."""
+    """Rows with the same keys in Parquet format; None if pyarrow is not installed."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -173,7 +214,7 @@ def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
 
 
 def _column(values: list[Any]) -> list[Any]:
-    """Values of one type: numbers where all are, else texts."""
+    """Values of one type: numbers if all are numbers, else strings."""
     kinds = {type(value) for value in values} - {type(None)}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -183,7 +224,7 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def flat(value: Any) -> Any:
-    """A value as it stands in one cell of a table."""
+    """Value for one cell of a table: tables and lists as JSON, no infinities."""
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Mapping | list | tuple):

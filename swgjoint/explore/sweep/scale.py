@@ -1,4 +1,4 @@
-"""How long a sweep takes on more workers, from measured times of its tasks."""
+"""Predicted run time of a sweep on more workers, from measured task times."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Schedule:
 
     workers: int
     wall: float
-    """From the order to the last result [s]."""
+    """Time from the start to the last result [s]."""
     work: float
-    """Sum over the tasks [s]."""
+    """Total computing time of the tasks [s]."""
 
     @property
     def efficiency(self) -> float:
@@ -28,20 +28,20 @@ class Schedule:
 def schedule(
     task_times: ArrayLike, workers: int, *, start: float = 0.0, handing: float = 0.0
 ) -> Schedule:
-    """List scheduling: whichever worker is free first takes the next task.
+    """List scheduling: the worker that is free first takes the next task.
 
-    One process hands out the tasks, one after the other, which bounds how many workers
-    it can feed: to about the time of a task over that of handing it out. Without that
-    time no order of n tasks ends later than ``work/m + (1 - 1/m) longest`` on m workers
-    (Graham 1966, "Bounds for certain multiprocessing anomalies", Bell System Technical
-    Journal 45).
+    One process hands out the tasks one after the other. The number of workers that it
+    can keep busy is therefore limited to about the time of a task divided by the time
+    to hand one out. If handing out takes no time, n tasks in any order end within
+    ``work/m + (1 - 1/m) longest`` on m workers (Graham 1966, "Bounds for certain
+    multiprocessing anomalies", Bell System Technical Journal 45).
 
     Args:
-        task_times: Work of the tasks in the order in which they are handed out (n,)
-            [s].
-        workers: Processes that compute.
-        start: Until the workers are ready: processes, imports [s].
-        handing: For one task and its result, in the process that hands out [s].
+        task_times: Computing time of each task, in the order of handing out, shape
+            (n,) [s].
+        workers: Number of computing processes.
+        start: Time until the workers are ready, for processes and imports [s].
+        handing: Time that the main process spends on one task and its result [s].
     """
     times = np.asarray(task_times, dtype=float).ravel().tolist()
     free = [start] * workers
@@ -54,7 +54,12 @@ def schedule(
 
 
 def tasks_of(design_times: ArrayLike, seconds: float) -> list[float]:
-    """Times of tasks that hold as many designs as fill some seconds on average."""
+    """Group designs into tasks of about equal duration, and return the task times [s].
+
+    Args:
+        design_times: Computing time of each design, shape (n,) [s].
+        seconds: Mean duration of a task [s].
+    """
     times = np.asarray(design_times, dtype=float).ravel()
     size = max(1, round(seconds / float(times.mean())))
     return [float(times[k : k + size].sum()) for k in range(0, times.size, size)]

@@ -18,26 +18,26 @@ from swgjoint.pool import Executor, Lost
 from swgjoint.progress import Progress, silent
 
 TASK_S = 2.0
-"""Work of a task [s]: long compared with its overhead, short enough to lose."""
+"""Duration of a task [s]: long compared with its overhead, but cheap to repeat."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepResult:
-    """What came of every design."""
+    """Records of all designs of a sweep."""
 
     file: SweepFile
     points: tuple[Point, ...]
     records: tuple[Record, ...]
     """In the order of the points."""
     reused: int
-    """Points whose record was kept from an earlier run."""
+    """Number of points whose record was stored by an earlier run."""
     computed: int
-    """Different designs computed in this run."""
+    """Number of different designs computed in this run."""
     workers: int
     work_s: float
-    """Sum over the designs computed in this run."""
+    """Total computing time of the designs computed in this run [s]."""
     wall_s: float
-    """Run time of this run."""
+    """Wall time of this run [s]."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -46,13 +46,13 @@ class SweepResult:
 
     @property
     def efficiency(self) -> float | None:
-        """Work over wall time and workers [-]; None where nothing was computed."""
+        """Work divided by wall time and workers [-]; None if nothing was computed."""
         if not self.computed:
             return None
         return self.work_s / (self.wall_s * self.workers)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row a design: parameters, outcome, figures, why there are none."""
+        """One row per design: parameters, outcome, figures, reason, computing time."""
         return [
             {
                 **{name: flat(value) for name, value in point.values.items()},
@@ -92,25 +92,24 @@ def run_sweep(
     retry_failed: bool = False,
     progress: Progress = silent,
 ) -> SweepResult:
-    """Compute what is not kept yet; what fails is a record, not an error.
+    """Compute all designs that are not stored yet; a failed design is a record.
 
-    What failed because of the machine (``lost``) is not kept and computed again.
-
-    Every record is kept as soon as it comes back, under a name that its content
-    decides, so that a sweep that was stopped by whatever means goes on where it was,
-    and one with more designs, or other figures beside, computes those alone.
+    Every record is stored as soon as it is computed, under a key derived from its
+    inputs. An interrupted sweep therefore resumes where it stopped, and an extended
+    sweep computes only the additional designs. Designs that failed because of the
+    machine (``lost``) are not stored; the next run computes them again.
 
     Args:
-        file: The sweep.
-        executor: Where designs are computed.
-        place: Where records are kept; None keeps none.
+        file: Sweep file.
+        executor: Executor that computes the designs.
+        place: Store of the records; None stores none.
         retry_failed: Whether failures of earlier runs are computed again.
-        progress: Called with the designs that were computed, of those that are to be.
+        progress: Called with the stage, the number of computed designs and their total.
 
     Raises:
         InputError: If the base design or scene cannot be read.
-        ComputationError: If the executor cannot go on, for instance because the
-            scheduler is gone.
+        ComputationError: If the executor cannot continue, for instance because the
+            connection to the scheduler is lost.
     """
     begin = time.perf_counter()
     points = points_of(file)
@@ -152,9 +151,9 @@ def run_sweep(
 def _computed(
     todo: dict[str, Point], executor: Executor
 ) -> Iterator[tuple[str, Record]]:
-    """Every design with its record, in the order in which they are ready."""
+    """Every design with its record, in order of completion."""
     queue = list(reversed(todo.values()))
-    alone: list[Point] = []  # of tasks that were lost with others
+    alone: list[Point] = []  # designs of lost tasks, to be computed one by one
     count, spent = 0, 0.0
 
     def tasks() -> Iterator[tuple[Point, ...]]:
@@ -162,8 +161,8 @@ def _computed(
             if alone:
                 yield (alone.pop(),)
                 continue
-            # as many as fill the time of a task, once that of a design is known; the
-            # last ones are spread over all workers
+            # fill the duration of a task once the time of a design is known; the last
+            # designs are spread over all workers
             fitting = round(TASK_S * count / spent) if spent else 1
             fair = len(queue) // (4 * max(executor.workers, 1))
             yield tuple(queue.pop() for _ in range(max(1, min(fitting, fair))))
@@ -179,9 +178,9 @@ def _computed(
             code, computed = found
             if code != code_version():
                 raise ComputationError(
-                    "a worker computes with another version of swgjoint, numpy, scipy"
-                    " or scikit-fem than this process, or it was changed meanwhile:"
-                    " what is finished is kept"
+                    "a worker runs another version of swgjoint, numpy, scipy or"
+                    " scikit-fem than this process, or a version changed during the"
+                    " sweep; finished results are kept"
                 )
             for point, record in zip(task, computed, strict=True):
                 count, spent = count + 1, spent + record.work_s
@@ -189,5 +188,5 @@ def _computed(
 
 
 def _key(point: Point) -> str:
-    assert point.key is not None  # those without are not computed
+    assert point.key is not None  # points without a key are not computed
     return point.key

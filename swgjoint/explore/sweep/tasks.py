@@ -1,4 +1,4 @@
-"""What a sweep or a search computes of a design or scene, and on which cluster."""
+"""Tasks of a sweep or search: the figures to compute, and the cluster to use."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
 class FigureTask(Section):
-    """What is computed of a design."""
+    """Figures to compute for a design."""
 
     known: ClassVar[tuple[str, ...]]
     figures: Annotated[tuple[Text, ...], Listed]
@@ -43,38 +43,38 @@ class FigureTask(Section):
 
 
 class MeshingTask(FigureTask):
-    """Simulation of meshing: stresses, errors, contact."""
+    """Meshing simulation: stresses, errors, contact."""
 
     known = MESHING_FIGURES
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
-    """T; rated torque of the design without."""
+    """Output torque [N·m]; None for the rated torque of the design."""
     positions: Annotated[int, Field(ge=1, le=10_000)] = 6
     turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
-    """Of the input; without, one pitch of the fixed member, after which the pattern of
-    a perfect gear repeats."""
+    """Input rotation [deg]; None for one pitch of the fixed member, after which the
+    pattern of a perfect gear repeats."""
     model: Literal["2d", "3d"] | None = None
-    """3d for a design with a cup, else 2d, without."""
+    """Model; None for 3d if the design has a cup, else 2d."""
 
     @model_validator(mode="after")
     def _loaded(self) -> MeshingTask:
         if self.torque_Nm == 0 and STIFFNESS in self.figures:
-            # with play the output is free then
-            told = f"0 N·m with {STIFFNESS}; accepted: another torque"
-            raise Fault(("torque_Nm", told))
+            # with clearance, an unloaded output can move freely
+            fault = f"0 N·m: {STIFFNESS} needs a nonzero torque"
+            raise Fault(("torque_Nm", fault))
         return self
 
 
 class SpecTask(FigureTask):
-    """The map of the drive and figures of its specification sheet."""
+    """Map of the drive, and figures of its specification sheet."""
 
     known = SPEC_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
     angles: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """Positions of the map over a pitch; see :func:`swgjoint.build_map`."""
+    """Number of positions of the map over a pitch; see :func:`swgjoint.build_map`."""
 
 
 class RunTask(FigureTask):
-    """The scene with the drive in every driven joint; the worst joint counts."""
+    """Run of the scene with the drive in every driven joint; the worst joint counts."""
 
     known = RUN_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
@@ -82,35 +82,35 @@ class RunTask(FigureTask):
 
 
 class SizeTask(FigureTask):
-    """How large the drive is."""
+    """Dimensions of the drive."""
 
     known = SIZE_FIGURES
 
 
 class SlurmCluster(Section):
-    """Jobs of a SLURM cluster, each with one process a core."""
+    """Jobs of a SLURM cluster, each with one process per core."""
 
     kind: Literal["slurm"] = "slurm"
     jobs: Annotated[int, Field(ge=1, le=10_000)]
     cores: Annotated[int, Field(ge=1, le=1_000)]
     memory_GB: Annotated[float, Field(gt=0, le=100_000)]
-    """Of a job."""
+    """Memory of one job [GB]."""
     walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]
     queue: Text | None = None
     account: Text | None = None
     prologue: Annotated[tuple[Text, ...], Field(strict=False)] = ()
-    """Lines of shell before a worker starts, such as ``module load``."""
+    """Shell commands run before a worker starts, such as ``module load``."""
     directives: Annotated[tuple[Text, ...], Field(strict=False)] = ()
     """Further ``#SBATCH`` options."""
 
 
 class AskedFile(Section):
-    """What every file asks for: designs, a scene, and what is computed of them."""
+    """Keys of every sweep and search file: bases, tasks and cluster."""
 
     description: Annotated[str, Field(max_length=1000)] = ""
     source: Annotated[str, Field(max_length=1000)] = ""
     design: Reference | None = None
-    """Base of the designs; a scene alone keeps its drives."""
+    """Base of the designs; without it, the scene keeps its drives."""
     scene: Reference | None = None
     meshing: MeshingTask | None = None
     spec: SpecTask | None = None
@@ -120,7 +120,7 @@ class AskedFile(Section):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What the keys of the parameters may belong to."""
+        """Kinds that parameters may vary: ``design``, ``scene`` or both."""
         bases = {"design": self.design, "scene": self.scene}
         return tuple(kind for kind, base in bases.items() if base is not None)
 
@@ -134,19 +134,21 @@ class AskedFile(Section):
 
 
 def task_faults(file: AskedFile) -> list[tuple[str, str]]:
-    """What is asked for needs its base; nothing is asked for twice."""
+    """Faults of the tasks: missing bases, repeated figures, unused keys.
+
+    Returns:
+        Pairs of location in the file and message.
+    """
     faults = []
     if not file.figures:
-        faults.append(
-            ("meshing", "nothing to compute; accepted: meshing, spec, size or run")
-        )
+        faults.append(("meshing", "nothing to compute; add meshing, spec, size or run"))
     for name in ("meshing", "spec", "size"):
         if getattr(file, name) is not None and file.design is None:
-            faults.append((f"{name}", "needs a design; accepted: with the key design"))
+            faults.append((f"{name}", "needs the key design"))
     if (file.run is None) != (file.scene is None):
-        faults.append(("run", "accepted: exactly where the key scene is"))
+        faults.append(("run", "expected both run and scene, or neither"))
     twice = sorted({name for name in file.figures if file.figures.count(name) > 1})
-    faults += [("figures", f"{name!r} asked for more than once") for name in twice]
+    faults += [("figures", f"{name!r} is listed more than once") for name in twice]
     if file.run is not None and file.design is None:
         faults += [
             (f"run.{key}", "unused without a design")

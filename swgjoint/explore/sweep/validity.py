@@ -1,4 +1,4 @@
-"""What the figures of a sweep stand for: level, torque, what is not modelled."""
+"""Validity of the figures of a sweep: model level, torque, effects left out."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from typing import Any
 from swgjoint.explore.sweep.tasks import AskedFile
 
 NOT_MODELLED = {
-    "ring": "passage of teeth, rim of the circular spline, micro-geometry, cup but for"
-    " its torsion",
-    "2d": "micro-geometry, cup but for its torsion; in a map the passage of balls; the"
-    " bearing of the wave generator outside of the layout circular_spline_fixed and on"
-    " outlines with corners, straights or three lobes, and in a map with errors",
+    "ring": "tooth passage, rim of the circular spline, micro-geometry, cup except its"
+    " torsion",
+    "2d": "micro-geometry, cup except its torsion; in a map, ball passage; the bearing"
+    " of the wave generator in layouts other than circular_spline_fixed, on outlines"
+    " with corners, straights or three lobes, and in a map with errors",
     "3d": "bearing of the wave generator; stresses at edges and at the step from rim to"
     " cup do not converge with the mesh",
 }
-"""Of a drive, by the fidelity of its model; all of them are quasi-static."""
-RUN = "what the level of a joint leaves out, orders too fast for the step"
+"""Effects left out, by model of the drive; all models are quasi-static."""
+RUN = "effects left out at the level of a joint, orders too fast for the time step"
 
 
 def validity_of(file: AskedFile) -> dict[str, dict[str, Any]]:
-    """One label for every task of a sweep.
+    """One validity label per task of a sweep.
 
-    ``swgjoint meshing``, ``spec`` and ``run`` tell more of a single design. No error
-    of the mesh is estimated in a sweep.
+    ``swgjoint meshing``, ``spec`` and ``run`` report more about a single design. A
+    sweep does not estimate the mesh error.
     """
     from swgjoint.maps.sheet.spec_sheet import needs_map
 

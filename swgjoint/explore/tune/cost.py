@@ -1,17 +1,17 @@
-r"""Cost of gains: episodes of an environment, candidates times seeds side by side.
+r"""Cost of gains: parallel episodes of an environment, one per candidate and seed.
 
-The cost of an episode is, in terms of the environment's own reward
-:math:`1/(1 + (e/s)^2) - w u^2`,
+With the symbols of the environment's reward :math:`1/(1 + (e/s)^2) - w u^2`, the cost
+of an episode is
 
 .. math:: J = s \sqrt{\langle (e/s)^2 + w u^2 \rangle}
     = \sqrt{\langle e^2 \rangle + s^2 w \langle u^2 \rangle},
 
-with the error e of the true link angle, the motor torque u over its limit and the mean
-over the episode: the rms error, and for full torque all the time as much as
-:math:`s\sqrt{w}`. For small errors the mean reward is :math:`1 - (J/s)^2`; unlike the
-reward J does not level off when errors are large. After a broken limit, and for what is
-not a number, e is the limit of the link's angle and u is 1: no cost is larger than
-:attr:`Trials.worst`.
+where e is the error of the true link angle, u the motor torque divided by its limit,
+and the brackets denote the mean over the episode. J is the rms error plus a torque
+term, which is :math:`s\sqrt{w}` for permanent full torque. For small errors the mean
+reward is :math:`1 - (J/s)^2`; unlike the reward, J does not level off for large errors.
+After a broken limit, and if a signal is not a number, e is the limit of the link angle
+and u is 1. No cost is therefore larger than :attr:`Trials.worst`.
 """
 
 from __future__ import annotations
@@ -32,28 +32,29 @@ from swgjoint.units import arcmin
 
 PREFIX = "swgjoint/"
 TUNABLE = ("JointTracking-v0",)
-"""Environments whose action is the motor's torque and nothing else."""
+"""Environments whose action is the motor torque alone."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """Signals of episodes, for pictures; shapes (n, n_episodes)."""
+    """Signals of episodes for plots, shape (n, n_episodes)."""
 
     time: Array
-    """At the ends of the control periods [s]. Shape (n,)."""
+    """Ends of the control periods [s], shape (n,)."""
     reference: Array
-    """Reference of the link [rad]."""
+    """Reference of the link angle [rad]."""
     error: Array
-    """Link minus reference [rad]; not a number after a broken limit."""
+    """Link angle minus reference [rad]; not a number after a broken limit."""
     torque: Array
-    """Torque of the motor [N·m]."""
+    """Motor torque [N·m]."""
 
 
 def environment_named(name: str) -> str:
-    """Id of an environment whose controllers can be tuned.
+    """Find the id of an environment whose controllers can be tuned.
 
     Raises:
-        InputError: If there is none of the name, or its action is added to a loop.
+        InputError: If the environment is unknown, or if its action is added to an
+            internal control loop.
         MissingExtraError: If gymnasium is not installed.
     """
     from swgjoint.envs import ENVIRONMENTS
@@ -63,8 +64,8 @@ def environment_named(name: str) -> str:
         return PREFIX + short
     if PREFIX + short in ENVIRONMENTS:
         raise InputError(
-            f"environment {name!r}: its action is added to a loop of its own; accepted:"
-            f" {', '.join(TUNABLE)}"
+            f"environment {name!r}: its action is added to an internal control loop;"
+            f" accepted: {', '.join(TUNABLE)}"
         )
     near = get_close_matches(short, TUNABLE, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
@@ -82,23 +83,23 @@ class Trials:
         seeds: Sequence[int],
         candidates: int,
     ) -> None:
-        """Make the simulations.
+        """Create the simulations.
 
         Args:
-            environment: Id.
-            arguments: Of the environment.
-            seeds: Of the episodes of every candidate.
-            candidates: How many run side by side.
+            environment: Id of the environment.
+            arguments: Settings of the environment.
+            seeds: Seeds of the episodes of every candidate.
+            candidates: Number of candidates that run in parallel.
 
         Raises:
-            InputError: If an argument is none of the environment's settings.
+            InputError: If an argument is not a setting of the environment.
         """
         import gymnasium
 
         from swgjoint.envs.bench import settings_of
         from swgjoint.envs.joint_tracking import TrackingSettings
 
-        # what gymnasium itself takes, such as the mode of restarts, is not for tuning
+        # rejects arguments of gymnasium itself, such as the restart mode
         settings_of(TrackingSettings, dict(arguments))
         self.seeds, self.candidates = tuple(seeds), candidates
         env = gymnasium.make_vec(
@@ -110,9 +111,9 @@ class Trials:
         settings, limits = self.env.core.settings, self.env.core.limits
         self.joints: KnownJoints = self.env.core.joints
         self.error_scale = float(settings.error_scale_arcmin * arcmin)
-        """s of the cost [rad]."""
+        """Error scale s of the cost [rad]."""
         self.effort_weight = float(settings.effort_weight)
-        """w of the cost."""
+        """Effort weight w of the cost [-]."""
         self._limit = float(limits.angle[0])
         self.worst = float(np.hypot(self._limit, self._full_torque))
         """Cost of an episode that breaks a limit at once [rad]."""
@@ -123,18 +124,23 @@ class Trials:
         return self.error_scale * float(np.sqrt(self.effort_weight))
 
     def costs(self, tunable: Tunable, values: Mapping[str, Array]) -> Array:
-        """Costs of candidates on all seeds [rad]. Shape (candidates, seeds).
+        """Costs of candidates on all seeds [rad], shape (candidates, seeds).
 
         Args:
-            tunable: The controller.
-            values: Of its parameters. Shape (candidates,) each.
+            tunable: Controller.
+            values: Values of its parameters by key, shape (candidates,) each.
         """
         return self._run(tunable, values, None)
 
     def cost_and_traces(
         self, tunable: Tunable, values: Mapping[str, Array]
     ) -> tuple[Array, Trace]:
-        """Costs [rad], shape (candidates, seeds), and what the episodes looked like."""
+        """Costs [rad], shape (candidates, seeds), and signals of the episodes.
+
+        Args:
+            tunable: Controller.
+            values: Values of its parameters by key, shape (candidates,) each.
+        """
         rows: list[tuple[Array, Array]] = []
         costs = self._run(tunable, values, rows)
         error, torque = (np.array(x) for x in zip(*rows, strict=True))
@@ -147,7 +153,7 @@ class Trials:
         )
 
     def close(self) -> None:
-        """Give the simulations back."""
+        """Close the environments."""
         self.env.close()
 
     def _run(
@@ -162,7 +168,7 @@ class Trials:
         each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
         limit = self.joints.torque_limit
         controller = build(self._plan(tunable, task, each), each, limit)
-        # the age of the readings is tuned, not told
+        # the controller must not know the age of the readings: it is tuned
         controller.start(replace(task, reading_age=ReadingAge()))
         squares = np.zeros((2, env.num_envs))
         alive = np.ones(env.num_envs, dtype=bool)
@@ -188,7 +194,7 @@ class Trials:
     def _plan(
         self, tunable: Tunable, task: Task, each: Mapping[str, Array]
     ) -> MotorPlan:
-        """Of all motions; what the seeds have in common is planned once."""
+        """Plan of all motions; the parts common to all candidates are planned once."""
         count = len(self.seeds)
         few = replace(
             task,

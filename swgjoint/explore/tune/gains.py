@@ -1,15 +1,16 @@
-r"""Controllers whose gains are tuned, and the textbook rule that they are held against.
+r"""Controllers with tuned gains, and the textbook rule that they are compared with.
 
-Motor and link behave like one inertia :math:`J = J_m + J_l/i^2` at the motor while the
-drive is stiff enough, so that PD with
+If the drive is stiff enough, motor and link behave like one inertia
+:math:`J = J_m + J_l/i^2` at the motor. PD control with
 
 .. math:: k_p = J\omega^2, \quad k_d = 2\zeta J\omega
 
-has the natural frequency :math:`\omega` and the damping ratio :math:`\zeta`. The drive
-bounds what that can be: with its motor held, the link swings on the stiffness K of the
-drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`, where the motor no longer
-moves the link. The rule of this file is :math:`\omega = \omega_a/3`, :math:`\zeta =
-0.7`, with nominal inertias and the mean stiffness of the map up to rated torque.
+then has the natural frequency :math:`\omega` and the damping ratio :math:`\zeta`. The
+drive limits the bandwidth: with the motor locked, the link oscillates on the stiffness
+K of the drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`, at which the motor
+does not move the link. The rule of this file is :math:`\omega = \omega_a/3`,
+:math:`\zeta = 0.7`, with nominal inertias and the mean stiffness of the map up to rated
+torque.
 """
 
 from __future__ import annotations
@@ -33,33 +34,34 @@ from swgjoint.sim.controller import KnownJoints, Task
 from swgjoint.typing import Array
 
 BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
-"""Of the textbook rule: over the anti-resonance, and ratio."""
+"""Textbook rule: bandwidth as a fraction of the anti-resonance, and damping ratio."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GainParameter:
-    """One number that is tuned, on a logarithmic scale between two bounds."""
+    """One tuned number, on a logarithmic scale between two bounds."""
 
     key: str
     low: float
     high: float
     neutral: float
-    """Without tuning: by the rule, shares of 1, no integral, readings of now."""
+    """Untuned value: gains by the rule, shares of 1, no integral, readings without
+    delay."""
 
     def value(self, place: Array) -> Array:
-        """Values at places from 0 to 1 between the bounds."""
+        """Values at positions 0 to 1 between the bounds."""
         return np.asarray(self.low * (self.high / self.low) ** place)
 
     @property
     def start(self) -> float:
-        """Place of the neutral value, or of the bound next to it."""
+        """Position of the neutral value between the bounds, or of the nearest bound."""
         inside = min(max(self.neutral, self.low), self.high)
         return float(np.log(inside / self.low) / np.log(self.high / self.low))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tunable:
-    """A named controller and what is tuned of it."""
+    """A named controller and the keys of its tuned parameters."""
 
     name: str
     text: str
@@ -78,7 +80,7 @@ CONTROLLERS = {
         ),
         Tunable(
             name="pd-feedforward",
-            text="PID with torque and friction of a rigid drive fed forward",
+            text="PID with feed-forward of torque and friction of a rigid drive",
             plan=rigid_plan,
             keys=(
                 "frequency_Hz",
@@ -91,7 +93,7 @@ CONTROLLERS = {
         ),
         Tunable(
             name="pd-flexible",
-            text="PID with torque, friction and torsion of the map fed forward",
+            text="PID with feed-forward of torque, friction and torsion of the map",
             plan=flexible_plan,
             keys=(
                 "frequency_Hz",
@@ -109,10 +111,10 @@ CONTROLLERS = {
 
 
 def controller_named(name: str) -> Tunable:
-    """One of :data:`CONTROLLERS`.
+    """Look up one of :data:`CONTROLLERS`.
 
     Raises:
-        InputError: If there is none of the name.
+        InputError: If the name is unknown.
     """
     if name not in CONTROLLERS:
         raise InputError(
@@ -123,16 +125,21 @@ def controller_named(name: str) -> Tunable:
 
 
 def anti_resonance(joints: KnownJoints) -> float:
-    """Frequency of the first joint's link on its drive, motor held [Hz]."""
+    """Anti-resonance of the first joint: link on its drive, motor locked [Hz]."""
     stiffness = joints.drives[0].mean_stiffness
     return float(np.sqrt(stiffness / joints.link_inertia[0]) / (2.0 * np.pi))
 
 
 def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter, ...]:
-    """What is tuned of a controller, with bounds for a joint."""
+    """Tuned parameters of a controller, with bounds for the first joint.
+
+    Args:
+        tunable: Controller.
+        joints: Joints with their drives and inertias.
+    """
     high = anti_resonance(joints)
     known = (
-        # a tenth to twice the anti-resonance: softer is useless, stiffer rings
+        # 0.1 to 2 times the anti-resonance: too soft below, oscillates above
         GainParameter(
             key="frequency_Hz",
             low=0.1 * high,
@@ -144,22 +151,30 @@ def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter,
         GainParameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
         GainParameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
         GainParameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
-        # of the nominal drive's kinematic error, whose phase specimens do not share
+        # share of the nominal kinematic error; specimens differ in its phase
         GainParameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
-        # a reading of t - age is held against the plan of then
+        # a reading taken at t - age is compared with the plan at that time
         GainParameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
     )
     return tuple(p for key in tunable.keys for p in known if p.key == key)
 
 
 def textbook(joints: KnownJoints) -> dict[str, Array]:
-    """Values of plain PD by the rule, for one candidate."""
+    """Parameter values of plain PD control by the rule, shape (1,) each."""
     pd = parameters_of(CONTROLLERS["pd"], joints)
     return {p.key: np.array([p.neutral]) for p in pd}
 
 
 def gains_of(values: Mapping[str, Array], joints: KnownJoints) -> dict[str, Array]:
-    """Gains on the motor of the first joint, in SI units. Shapes as those given."""
+    """Gains at the motor of the first joint, in SI units.
+
+    Args:
+        values: Values of the tuned parameters by key.
+        joints: Joints with their inertias and ratios.
+
+    Returns:
+        Gains by key with unit, of the same shape as the values.
+    """
     ratio, rotor = joints.ratio[0], joints.rotor_inertia[0]
     inertia = rotor + joints.link_inertia[0] / ratio**2
     omega = 2.0 * np.pi * values["frequency_Hz"]
@@ -174,10 +189,15 @@ def gains_of(values: Mapping[str, Array], joints: KnownJoints) -> dict[str, Arra
 
 
 def parts_of(tunable: Tunable, task: Task) -> tuple[MotorPlan, MotorPlan]:
-    """The plan of a controller, and what of it the drive's angle functions make.
+    """Split the plan of a controller into a mean part and an angle-dependent part.
 
-    The first is the plan for the mean curve of the drives, without kinematic error; the
-    second, which is added to it, is zero where a controller has no share of that.
+    The first part is the plan for the mean torsion curve of the drives, without
+    kinematic error. The second part is added to it and contains the angle-dependent
+    functions of the drives; it is zero if the controller has no ``error_share``.
+
+    Args:
+        tunable: Controller.
+        task: Motions and joints.
     """
     plan = tunable.plan(task)
     if "error_share" not in tunable.keys:
@@ -201,13 +221,13 @@ def weight_plan(
     values: Mapping[str, Array],
     repeats: int = 1,
 ) -> MotorPlan:
-    """A plan with shares of its parts.
+    """Plan with weighted parts.
 
     Args:
-        parts: Of the task, see :func:`parts_of`.
-        task: Motions, of which the episodes are the second axis.
-        values: Shares, those that are missing are 1. Shape (n_motions, 1) each.
-        repeats: So many times the motions of the task, one after the other.
+        parts: Parts of the plan of the task, see :func:`parts_of`.
+        task: Motions; the second axis is the episodes.
+        values: Shares by key, shape (n_motions, 1) each; a missing share is 1.
+        repeats: Number of times that the motions of the task are repeated.
     """
     (even, uneven), joints, i = parts, task.joints, task.joints.ratio
     one = np.ones(1)
@@ -241,12 +261,12 @@ def weight_plan(
 def build(
     plan: MotorPlan, values: Mapping[str, Array], torque_limit: Array
 ) -> MotorPID:
-    """The controller of motions side by side.
+    """Build the controller of parallel motions.
 
     Args:
-        plan: Weighted, of all motions.
-        values: Of every motion. Shape (n_motions, 1) each.
-        torque_limit: Of the motors, which also bounds the integral [N·m].
+        plan: Weighted plan of all motions.
+        values: Values of the tuned parameters, shape (n_motions, 1) each.
+        torque_limit: Torque limit of the motors [N·m]; also limits the integral.
     """
     return MotorPID(
         lambda task: plan,

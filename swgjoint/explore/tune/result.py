@@ -1,4 +1,4 @@
-"""What a tuning run is asked for, and what it found."""
+"""Settings and results of a tuning run."""
 
 from __future__ import annotations
 
@@ -16,29 +16,31 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 MINUTES = 3.0
+"""Default wall time of a tuning run [min]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TuneSettings:
-    """What is tuned, and how long."""
+    """Environment, controller, optimiser and budget of a tuning run."""
 
     environment: str
     controller: str = "pd-flexible"
     optimiser: str = "de"
     minutes: float | None = None
-    """Wall time; None: :data:`MINUTES`, unless ``evaluations`` are given."""
+    """Wall time [min]; None for :data:`MINUTES`, unless ``evaluations`` is set."""
     evaluations: int | None = None
-    """Candidates of both searches instead: the same result on every machine."""
+    """Total number of candidates of both searches, as an alternative to ``minutes``;
+    the result is then the same on every machine."""
     seed: int = 0
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    """Of the environment; drives and loads differ within tolerances unless it says
-    ``randomise`` false."""
+    """Settings of the environment. Drives and loads vary within their tolerances
+    unless ``randomise`` is false."""
     population: int = 16
-    """Candidates of a generation."""
+    """Number of candidates in a generation."""
     training: int = 8
-    """Seeds that the searches see."""
+    """Number of seeds used by the searches."""
     held_out: int = 16
-    """Seeds that they do not see."""
+    """Number of seeds reserved for the comparison."""
 
     def __post_init__(self) -> None:
         if self.optimiser not in OPTIMISERS:
@@ -46,7 +48,7 @@ class TuneSettings:
                 f"optimiser {self.optimiser!r}; accepted: {', '.join(OPTIMISERS)}"
             )
         if self.minutes is not None and self.evaluations is not None:
-            raise InputError("minutes and evaluations given; accepted: one of them")
+            raise InputError("expected either minutes or evaluations, not both")
         if self.minutes is not None and not 0.0 < self.minutes <= 1440.0:
             raise InputError(f"minutes {self.minutes:g}; accepted: > 0 and <= 1440")
         least = 2 * self.population
@@ -60,7 +62,7 @@ class TuneSettings:
 
     @property
     def seeds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Seeds of the episodes: those of the searches, and those kept from them."""
+        """Seeds of the episodes: training seeds and held-out seeds."""
         first = 1000 * self.seed
         return (
             tuple(range(first, first + self.training)),
@@ -70,18 +72,18 @@ class TuneSettings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GainCandidate:
-    """A controller with its values and what it costs."""
+    """A controller with its parameter values and its costs."""
 
     name: str
     controller: str
     values: dict[str, float]
     """Values of its parameters."""
     gains: dict[str, float]
-    """On the motor, in SI units."""
+    """Gains at the motor, in SI units."""
     training: Array
-    """Cost by seed [rad]."""
+    """Cost of each training seed [rad]."""
     held_out: Array
-    """Cost by seed that no search has seen [rad]."""
+    """Cost of each held-out seed [rad]."""
     trace: Trace
     """Trace of the held-out episodes."""
 
@@ -110,18 +112,20 @@ class Tuned:
     settings: TuneSettings
     environment: str
     candidates: tuple[GainCandidate, ...]
-    """First the textbook's PD, last the tuned controller."""
+    """First PD by the textbook rule, last the tuned controller."""
     searches: dict[str, GainSearch]
     parameters: tuple[GainParameter, ...]
     """Parameters of the named controller."""
     anti_resonance: float
     """Anti-resonance of the nominal plant [Hz]."""
     error_scale: float
+    """Error scale s of the cost [rad]."""
     effort_weight: float
+    """Effort weight w of the cost [-]."""
     worst: float
     """Largest possible cost [rad]."""
     wall: float
-    """With what was spent before an interruption [s]."""
+    """Wall time, including the time before an interruption [s]."""
 
     @property
     def baseline(self) -> GainCandidate:
@@ -134,7 +138,7 @@ class Tuned:
         return self.candidates[-1]
 
     def improvement(self, candidate: GainCandidate) -> float:
-        """Share of the baseline's held-out cost that a candidate saves."""
+        """Fraction of the baseline's held-out cost that a candidate saves [-]."""
         return float(1.0 - candidate.held_out.mean() / self.baseline.held_out.mean())
 
     def to_json(self) -> dict[str, Any]:
@@ -159,7 +163,7 @@ class Tuned:
             "bounds": {p.key: [p.low, p.high] for p in self.parameters},
             "anti_resonance_Hz": self.anti_resonance,
             "cost": "sqrt(mean(e^2) + s^2 w mean(u^2)), e link error, u motor torque"
-            " over its limit",
+            " divided by its limit",
             "error_scale_arcmin": self.error_scale / arcmin,
             "effort_weight": self.effort_weight,
             "worst_cost_arcmin": self.worst / arcmin,
@@ -168,5 +172,5 @@ class Tuned:
 
 
 def arguments_of(settings: TuneSettings) -> dict[str, Any]:
-    """Arguments of the environment."""
+    """Arguments of the environment; ``randomise`` is true unless set otherwise."""
     return {"randomise": True, **settings.arguments}

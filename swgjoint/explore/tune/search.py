@@ -1,8 +1,8 @@
-"""Searches in the unit cube that can be taken up again where they were interrupted.
+"""Searches in the unit cube that can be resumed after an interruption.
 
-All optimisers are seeded and ask for whole generations. What they asked for and what
-it cost is kept in a journal; a search that is taken up again is run from its beginning,
-its questions answered from the journal, so that it goes on as if nothing had happened.
+All optimisers are seeded and request whole generations. A journal stores the requested
+candidates and their costs. A resumed search runs again from its beginning and takes the
+stored costs from the journal, so that it continues exactly as without interruption.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from swgjoint.store import arrays_content, arrays_file, one_line
 from swgjoint.typing import Array
 
 Evaluate = Callable[[Array], Array]
-"""Places (n, d) to costs (n,)."""
+"""Maps candidates, shape (n, d), to costs, shape (n,)."""
 
 JOURNAL = "tune.npz"
 NEAR = 0.1
 """Standard deviation about the start in the first generation of differential
-evolution, of the width of the cube."""
+evolution, relative to the width of the cube."""
 STEP = 0.2
-"""First standard deviation of CMA-ES, of the width of the cube."""
+"""Initial standard deviation of CMA-ES, relative to the width of the cube."""
 
 
 class Spent(Exception):
@@ -36,7 +36,7 @@ class Spent(Exception):
 
 
 class _Failed(Exception):
-    """Carries an error of the cost through an optimiser unchanged."""
+    """Passes an error of the cost function through an optimiser unchanged."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(error)
@@ -48,24 +48,24 @@ class GainSearch:
     """Generations of one search."""
 
     places: list[Array] = field(default_factory=list)
-    """In the unit cube. Shape (n, d) each."""
+    """Candidates of each generation in the unit cube, shape (n, d) each."""
     costs: list[Array] = field(default_factory=list)
-    """Costs of every seed. Shape (n, seeds) each."""
+    """Costs on every seed [rad], shape (n, seeds) each."""
     seconds: list[float] = field(default_factory=list)
-    """That the generations took."""
+    """Computing time of each generation [s]."""
 
     @property
     def evaluations(self) -> int:
-        """Candidates so far."""
+        """Number of candidates so far."""
         return sum(map(len, self.places))
 
     def best(self) -> Array:
-        """Place of the candidate of the lowest mean cost. Shape (d,)."""
+        """Candidate of lowest mean cost in the unit cube, shape (d,)."""
         mean = np.concatenate(self.costs).mean(axis=1)
         return np.asarray(np.concatenate(self.places)[int(mean.argmin())])
 
     def progress(self) -> Array:
-        """Lowest mean cost after every candidate. Shape (evaluations,)."""
+        """Lowest mean cost after every candidate [rad], shape (evaluations,)."""
         mean = np.concatenate(self.costs).mean(axis=1)
         return np.asarray(np.minimum.accumulate(mean))
 
@@ -82,21 +82,21 @@ def run_search(
     clock: Callable[[], float],
     after: Callable[[], None],
 ) -> None:
-    """Let an optimiser go on with a search until its budget is spent.
+    """Continue a search until its budget is spent.
 
     Args:
         optimiser: Key of :data:`OPTIMISERS`.
-        search: What is known; is added to.
-        costs: Places (n, d) to costs (n, seeds).
-        more: Whether another generation is allowed.
-        start: One of the first generation. Shape (d,).
-        size: Of a generation.
-        seed: Of all that is random.
-        clock: Time [s].
+        search: Generations known so far; new ones are appended.
+        costs: Function from candidates, shape (n, d), to costs, shape (n, seeds).
+        more: Function that returns whether another generation is allowed.
+        start: Member of the first generation, shape (d,).
+        size: Number of candidates in a generation.
+        seed: Seed of the optimiser.
+        clock: Function that returns a time [s].
         after: Called after every new generation.
 
     Raises:
-        InputError: If the journal is of another search.
+        InputError: If the journal belongs to another search.
     """
     done = 0
 
@@ -123,7 +123,7 @@ def run_search(
     def guarded(places: Array) -> Array:
         try:
             return evaluate(places)
-        # scipy would make another error of these, InputError among them
+        # scipy would replace these errors, including InputError, by its own
         except (TypeError, ValueError) as error:
             raise _Failed(error) from None
 
@@ -142,7 +142,7 @@ def _differential_evolution(
 
     rng = np.random.default_rng(seed)
     shape = (size, start.size)
-    # a Latin hypercube; half of it gives way to the start and its neighbourhood
+    # Latin hypercube; half of it is replaced by the start and its neighbourhood
     strata = np.tile(np.arange(size)[:, None], start.size)
     first = (rng.permuted(strata, axis=0) + rng.uniform(size=shape)) / size
     near = start + NEAR * rng.standard_normal((size // 2, start.size))
@@ -206,7 +206,7 @@ def _optuna(evaluate: Evaluate, start: Array, size: int, seed: int) -> None:
 
 def _missing(what: str, package: str) -> MissingExtraError:
     return MissingExtraError(
-        f"{what} needs {package}: pip install 'swgjoint[tune]'; without it: de"
+        f"{what} needs {package}: pip install 'swgjoint[tune]'; or use optimiser de"
     )
 
 
@@ -221,7 +221,16 @@ OPTIMISERS: dict[str, Callable[[Evaluate, Array, int, int], None]] = {
 def write_journal(
     folder: Path, header: Mapping[str, Any], searches: Mapping[str, GainSearch]
 ) -> Path:
-    """Write all searches, whole or not at all."""
+    """Write all searches atomically.
+
+    Args:
+        folder: Folder of the journal.
+        header: Settings that a resumed run must share.
+        searches: Searches by name.
+
+    Returns:
+        Path of the journal.
+    """
     arrays: dict[str, Any] = {"header": json.dumps(header, sort_keys=True)}
     for name, search in searches.items():
         if search.places:
@@ -234,10 +243,15 @@ def write_journal(
 def read_journal(
     folder: Path, header: Mapping[str, Any], names: tuple[str, ...]
 ) -> dict[str, GainSearch]:
-    """Searches of a run that is taken up again.
+    """Read the searches of a run to resume.
+
+    Args:
+        folder: Folder of the journal.
+        header: Settings of the resumed run.
+        names: Names of the searches.
 
     Raises:
-        InputError: If there is none, it cannot be read, or was of other settings.
+        InputError: If there is no journal, it cannot be read, or its settings differ.
     """
     path = folder / JOURNAL
     try:
@@ -258,8 +272,8 @@ def read_journal(
     for key, value in header.items():
         if kept.get(key) != value:
             raise InputError(
-                f"{path} is of {key} {kept.get(key)!r}, not {value!r}; accepted: the"
-                " same settings and files, or another --out"
+                f"{path} was written with {key} {kept.get(key)!r}, not {value!r};"
+                " accepted: the same settings and files, or another --out"
             )
     return found
 

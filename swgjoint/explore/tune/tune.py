@@ -1,8 +1,8 @@
-"""``swgjoint tune``: gains of a named controller, held against a textbook rule.
+"""``swgjoint tune``: tunes the gains of a controller and compares with a textbook rule.
 
-Four controllers are told apart on seeds that no search has seen, so that what feed-
-forward brings is not taken for what tuning brings: PD by the rule, the same PD with its
-two gains tuned, the named controller with gains by the rule, and that one tuned.
+Four controllers are compared on held-out seeds, which separates the benefit of feed-
+forward from the benefit of tuning: PD by the rule, the same PD with both gains tuned,
+the named controller with gains by the rule, and the named controller with tuned gains.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 PD_SHARE = 0.2
-"""Of the budget, for the two gains of plain PD."""
+"""Fraction of the budget for tuning the two gains of plain PD."""
 RESERVE = 15.0
-"""Of the minutes, for the held-out seeds and the report [s]."""
+"""Part of the wall time reserved for the held-out seeds and the report [s]."""
 _PD, _NAMED = "pd", "named"
 
 
@@ -65,15 +65,16 @@ def tune(
     """Tune a controller, and a plain PD controller for comparison.
 
     Args:
-        settings: What, and how long. With ``evaluations`` the same settings give the
-            same result to the last bit; minutes end a search sooner or later.
-        folder: Receives the journal after every generation, and goes on with one of
-            the same settings that is there; None: none is kept.
-        resume: Whether there has to be such a journal.
-        progress: Called with the search, the candidates (or seconds) done and all.
+        settings: Controller and budget. With ``evaluations``, the same settings give
+            the same result to the last bit; with ``minutes``, the number of candidates
+            depends on the machine.
+        folder: Folder of the journal, which is written after every generation; an
+            existing journal of the same settings is resumed. None writes no journal.
+        resume: Whether a journal must exist.
+        progress: Called with the stage, the candidates (or seconds) done and the total.
 
     Raises:
-        InputError: If a name, an argument or the journal is not accepted.
+        InputError: If a name, an argument or the journal is invalid.
         MissingExtraError: If gymnasium or the optimiser is not installed.
     """
     began = time.perf_counter()
@@ -84,7 +85,7 @@ def tune(
         tunables[_NAMED] = named
     searches = {name: GainSearch() for name in tunables}
     if folder is None and resume:
-        raise InputError("resume without a folder; accepted: --out of the run")
+        raise InputError("resume needs the output folder of the run (--out)")
     training, held_out = settings.seeds
     trials = Trials(
         environment, arguments, seeds=training, candidates=settings.population
@@ -94,8 +95,8 @@ def tune(
         if resume or (folder / JOURNAL).exists():
             searches = read_journal(folder, header, tuple(tunables))
             known = sum(search.evaluations for search in searches.values())
-            told = f"going on with {folder / JOURNAL}: candidates that are known"
-            progress(told, known, known)
+            stage = f"resuming from {folder / JOURNAL}: known candidates"
+            progress(stage, known, known)
         folder.mkdir(parents=True, exist_ok=True)
     before = sum(sum(s.seconds) for s in searches.values())
 
@@ -164,7 +165,7 @@ def tune(
 
 @dataclass(frozen=True, eq=False)
 class _Budget:
-    """When a search has to end: after so many candidates, or in time."""
+    """Budget of a search: a number of candidates, or a time."""
 
     settings: TuneSettings
     searches: Mapping[str, GainSearch]
@@ -174,7 +175,7 @@ class _Budget:
 
     @property
     def _candidates(self) -> int:
-        """Candidates of this search; the second has what the first left over."""
+        """Candidates of this search; the second search gets what the first left."""
         s = self.settings
         assert s.evaluations is not None
         if self.share < 1.0:
@@ -199,7 +200,7 @@ class _Budget:
         return bool(spent + one <= self.share * self._seconds)
 
     def shown(self) -> tuple[int, int]:
-        """Done and all: candidates, or seconds."""
+        """Candidates or seconds spent, and their total."""
         if self.settings.evaluations is not None:
             return self.search.evaluations, self._candidates
         done = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
@@ -212,8 +213,8 @@ def _header(
     arguments: Mapping[str, Any],
     drive: DriveMap,
 ) -> dict[str, Any]:
-    """What a journal must agree in with the run that goes on with it."""
-    # a file of the same path may have changed; provenance does not move the joint
+    """Settings that a journal must share with the run that resumes it."""
+    # a file of the same path may have changed; provenance does not affect the joint
     moved = json_text(replace(drive, info={}, fields=None), indent=None)
     text: dict[str, Any] = json.loads(
         json.dumps(
