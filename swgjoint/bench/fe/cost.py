@@ -1,10 +1,10 @@
-"""``swgjoint bench fe``: what finite elements of less effort miss, and their time.
+"""``swgjoint bench fe``: error and run time of finite element models of the drive.
 
-Every setting is compared three times: with the finest model in space, with the finest
-mesh of its own kind, and with the finest of the next level up (ring, plane, space;
-linear, nonlinear). References that take long come from a stored file, which holds one
-short setting, too: solved again, it tells whether the file is of this code. What takes
-long and is not stored is left out.
+Every setting is compared with three references: the finest 3D model, the finest mesh of
+its own kind, and the finest mesh of the next level up (ring, 2D, 3D; linear,
+nonlinear). Long references come from a stored file. The file also contains one short
+setting; solving it again shows whether the file matches the present code. Long settings
+that are not stored are left out.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ SETTINGS = (
     FeSetting(model="3d", refinement=1.0),
     FeSetting(model="3d", refinement=1.4),
 )
-"""The finest of every kind comes last; the last one of all is the reference."""
+"""Settings with the finest of every kind last; the last one of all is the reference."""
 
-LEFT_OUT = "left out: long, and not in a stored file; solved with --recompute"
-LOST = "its process died: out of memory, or killed"
+LEFT_OUT = "left out: long run, not in a stored file; --recompute solves it"
+LOST = "process died: out of memory or killed"
 
 
 def run_fe_cost(
@@ -76,31 +76,32 @@ def run_fe_cost(
     """Solve every setting; the last one that is not left out is the reference.
 
     Args:
-        design: With a cup.
-        settings: Coarse to fine within each kind.
-        folder: For table, JSON and picture; None writes nothing.
+        design: Design with a cup.
+        settings: Settings, from coarse to fine within each kind.
+        folder: Folder for table, JSON and picture; None writes nothing.
         progress: Called after every setting.
-        jobs: Processes, one a core; every setting has a fresh one.
-        recompute: Solve what the stored file has, too, and write that file anew
-            (into ``folder``).
+        jobs: Number of processes, one per core; every setting has a fresh process.
+        recompute: Whether stored settings are solved again and a new stored file is
+            written into ``folder``.
 
     Returns:
-        ``rows``, see :func:`swgjoint.bench.fe.rows.rows_of`; ``cheapest``: setting
-        by quantity and bound, ``cheapest_in_the_plane`` against the finest plane mesh;
-        ``design``, ``stored`` with the provenance of the stored settings and how far
-        they have drifted, ``left_out``: settings by key,
-        ``kinematic_error_positions``: so many of a pitch it is told at, which sees its
-        first harmonic, ``provenance``, ``files``, ``wall_s``.
+        ``rows``, see :func:`swgjoint.bench.fe.rows.rows_of`; ``cheapest``: cheapest
+        setting by quantity and bound, and ``cheapest_in_the_plane``: the same compared
+        with the finest 2D mesh; ``design``; ``stored``: provenance and drift of the
+        stored settings; ``left_out``: keys of the settings left out;
+        ``kinematic_error_positions``: number of positions per pitch at which the
+        kinematic error is evaluated, which resolve its first harmonic; ``provenance``,
+        ``files``, ``wall_s``.
 
     Raises:
-        DesignError: If the design has no cup or holds what is not modelled in space.
+        DesignError: If the design has no cup or a feature that 3D does not model.
         ComputationError: If the reference fails.
     """
     begin = time.perf_counter()
     if design.cup is None:
         raise DesignError(
-            f"{design.drive.name}: bench fe goes by the model in space, which needs a"
-            " [cup]; accepted: a design with one, such as reference-3d-modified"
+            f"{design.drive.name}: bench fe compares with the 3D model, which needs a"
+            " [cup]; accepted: a design with a cup, such as reference-3d-modified"
         )
     check_modelled(design)
     kept = {} if recompute else load_stored(design)
@@ -154,11 +155,11 @@ def _solve_all(
     stage: str,
     progress: Progress,
 ) -> dict[str, Found | str]:
-    """Every setting in a process that does nothing else, the long ones first."""
+    """Solve every setting in a process of its own, the longest ones first."""
     order = sorted(settings, key=_work, reverse=True)
     found: dict[str, Found | str] = {}
     progress(stage, 0, len(order))
-    # a thread holds the process of one setting, so that one which dies ends no other
+    # one thread per process, so that a process that dies does not end the others
     threads = ThreadPoolExecutor(max_workers=jobs)
     with _one_thread():
         try:
@@ -175,7 +176,7 @@ def _solve_all(
 
 
 def _solved_apart(task: SettingTask) -> Found | str:
-    """A setting in a process of its own; what becomes of that is part of the result."""
+    """Solve a setting in its own process; the reason if that process fails."""
     context = get_context("spawn")
     with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
         try:
@@ -188,10 +189,11 @@ def _solved_apart(task: SettingTask) -> Found | str:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes that begin inside have one thread of algebra.
+    """Processes started in this context use one thread for linear algebra.
 
-    A second one would blur what a core costs. A process loads its algebra with this
-    module, before any code of ours runs in it: only what it is born with counts.
+    A second thread would falsify the CPU time. The limit must be in the environment of
+    a new process, because the process loads its algebra library before it runs any code
+    of this package.
     """
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}
@@ -207,7 +209,7 @@ def _one_thread() -> Iterator[None]:
 
 
 def _work(setting: FeSetting) -> float:
-    """Rough seconds."""
+    """Estimated run time [s]."""
     base = {"ring": 6.0, "2d": 5.0, "3d": 150.0}[setting.model]
     active_sets = 3.0 if setting.kind == "3d linear" else 1.0
     return (2 if setting.full else 1) * active_sets * base * setting.refinement**2

@@ -1,4 +1,4 @@
-"""Settings of ``swgjoint bench fe`` without a mesh: thin rings, closed forms."""
+"""Settings of ``swgjoint bench fe`` without solid mesh: thin rings, closed forms."""
 
 from __future__ import annotations
 
@@ -33,7 +33,16 @@ from swgjoint.units import mm
 
 
 def solve_by_thin_rings(design: Design, setting: FeSetting, begin: float) -> Found:
-    """What rings or closed forms say of a design; ``begin``: of the setting [s]."""
+    """Solve a design with thin rings or closed forms.
+
+    Args:
+        design: Design to solve.
+        setting: Setting of model ``ring``.
+        begin: Start of the setting, from :func:`time.perf_counter` [s].
+
+    Raises:
+        ComputationError: If a position has no equilibrium.
+    """
     if not setting.refinement:
         return _closed_form(design, begin)
     if design.wave_generator.bearing is None:
@@ -74,7 +83,7 @@ def solve_by_thin_rings(design: Design, setting: FeSetting, begin: float) -> Fou
 
 
 def bearing_by_rule(design: Design) -> dict[str, float]:
-    """Ball bearing of the family's proportions, without clearance."""
+    """Ball bearing with the proportions of the family, without clearance."""
     pitch = design.drive.module_mm * design.drive.teeth_flexspline
     return {
         "balls": family.BALLS,
@@ -86,12 +95,13 @@ def bearing_by_rule(design: Design) -> dict[str, float]:
 
 
 def _rim_stress(design: Design, model: ThinRing, state: ThinRingState) -> float:
-    r"""Largest tensile stress of the rim between the teeth, no notch [Pa].
+    r"""Largest tensile stress of the rim between the teeth, without notch effect [Pa].
 
     .. math:: \sigma = E\,(\varepsilon + y\,\Delta\kappa)
 
-    at its bore and at the root circle, y from the neutral line, in the middle of every
-    element, where bending of a cubic is right.
+    The stress is evaluated at the bore and at the root circle, at distance y from the
+    neutral line. It is taken in the middle of every element, where the curvature of a
+    cubic element is accurate.
     """
     rim, outside = model.rim, design.flexspline.rim_mm * mm
     centre: Array = np.arange(rim.elements, dtype=np.float64) + 0.5
@@ -109,7 +119,7 @@ def _rim_stress(design: Design, model: ThinRing, state: ThinRingState) -> float:
 
 
 def _closed_form(design: Design, begin: float) -> Found:
-    """Thin shell on an unloaded wave generator; rigid teeth at the ideal ratio."""
+    """Thin shell on an unloaded wave generator, with rigid teeth at the ideal ratio."""
     phi = pi * np.arange(RIM) / RIM
     return Found(
         stiffness=1.0 / series_compliance(design, cup=True),

@@ -1,4 +1,4 @@
-"""Rows of ``swgjoint bench fe``: errors of the settings, and which of them to use."""
+"""Rows of ``swgjoint bench fe``: errors of the settings, and the cheapest settings."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ QUANTITIES = {
     "tensile_MPa": "%",
     "rim_shape_mm": "%",
 }
-"""With the unit of their error; that of the rim is the largest anywhere around over the
-largest deflection."""
+"""Quantities with the unit of their error. The error of the rim shape is the largest
+difference along the rim divided by the largest deflection."""
 NEXT_LEVEL = {"ring": "2d", "2d linear": "2d", "2d": "3d", "3d linear": "3d"}
-"""Of a kind."""
+"""Next more accurate kind by kind."""
 SAME = 1e-6
-"""Errors that differ by less, as a part of them, are equal."""
+"""Relative difference below which two errors count as equal [-]."""
 BOUNDS = (1.0, 5.0, 15.0)
-"""Errors that a reader may ask for [%]."""
+"""Error bounds for which the cheapest setting is listed [%]."""
 
 
 def rows_of(
@@ -33,25 +33,25 @@ def rows_of(
     best: FeSetting,
     stored: set[str],
 ) -> list[dict[str, Any]]:
-    """One row a setting and quantity, one row for a setting without solution.
+    """One row per setting and quantity; one row for a setting without solution.
 
     Args:
-        settings: Coarse to fine within each kind.
-        found: By key; why there is nothing for those that failed.
-        best: The reference.
-        stored: Keys of those that come from the file.
+        settings: Settings, from coarse to fine within each kind.
+        found: Results by key of the setting, or the reason for missing results.
+        best: Setting that is the reference.
+        stored: Keys of the settings that come from the stored file.
 
     Returns:
-        ``bench``, ``model``, ``setting``, ``kind``, ``quantity``, ``value``, ``unit``
+        ``bench``, ``model``, ``setting``, ``kind``, ``quantity``, ``value``; ``unit``
         of the errors; ``error`` from ``reference``, ``error_of_kind`` from
-        ``reference_of_kind``, both also as ``..._percent``, the pattern of the
-        kinematic error over its peak to peak; ``error_next_level`` from
-        ``reference_next_level``, null where there is none, as for the only mesh of a
-        kind; ``kinematic_error_pp_arcsec`` is that of the first harmonic over a pitch,
-        which is what four positions see; ``pareto`` and
-        ``pareto_of_kind``: whether no other setting is both cheaper and nearer to that
-        reference; ``wall_s``, ``cpu_s``, ``peak_MB``, ``cores``, ``nodes`` of a sector,
-        ``stored``, ``outcome``.
+        ``reference_of_kind``, both also as ``..._percent``, for the kinematic error
+        relative to its peak-to-peak value; ``error_next_level`` from
+        ``reference_next_level``; ``pareto`` and ``pareto_of_kind``: whether no other
+        setting is both cheaper and closer to the reference; ``wall_s``, ``cpu_s``,
+        ``peak_MB``, ``cores``, ``nodes`` of a sector, ``stored``, ``outcome``. Errors
+        without a reference, such as those of the only mesh of a kind, are null.
+        ``kinematic_error_pp_arcsec`` contains the first harmonic over a pitch, which is
+        what four positions resolve.
     """
     meshes = [
         s
@@ -139,7 +139,7 @@ def _failed(same: dict[str, Any], best: FeSetting, outcome: str) -> dict[str, An
 
 
 def _value(found: Found, quantity: str) -> float | None:
-    """In the unit of the quantity's name."""
+    """Value of a quantity, in the unit of its name."""
     if quantity == "torsional_stiffness_Nm_rad":
         return found.stiffness
     if quantity == "tensile_MPa":
@@ -152,7 +152,7 @@ def _value(found: Found, quantity: str) -> float | None:
 
 
 def _error(one: Found, than: Found, quantity: str) -> float | None:
-    """Signed for figures; of patterns how far apart they come."""
+    """Signed relative error of a scalar; largest difference of two patterns."""
     if quantity == "kinematic_error_pp_arcsec":
         if one.kinematic_error is None or than.kinematic_error is None:
             return None
@@ -169,7 +169,7 @@ def _error(one: Found, than: Found, quantity: str) -> float | None:
 def _percent(
     row: dict[str, Any], found: Mapping[str, Found | str], tail: str
 ) -> float | None:
-    """Size of an error over what it is an error of."""
+    """Magnitude of an error relative to the value of its reference [%]."""
     error, than = row[f"error{tail}"], found.get(row[f"reference{tail}"])
     if error is None or not isinstance(than, Found):
         return None
@@ -180,12 +180,15 @@ def _percent(
 
 
 def seconds(row: Mapping[str, Any]) -> float:
-    """Cost: of one core, which others that share it do not lengthen."""
+    """Cost of a setting: CPU time, which other processes do not lengthen [s].
+
+    Wall time replaces a missing CPU time.
+    """
     return float(row["wall_s"] if row["cpu_s"] is None else row["cpu_s"])
 
 
 def _on_front(row: dict[str, Any], beside: list[dict[str, Any]], key: str) -> bool:
-    """Whether nothing else is both cheaper and better."""
+    """Whether a row is Pareto-optimal in cost and error."""
     if row["value"] is None or row[key] is None:
         return False
     cost, error = seconds(row), abs(row[key])
@@ -193,7 +196,7 @@ def _on_front(row: dict[str, Any], beside: list[dict[str, Any]], key: str) -> bo
         if other is row or other[key] is None or seconds(other) > cost:
             continue
         than = abs(other[key])
-        # half and all teeth differ in the last digits alone
+        # models of half and of all teeth differ only in the last digits
         if than < (1.0 - SAME) * error or (
             than <= (1.0 + SAME) * error and seconds(other) < cost
         ):
@@ -204,18 +207,20 @@ def _on_front(row: dict[str, Any], beside: list[dict[str, Any]], key: str) -> bo
 def cheapest(
     rows: Sequence[dict[str, Any]], kind: str | None = None
 ) -> list[dict[str, Any]]:
-    """The cheapest setting within each bound, by quantity.
+    """Cheapest setting that meets each bound, by quantity.
 
-    One that meets a bound while a finer mesh of its kind does not has met it by chance
-    and does not count.
+    Finer meshes of the same kind must meet the bound too; otherwise the setting meets
+    it by chance and does not count.
 
     Args:
-        rows: Of all settings.
-        kind: Settings of this kind alone, against the finest of them.
+        rows: Rows of all settings.
+        kind: Only settings of this kind, compared with the finest of them; None for
+            all settings, compared with the reference.
 
     Returns:
         ``quantity``, ``bound_percent``, ``model``, ``setting``, ``error_percent``,
-        ``wall_s``, ``cpu_s``; setting null where only the reference is left.
+        ``wall_s``, ``cpu_s``; the setting is null if only the reference meets the
+        bound.
     """
     tail, found = "" if kind is None else "_of_kind", []
     error = f"error{tail}_percent"

@@ -1,7 +1,7 @@
-"""What ``swgjoint bench fe`` solves, and what it keeps of a solution.
+"""Settings of ``swgjoint bench fe``, and the results stored for each.
 
 Every setting solves the same positions over one pitch: without torque for the kinematic
-error, at rated torque for stiffness, stress and the shape of the rim.
+error, and at rated torque for stiffness, stress and rim shape.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from swgjoint.typing import Array
 AnyState = TypeVar("AnyState", State, SolidState, ThinRingState)
 
 POSITIONS = 4
-"""Over one pitch; the same ones in every setting."""
+"""Number of positions over one pitch, the same in every setting."""
 RIM = 90
-"""Angles over half a turn at which the shape of the rim is compared."""
+"""Number of angles over half a turn at which the rim shape is compared."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeSetting:
-    """One model and its effort."""
+    """One model with its mesh refinement."""
 
     model: str
     """``ring``, ``2d`` or ``3d``."""
     refinement: float
-    """Of the mesh; of thin rings elements a tooth pitch over two, 0 for closed forms.
-    """
+    """Mesh refinement [-]; for thin rings half the number of elements per tooth pitch,
+    zero for closed forms."""
     nonlinear: bool = True
     full: bool = False
-    """All teeth also where half of them would do."""
+    """Whether all teeth are modelled even if half of them suffice."""
 
     @property
     def name(self) -> str:
-        """As the table has it."""
+        """Name in the table."""
         if self.model == "ring":
             if not self.refinement:
                 return "closed form"
@@ -61,37 +61,37 @@ class FeSetting:
 
     @property
     def kind(self) -> str:
-        """Settings of one kind differ in their mesh alone."""
+        """Kind of the setting; settings of one kind differ only in their mesh."""
         return self.model + ("" if self.nonlinear else " linear")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Found:
-    """What a setting says of the drive."""
+    """Results of a setting."""
 
     stiffness: float | None
-    """Mean tangent at rated torque [N·m/rad]."""
+    """Mean tangent stiffness at rated torque [N·m/rad]."""
     kinematic_error: Array | None
-    """Unloaded output error less its mean (POSITIONS,) [rad]."""
+    """Unloaded output error minus its mean, shape (POSITIONS,) [rad]."""
     tensile: float | None
-    """Mean over the positions of the largest tensile stress of the flexspline [Pa]."""
+    """Largest tensile stress of the flexspline, averaged over the positions [Pa]."""
     rim_shape: Array | None = None
-    """Radial deflection of the bore at mid-face, from the major axis of the wave
-    generator, under rated torque at the first position (RIM,) [m]."""
+    """Radial deflection of the bore at mid-face, at angles from the major axis of the
+    wave generator, under rated torque at the first position, shape (RIM,) [m]."""
     wall_s: float
     cpu_s: float | None = None
-    """Of all threads."""
+    """CPU time of all threads [s]."""
     peak_MB: float | None = None
-    """Largest resident memory of the process that did nothing else."""
+    """Largest resident memory of the process [MB]."""
     nodes: int | None = None
-    """Nodes of one sector of the flexspline."""
+    """Number of nodes in one sector of the flexspline."""
 
 
 def require_equilibrium(state: AnyState) -> AnyState:
-    """The state, if it is an equilibrium.
+    """Return the state if it is an equilibrium.
 
     Raises:
-        ComputationError: If it is not.
+        ComputationError: If it is not an equilibrium.
     """
     if not state.outcome.ok:
         raise ComputationError(state.outcome.value)
@@ -99,7 +99,7 @@ def require_equilibrium(state: AnyState) -> AnyState:
 
 
 def positions(design: Design) -> Array:
-    """Input angles over one pitch [rad]."""
+    """Input angles over one pitch [rad], shape (POSITIONS,)."""
     pitch = 2.0 * pi / design.periodicity
     return np.asarray(pitch * np.arange(POSITIONS) / POSITIONS)
 
@@ -110,12 +110,12 @@ def mean_of(
     tensile: Sequence[float],
     **rest: Any,
 ) -> Found:
-    """What the solved positions say together.
+    """Combine the solved positions into the results of a setting.
 
     Args:
-        error: Unloaded output error at each [rad].
-        compliance: At rated torque [rad/(N·m)].
-        tensile: Largest tensile stress there [Pa].
+        error: Unloaded output error at each position [rad].
+        compliance: Compliance at rated torque at each position [rad/(N·m)].
+        tensile: Largest tensile stress at rated torque at each position [Pa].
         **rest: Other fields of :class:`Found`.
     """
     return Found(
@@ -127,12 +127,17 @@ def mean_of(
 
 
 def rim_shape(points: Array, radius: float, alpha: float) -> Array:
-    """Radial deflection at equal angles from the major axis, half turns folded.
+    """Radial deflection at equally spaced angles from the major axis.
+
+    Both half turns are mapped onto one.
 
     Args:
-        points: Of the deflected rim, anywhere around (n, 2) [m].
-        radius: Undeformed [m].
+        points: Points of the deflected rim in any order, shape (n, 2) [m].
+        radius: Undeformed radius [m].
         alpha: Wave-generator angle [rad].
+
+    Returns:
+        Deflection, shape (RIM,) [m].
     """
     phi = np.mod(np.arctan2(-points[:, 0], points[:, 1]) - alpha, pi)
     at = pi * np.arange(RIM) / RIM

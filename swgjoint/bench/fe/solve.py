@@ -1,4 +1,4 @@
-"""One setting of ``swgjoint bench fe`` in a process of its own."""
+"""Solution of one setting of ``swgjoint bench fe`` in a process of its own."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True)
 class SettingTask:
-    """A setting of a design; a process of its own solves it."""
+    """A setting of a design, solved in a process of its own."""
 
     design: Design
     setting: FeSetting
 
 
 def solve_in_process(task: SettingTask) -> Found | str:
-    """A setting in a process that has done nothing else, or why it has no solution."""
+    """Solve a setting in a fresh process; the reason if there is no solution."""
     cpu = time.process_time()
     try:
         found = solve_setting(task.design, task.setting)
@@ -64,17 +64,21 @@ def peak_memory() -> float:
 
 
 def solve_setting(design: Design, setting: FeSetting) -> Found:
-    """What a setting says of a design.
+    """Solve a setting of a design.
+
+    Args:
+        design: Design to solve.
+        setting: Model and refinement.
 
     Raises:
-        DesignError: If the design holds what the model does not.
+        DesignError: If the design has a feature that the model lacks.
         ComputationError: If a position has no solution.
     """
     begin = time.perf_counter()
     if setting.model == "ring":
         return solve_by_thin_rings(design, setting, begin)
     changed = design.with_changes({"mesh.refinement": setting.refinement})
-    # on the rigid wave generator that the levels in space have
+    # with a rigid wave generator, as in 3D
     half = can_halve(changed, bearing=False) and not setting.full
     if setting.model == "3d":
         ring = solid_sector_model(changed, half=half, nonlinear=setting.nonlinear)
@@ -111,16 +115,16 @@ def _measured(
     nodes: int,
     begin: float,
 ) -> Found:
-    """Unloaded and loaded positions of a model in the plane or in space.
+    """Solve the unloaded and loaded positions of a 2D or 3D model.
 
     Args:
-        design: The drive.
-        follow: Its model.
-        stress: Largest stresses of the flexspline at a state.
-        rim: Shape of the rim at a state.
-        series: Compliance that the model lacks [rad/(N·m)].
-        nodes: Of a sector.
-        begin: When the setting began [s].
+        design: Design to solve.
+        follow: Continuation of its model.
+        stress: Function that returns the largest stresses of the flexspline at a state.
+        rim: Function that returns the rim shape at a state.
+        series: Compliance in series that the model lacks [rad/(N·m)].
+        nodes: Number of nodes in a sector.
+        begin: Start of the setting, from :func:`time.perf_counter` [s].
     """
     rated, theta = ratings_of(design).rated_torque, positions(design)
     rest = follow.unload(
@@ -153,7 +157,7 @@ def _plane_rim(model: SectorModel, state: State) -> Array:
 
 
 def _solid_rim(ring: SolidSectorModel, state: SolidState) -> Array:
-    """Solid rim of the bore at mid-face, between the planes beside it."""
+    """Rim shape of the bore at mid-face, interpolated between the adjacent planes."""
     frame, strip = ring.frames(state)[0], ring.strip
     points = np.einsum("sij,spj->spi", frame.turn, ring.bore_positions(frame, state))
     points = points.reshape(len(points), strip.planes, -1, 3)

@@ -1,4 +1,4 @@
-"""References of ``swgjoint bench fe`` that take long, in a file."""
+"""Stored file of the long references of ``swgjoint bench fe``."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from swgjoint.provenance import provenance
 from swgjoint.store import json_content, read_kept
 
 LONG = ("3d, refinement 1, linear", "3d, refinement 1.4")
-"""Settings of up to an hour: they come from the file where it has them, else they are
-left out; only ``recompute`` solves them."""
+"""Settings that take up to one hour. They are read from the file if it contains them,
+else left out; only ``recompute`` solves them."""
 WITNESS = "3d, refinement 0.5"
-"""In the file, too, and always solved: its figures must not have moved."""
+"""Setting that is stored and also solved in every run, to detect changed results."""
 DRIFT = 1e-3
-"""Change of the witness beyond which the file is of another code [-]."""
+"""Relative change of the witness above which the file does not match the code [-]."""
 FILE = "bench-fe-reference.json"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Stored:
-    """What is read of the file."""
+    """Content of the file that is read."""
 
     design_hash: str
     positions: int
@@ -36,7 +36,15 @@ class _Stored:
 
 
 def load_stored(design: Design, path: Path | None = None) -> dict[str, Any]:
-    """Stored settings of a design, empty if the file is of another one."""
+    """Read the stored settings of a design.
+
+    Args:
+        design: Design of the benchmark.
+        path: Stored file; None for the bundled one.
+
+    Returns:
+        Content of the file; empty if it does not exist or belongs to another design.
+    """
     path = path or models_path() / "studies" / FILE
     kept = read_kept(path, _read)
     if kept is None:
@@ -60,7 +68,12 @@ def _found(values: dict[str, Any]) -> Found:
 
 
 def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
-    """What the file holds of a design's settings."""
+    """Content of the stored file for a design.
+
+    Args:
+        design: Design of the benchmark.
+        found: Results of the settings by key.
+    """
     kept = {key: found.get(key) for key in (*LONG, WITNESS)}
     return {
         "what": "stored settings of swgjoint bench fe",
@@ -76,9 +89,15 @@ def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
 def describe_stored(
     kept: dict[str, Any], found: dict[str, Found | str]
 ) -> dict[str, Any]:
-    """Provenance of the file, how far its witness is from today's, and how much faster.
+    """Provenance of the stored file, and its deviation from the present code.
 
-    ``pace`` is CPU time of the witness today over that in the file.
+    Args:
+        kept: Content of the stored file.
+        found: Results of the settings by key.
+
+    Returns:
+        Among others ``drift``, the largest relative change of stiffness and stress of
+        the witness, and ``pace``, its present CPU time divided by the stored one.
     """
     was, now = kept["settings"].get(WITNESS), found.get(WITNESS)
     drift = pace = None

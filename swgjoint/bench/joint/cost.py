@@ -1,8 +1,9 @@
-"""``swgjoint bench joint``: what levels, integrators and steps miss, and their cost.
+"""``swgjoint bench joint``: error and cost of joint levels, integrators and time steps.
 
-Three scenes (:mod:`joint_scenes`). The error of a setting is that against level
-``full`` without an error of its steps; its ``own_error`` that against the same level,
-the part that its steps make.
+There are three scenes (:mod:`swgjoint.bench.joint.scenes`). The error of a setting is
+its difference from level ``full`` solved without time-step error. Its ``own_error`` is
+the difference from its own level solved without time-step error, that is the part of
+the error that the time step causes.
 """
 
 from __future__ import annotations
@@ -41,16 +42,16 @@ from swgjoint.sim.accuracy import (
 from swgjoint.sim.run import Run
 
 STEPS = (1e-5, 5e-5, 1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)
-"""[s]."""
+"""Time steps [s]."""
 REFERENCE_STEP = 2e-5
-"""Of RK4, whose error is shown by the run at twice that step [s]."""
+"""Time step of the RK4 reference [s]; a run at twice this step shows its error."""
 EXPLICIT = ("Euler", "implicitfast", "RK4")
 SPLIT_STEPS = (5e-4, 1e-3, 2e-3, 5e-3)
 DAMPING = "damping_ratio"
 
 
 def settings() -> list[Setting]:
-    """All that a scene is run with: the most where there is the most to see."""
+    """All settings of a scene, with most time steps at level ``full``."""
     found = []
     for level in LEVELS:
         steps: tuple[float, ...] = STEPS[1:]
@@ -81,22 +82,22 @@ def run_joint_cost(
     """Run every setting of every scene.
 
     Args:
-        only: Some of the scenes.
-        jobs: Processes, one scene each.
-        folder: Where tables and pictures go; None writes nothing.
+        only: Names of the scenes to run; empty for all.
+        jobs: Number of processes; each runs one scene at a time.
+        folder: Folder for tables and pictures; None writes nothing.
         progress: Called after every scene.
 
     Returns:
-        ``rows``: ``bench``, ``scene``, ``model`` (the level), ``setting``,
-        ``integrator``, ``step_s``, ``quantity``, ``error``, ``own_error``, ``unit``,
-        ``outcome``, ``reason``, ``sub_steps``, ``steps_ratio`` (steps per second over
-        those of the rigid arm), ``cost`` (CPU time per simulated time over that of the
-        rigid arm at 1 ms; both None for the splits), ``pareto``, ``wall_s``,
-        ``reference``; one a setting and quantity. ``references`` with their own errors,
-        ``files``, ``provenance``, ``wall_s``.
+        ``rows``, one per setting and quantity: ``bench``, ``scene``, ``model`` (the
+        level), ``setting``, ``integrator``, ``step_s``, ``quantity``, ``error``,
+        ``own_error``, ``unit``, ``outcome``, ``reason``, ``sub_steps``, ``steps_ratio``
+        (steps per second relative to the rigid arm), ``cost`` (CPU time per simulated
+        time relative to the rigid arm at 1 ms), ``pareto``, ``wall_s``, ``reference``.
+        ``steps_ratio`` and ``cost`` are None for the splits. Also ``references`` with
+        their own errors, ``files``, ``provenance``, ``wall_s``.
 
     Raises:
-        InputError: If there is no such scene.
+        InputError: If a scene is unknown.
         ComputationError: If a reference fails.
     """
     begin = time.perf_counter()
@@ -118,21 +119,21 @@ def run_joint_cost(
 
 
 def check_scenes(only: Sequence[str]) -> None:
-    """Refuse names that are no scene of this benchmark.
+    """Check that all names are scenes of this benchmark.
 
     Raises:
-        InputError: If one is not, or is empty.
+        InputError: If a name is unknown or empty.
     """
     unknown = [name or "''" for name in only if name not in SCENES]
     if unknown:
         raise InputError(
-            f"--only {','.join(unknown)}: no such scene; accepted: {', '.join(SCENES)}"
+            f"--only {','.join(unknown)}: unknown scene; accepted: {', '.join(SCENES)}"
         )
 
 
 def run_bench_scene(name: str) -> dict[str, Any]:
-    """All settings of one scene."""
-    # schemes that diverge are rows, the engine need not print them too
+    """Run all settings of one scene."""
+    # a diverging scheme becomes a row, so the engine need not print a warning
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         return measure(bench_scene(name), settings())
@@ -141,7 +142,18 @@ def run_bench_scene(name: str) -> dict[str, Any]:
 
 
 def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
-    """Rows of some settings of a scene, and of its references."""
+    """Run settings of a scene, and its references.
+
+    Args:
+        bench: Scene with its drives.
+        chosen: Settings to run.
+
+    Returns:
+        ``rows`` and ``references``.
+
+    Raises:
+        ComputationError: If a reference fails.
+    """
     rigid = rigid_arm(bench.scene, bench.drives)
     own, names, shown = {}, {}, []
     for level in ("full", *LEVELS):
@@ -160,7 +172,7 @@ def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
             "reference": names["full"],
         }
         if setting.integrator in SPLITS:
-            # its force comes from Python: there is no cost to compare
+            # its force comes from Python, so its cost is not comparable
             with split(bench.scene, setting, bench.drives) as whole:
                 got = attempt_assembled(whole)
                 base |= _costs(got, None)
@@ -174,9 +186,20 @@ def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
 
 
 def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
-    """A level without an error of its steps, its name, and how far it can be trusted.
+    """Solve a level without time-step error.
 
-    RK4 with the inputs of the middle of each step; DOP853 for the bench at ``full``.
+    The method is RK4 with inputs taken in the middle of each step, or DOP853 for scene
+    ``bench`` at level ``full``.
+
+    Args:
+        bench: Scene with its drives.
+        level: Level of the joint.
+
+    Returns:
+        Run, name of the reference, and a row with estimates of its own error.
+
+    Raises:
+        ComputationError: If the reference fails.
     """
     step = REFERENCE_STEP
     runs, assemblies = [], []
@@ -204,13 +227,13 @@ def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
 def _rows(
     base: dict[str, Any], got: SettingOutcome, full: Run, level: Run
 ) -> list[dict[str, Any]]:
-    """A row a quantity.
+    """One row per quantity of a setting.
 
     Args:
-        base: What they share.
-        got: The run.
-        full: Reference of level ``full``.
-        level: That of the run's own level.
+        base: Columns that the rows share.
+        got: Outcome of the setting.
+        full: Reference at level ``full``.
+        level: Reference at the level of the setting.
     """
     row = base | {"outcome": got.outcome, "reason": got.reason}
     off: dict[str, float] = {}
@@ -247,7 +270,7 @@ def _rows(
 
 
 def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
-    """Sub-steps, harmonics left out, time; against a rigid arm where there is one."""
+    """Sub-steps, unresolved harmonics and times; relative cost if ``rigid`` is set."""
     keys = ("sub_steps", "unresolved", "wall_s", "steps_ratio", "cost")
     found: dict[str, Any] = dict.fromkeys(keys)
     if got.run is None or got.assembly is None:
@@ -267,7 +290,7 @@ def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
 
 
 def _mark_pareto(rows: list[dict[str, Any]]) -> None:
-    """Whether a row is Pareto-optimal in cost and error, for every quantity."""
+    """Mark the rows that are Pareto-optimal in cost and error, for every quantity."""
     for row in rows:
         if row["quantity"] == DAMPING:
             row["pareto"] = None
@@ -285,7 +308,15 @@ def _mark_pareto(rows: list[dict[str, Any]]) -> None:
 
 
 def write_files(result: dict[str, Any], folder: Path) -> list[str]:
-    """Tables as CSV and JSON, one picture a scene; their paths."""
+    """Write tables as CSV and JSON, and one picture per scene.
+
+    Args:
+        result: Result of :func:`run_joint_cost`.
+        folder: Folder of the files.
+
+    Returns:
+        Paths of the written files.
+    """
     from swgjoint.view.plots.bench_joint import joint_picture
 
     rows = result["rows"]

@@ -1,9 +1,10 @@
-r"""Modes of an arm as its steps have them, and the damping that the steps add.
+r"""Modes of an arm in discrete time, and the damping that the integrator adds.
 
-Motors give the torque that holds the start of the scene and no more: their loops would
-damp the modes, too. The step of the engine about that start is linearised in positions,
-velocities, actuator states and what the plugin remembers. Eigenvalues :math:`\lambda`
-of that matrix are :math:`e^{sh}`, with
+The motors apply only the constant torque that holds the start of the scene, because
+their control loops would also damp the modes. One step of the engine about that start
+is linearised in positions, velocities, actuator states and the memory of the plugin.
+The eigenvalues :math:`\lambda` of the resulting matrix are :math:`e^{sh}`, where h is
+the time step, and
 
 .. math:: f = |s|/2\pi, \qquad \zeta = -\operatorname{Re} s/|s|.
 """
@@ -28,21 +29,22 @@ from swgjoint.typing import Array
 Complex = NDArray[np.complex128]
 
 EXACT_STEP = 1e-5
-"""Of RK4, which gives what the model has of itself [s]."""
+"""Time step of RK4, which gives the modes of the model without numerical damping [s].
+"""
 LOWEST, HIGHEST = 5.0, 60.0
-"""Modes that are looked at [Hz]."""
+"""Frequency range of the modes [Hz]."""
 LIGHT = 0.3
-"""Damping ratio below which a mode is one of the drives and not of a loop."""
+"""Damping ratio below which a mode belongs to the drives, not to a control loop [-]."""
 ALIKE = 0.7
-"""Product of two shapes of unit length from which on they are the same mode."""
+"""Scalar product of two mode shapes of unit length above which they match [-]."""
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _CHANGE = {"q": 1e-6, "v": 1e-4, "act": 1e-6, "plugin": 1e-1}
 
 
 def release_motors(whole: Assembly) -> Assembly:
-    """The same with the motors' torque at the start in place of their loops.
+    """Replace the motor loops of an assembly by their constant torque at the start.
 
-    Loops with an integral or a torque-speed line stay.
+    Loops with an integral or a torque-speed line are kept.
     """
     model = copy.copy(whole.model)
     data = mujoco.MjData(model)
@@ -57,20 +59,20 @@ def release_motors(whole: Assembly) -> Assembly:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Modes:
-    """Oscillating modes, those with a positive frequency."""
+    """Oscillating modes, each with a positive frequency."""
 
     s: Complex
-    """[1/s]. Shape (n,)."""
+    """Complex eigenvalues [1/s], shape (n,)."""
     shape: Complex
-    """Positions at the output, of unit length. Shape (nq, n)."""
+    """Mode shapes: positions at the output, of unit length, shape (nq, n)."""
 
     def where(self, chosen: NDArray[Any]) -> Modes:
-        """Some of them, by mask or index."""
+        """Select modes by mask or index."""
         return Modes(s=self.s[chosen], shape=self.shape[:, chosen])
 
 
 def modes(whole: Assembly) -> Modes:
-    """All oscillating modes; none where a step gives no numbers."""
+    """All oscillating modes; none if a step gives values that are not finite."""
     matrix, nq = step_matrix(whole), whole.model.nq
     if not np.isfinite(matrix).all():
         return Modes(s=np.zeros(0, complex), shape=np.zeros((nq, 0), complex))
@@ -85,7 +87,7 @@ def modes(whole: Assembly) -> Modes:
 
 
 def step_matrix(whole: Assembly) -> Array:
-    """The linearised step about the start, by central differences. Shape (n, n)."""
+    """Linearise one step about the start by central differences, shape (n, n)."""
     model = whole.model
     data = mujoco.MjData(model)
     set_start(whole, data)
@@ -113,15 +115,15 @@ def step_matrix(whole: Assembly) -> Array:
 
 
 def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
-    """Entries of the engine's state that take part, and how far each is moved.
+    """Entries of the engine's state to vary, and the increment of each.
 
-    Time does not, nor where hysteresis and bristles are relaxed: they stick.
+    Time is excluded, and so are the states of hysteresis and bristles: they stick.
     """
     model = whole.model
     flexible = whole.motor_position[whole.motor_position >= 0]
     turn = np.full(model.nq, _CHANGE["q"])
     rate = np.full(model.nv, _CHANGE["v"])
-    turn[flexible] *= 100.0  # a rotor turns so many times as far as its link
+    turn[flexible] *= 100.0  # a rotor turns about 100 times as far as its link
     rate[whole.motor_velocity[whole.motor_velocity >= 0]] *= 100.0
     first = 1 + model.nq + model.nv + model.na
     remembered = [
@@ -140,7 +142,7 @@ def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
 
 
 def own_modes(whole: Assembly) -> Modes:
-    """Modes up to :data:`HIGHEST` without what steps add, by RK4, lowest first."""
+    """Modes up to :data:`HIGHEST` without numerical damping, lowest first."""
     exact = replace(whole, model=copy.copy(whole.model))
     exact.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     exact.model.opt.timestep = EXACT_STEP
@@ -154,10 +156,13 @@ def own_modes(whole: Assembly) -> Modes:
 
 
 def numerical_damping(whole: Assembly) -> list[tuple[float, float, float]]:
-    """Frequency [Hz], own damping ratio and what the steps add, by mode, lowest first.
+    """Numerical damping of the modes, lowest first.
 
-    A mode at the scene's step is the one of the nearest shape. Where steps leave a mode
-    no oscillation, they add what is missing to a damping ratio of one.
+    Modes at the time step of the scene are matched by the closest shape. If no mode
+    matches, the time step suppresses the oscillation: the damping ratio is then one.
+
+    Returns:
+        Frequency [Hz], physical damping ratio and added damping ratio of each mode.
     """
     free = release_motors(whole)
     stepped = modes(free)

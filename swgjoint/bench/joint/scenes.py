@@ -1,11 +1,14 @@
-r"""Scenes of ``swgjoint bench joint``, and the equations of its bench by DOP853.
+r"""Scenes of ``swgjoint bench joint``, and the DOP853 solution of scene ``bench``.
+
+The equations of motion of scene ``bench`` are
 
 .. math::
     J\ddot\theta = \tau - \left(T(\Delta) + C\dot\Delta\right)(1/i + e_0'(\theta)),
     \qquad J_l\ddot\psi = T(\Delta) + C\dot\Delta - T_l
 
-with :math:`\Delta = \theta/i + e_0(\theta) - \psi` and the motor's loop :math:`\tau`
-written out: neither the map, nor the engine, nor the inputs held over a step are used.
+with :math:`\Delta = \theta/i + e_0(\theta) - \psi` and the torque :math:`\tau` of the
+motor loop written out. The solution uses neither the map nor the engine nor inputs that
+are constant over a step.
 """
 
 from __future__ import annotations
@@ -31,11 +34,12 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.typing import Array
 
 STIFFNESS = 3e4
-"""Of the bench's drive at no torque [N·m/rad]: 39 Hz between rotor and link."""
+"""Stiffness of the drive of scene ``bench`` at zero torque [N·m/rad]; rotor and link
+oscillate at 39 Hz."""
 DURATION = 1.6
 TIMING = {"hold_s": 0.1, "ramp_s": 0.3, "settle_s": 0.1}
 TRAVEL = 8.0
-"""Of every joint, about 7 deg/s of the link [deg]."""
+"""Travel of every joint [deg]; the links move at about 7 deg/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +57,11 @@ class BenchScene:
 
 
 def bench_scene(name: str) -> BenchScene:
-    """``bench``, ``ur5e`` or ``iiwa14``: a short sweep at ordinary speed.
+    """Scene ``bench``, ``ur5e`` or ``iiwa14``: a short sweep at ordinary speed.
 
-    The bench's drive hardens; the arms have catalogue drives. All have a kinematic
-    error of 1 arcmin at two and at four per input turn, and neither hysteresis nor
-    friction, so that RK4 is of the fourth order.
+    Scene ``bench`` has a hardening drive, the arms have catalogue drives. All drives
+    have a kinematic error of 1 arcmin at orders two and four per input turn. They have
+    neither hysteresis nor friction, so that RK4 converges with fourth order.
     """
     if name == "bench":
         return BenchScene(
@@ -87,7 +91,7 @@ def bench_scene(name: str) -> BenchScene:
 
 
 SCENES = ("ur5e", "iiwa14", "bench")
-"""The longest first."""
+"""Scenes, the longest run first."""
 
 
 def _bench() -> Scene:
@@ -116,11 +120,14 @@ def _bench() -> Scene:
 
 
 def exact(run: Run, whole: Assembly) -> Run:
-    """The run of the bench by DOP853, at the samples of another run of it.
+    """Solve scene ``bench`` by DOP853, at the samples of another run.
 
     Args:
-        run: At level ``full``; it starts there.
-        whole: The scene at a small step: its motion, gains, load and inertias.
+        run: Run at level ``full``, which defines start and sample times.
+        whole: Assembled scene at a small step: motion, gains, load and inertias.
+
+    Raises:
+        ComputationError: If the integration fails.
     """
     from scipy.integrate import solve_ivp
     from scipy.interpolate import CubicHermiteSpline
@@ -141,7 +148,7 @@ def exact(run: Run, whole: Assembly) -> Run:
         return inside * (STIFFNESS + cubic * inside**2) + top * (s - inside)
 
     def twisted(y: Array) -> tuple[float, float, float]:
-        """Torsion, torque on the link, d torsion/d theta."""
+        """Torsion, torque on the link, and derivative of the torsion by theta."""
         theta, psi, theta_rate, psi_rate = y.tolist()
         error = ERROR * sum(cos(n * theta) for n in ORDERS)
         by = 1.0 / i - ERROR * sum(n * sin(n * theta) for n in ORDERS)
@@ -181,7 +188,7 @@ def exact(run: Run, whole: Assembly) -> Run:
         max_step=5e-3,
     )
     if not found.success:
-        raise ComputationError(f"reference of the bench: {found.message}")
+        raise ComputationError(f"reference of scene 'bench': {found.message}")
     torsion, torque = np.array([twisted(y)[:2] for y in found.y.T]).T
     position = found.y[1][:, None]
     return replace(

@@ -1,14 +1,14 @@
-r"""The two splits that the joint does not use, for comparison with its scheme.
+r"""Two implicit-explicit splits, for comparison with the scheme of the joint.
 
-A native tendon of stiffness :math:`K_0` lies between rotor and link, which the
-``discrete`` integrator takes implicitly, and the rest of the drive is an explicit
-force. ``plain split``: no more than that. ``corrected split``: the integrator's own
-shift :math:`-h K_0\,\dot l` along the tendon, l its length, is taken out and
-:math:`-\mu h K_0\,\dot\Delta` put in along the gradient of the torsion,
+A native tendon of stiffness :math:`K_0` connects rotor and link. The ``discrete``
+integrator treats it implicitly; the rest of the drive is an explicit force. This is the
+``plain split``. The ``corrected split`` also removes the integrator's own term
+:math:`-h K_0\,\dot l` along the tendon of length l and adds
+:math:`-\mu h K_0\,\dot\Delta` along the gradient of the torsion, with
 :math:`\mu = 0.2`.
 
-The force comes from Python through ``mjcb_passive``, which is global and slow: nothing
-but this benchmark does so, and its cost is not compared.
+The force is computed in Python through ``mjcb_passive``, which is global and slow. Only
+this benchmark uses it, and the cost of the splits is not compared.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 
 SPLITS = {"plain split": None, "corrected split": 0.2}
-"""With mu, None for no correction."""
+"""Splits with their coefficient mu; None for no correction."""
 
 
 @contextmanager
 def split(
     scene: Scene, setting: Setting, drives: Mapping[str, DriveMap]
 ) -> Iterator[Assembly]:
-    """The scene at level ``full`` under a split, as long as the context lasts.
+    """Assemble a scene at level ``full`` with a split, for the duration of the context.
 
     Args:
-        scene: With drives that have neither hysteresis nor friction.
-        setting: Its integrator names the split.
-        drives: As for :func:`assemble_setting`.
+        scene: Scene whose drives have neither hysteresis nor friction.
+        setting: Setting whose integrator names the split.
+        drives: Maps by name, as for :func:`assemble_setting`.
     """
     full, linear = (
         assemble_setting(
@@ -49,7 +49,7 @@ def split(
         )
         for level in ("full", "linear")
     )
-    # the map says what happens, the model has its native tendons
+    # forces come from the map of level full, tendons from the linear model
     whole = replace(
         linear,
         transmissions=tuple(
@@ -57,13 +57,13 @@ def split(
             for t in full.transmissions
         ),
     )
-    # a split has the integrator's own damping of its tendon
+    # a split keeps the integrator's own damping of its tendon
     restore_damping(whole.model, [t.attached for t in linear.transmissions])
     joints = []
     for j, t in enumerate(linear.transmissions):
         tendon = whole.model.tendon(t.attached.tendon).id
         law = full.transmissions[j].attached.drive
-        # half of the largest stiffness is what keeps a split stable
+        # a split is stable from half of the largest stiffness on
         stiffness = max(t.attached.stiffness, 0.5 * law.max_stiffness)
         whole.model.tendon_stiffness[tendon] = stiffness
         joints.append((j, law, stiffness))
@@ -71,7 +71,7 @@ def split(
 
     def rest(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         if model.nq != whole.model.nq:
-            return  # the rigid arm, which tells the torques of the motion
+            return  # the rigid arm that provides the torques of the motion
         discrete = model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE
         h = float(model.opt.timestep) if discrete and mu is not None else 0.0
         for j, law, k in joints:

@@ -1,4 +1,4 @@
-"""Run time of the 2D simulation of meshing over teeth, mesh, torque and positions."""
+"""Run time of the 2D meshing simulation over teeth, mesh, torque and positions."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from swgjoint.gear.design.design import Design
 
 DESIGN = "reference-2d"
 POSITIONS = 3
-"""After the first one, which counts as set-up."""
+"""Number of positions after the first one, which counts as set-up."""
 
 
 def _measure(
     design: Design, *, part: float = 1.0, positions: int = POSITIONS
 ) -> dict[str, Any]:
-    """Half of a drive over a pitch: CPU time of a position and of the set-up."""
+    """CPU time of one position and of the set-up, for half of a drive over a pitch."""
     marks = [time.process_time()]
     torque = part * ratings_of(design).rated_torque
     row: dict[str, Any] = {"model": "2d", "torque_Nm": torque}
@@ -43,25 +43,25 @@ def _measure(
 
 
 def teeth(count: float) -> dict[str, Any]:
-    """One pitch diameter, teeth of its module, rated torque, rigid wave generator."""
+    """Vary the number of teeth at constant pitch diameter; rigid wave generator."""
     design = Design.load(f"size-25-{int(count) // 2}")
     return _measure(design.with_changes({"wave_generator.bearing": None}))
 
 
 def mesh(refinement: float) -> dict[str, Any]:
-    """The same drive on a finer mesh; its size is the number of nodes."""
+    """Refine the mesh of one drive; the size is the number of nodes."""
     design = Design.load(DESIGN).with_changes({"mesh.refinement": refinement})
     row = _measure(design)
     return row | ({"size": float(row["nodes"])} if "nodes" in row else {})
 
 
 def torque(part: float) -> dict[str, Any]:
-    """A part of rated torque."""
+    """Vary the torque; ``part`` is the torque divided by rated torque."""
     return _measure(Design.load(DESIGN), part=part)
 
 
 def angles(count: float) -> dict[str, Any]:
-    """A turn of so many positions, as far apart as in the other sweeps."""
+    """Vary the number of positions, with the same spacing as in the other sweeps."""
     row = _measure(Design.load(DESIGN), positions=int(count))
     each = row.get("seconds")
     return row | {"seconds": None if each is None else each * count}

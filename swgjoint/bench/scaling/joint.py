@@ -1,4 +1,4 @@
-"""Time of driven joints over their number, of batches and of maps with harmonics."""
+"""Run time of driven joints over their number, batch size and number of harmonics."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ from swgjoint.joint.fitting import Fitting
 from swgjoint.maps.drive_map import DriveMap
 
 STEP = 1e-3
-"""[s]."""
+"""Time step [s]."""
 DRIVE = "CSG-25-100"
 HARMONICS = 4
-"""Of the map in chains and batches."""
+"""Number of harmonics of the map in chains and batches."""
 ARM = 6
-"""Joints of the arms of a batch."""
+"""Number of joints of each arm in a batch."""
 ROTOR = 1e-4
-"""Inertia [kg·m²]."""
+"""Rotor inertia [kg·m²]."""
 REPEATS = 5
+"""Number of timed repetitions."""
 SPEED = 1e-3
-"""Of the links [rad/s]: slow enough for the step to carry all harmonics."""
+"""Speed of the links [rad/s], so slow that the time step resolves all harmonics."""
 
 
 def map_with(harmonics: int) -> DriveMap:
-    """A catalogue drive with orders 1 to n, each of 2 %/n of ripple."""
+    """Map of a catalogue drive with orders 1 to n, each with a ripple of 2 %/n."""
     base = DriveMap.from_catalogue(DRIVE, kinematic_error_arcmin=0.0)
     base = replace(base, hysteresis=())
     n = 1 + harmonics
@@ -56,7 +57,16 @@ def map_with(harmonics: int) -> DriveMap:
 def chain_spec(
     joints: int, *, level: str = "full", harmonics: int = HARMONICS
 ) -> tuple[mujoco.MjSpec, list[JointDrive]]:
-    """Links of equal size, axes in turns, without gravity, a drive in every joint."""
+    """Chain of equal links with alternating axes and a drive in every joint.
+
+    Args:
+        joints: Number of joints.
+        level: Level of the joints, see :func:`swgjoint.joint.attach.attach`.
+        harmonics: Number of harmonics of the map.
+
+    Returns:
+        Specification without gravity, and the drives in the order of the joints.
+    """
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
@@ -65,7 +75,7 @@ def chain_spec(
     for k in range(joints):
         body = body.add_body(name=f"link{k}", pos=[0, 0, 0.1])
         body.add_joint(name=f"j{k}", axis=[[0, 0, 1], [0, 1, 0]][k % 2])
-        # a place, too: without one a saved file would have no inertia
+        # without a position, a saved file would contain no inertia
         body.mass, body.inertia, body.ipos = 0.5, [0.05, 0.05, 0.05], [0, 0, 0]
         body.explicitinertial = True
     fitting = Fitting(drive=drive, level=level, rotor_inertia=ROTOR, friction=False)
@@ -76,7 +86,13 @@ def chain_spec(
 def chain_model(
     joints: int, *, level: str = "full", harmonics: int = HARMONICS
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The chain with all its links turning slowly."""
+    """Compiled chain with all links rotating slowly.
+
+    Args:
+        joints: Number of joints.
+        level: Level of the joints, see :func:`swgjoint.joint.attach.attach`.
+        harmonics: Number of harmonics of the map.
+    """
     spec, drives = chain_spec(joints, level=level, harmonics=harmonics)
     model = spec.compile()
     data = mujoco.MjData(model)
@@ -88,7 +104,12 @@ def chain_model(
 
 
 def best(work: Callable[[], object], count: int) -> float:
-    """CPU seconds of one of ``count`` units, the least of some runs after a first."""
+    """CPU time of one unit of work: the shortest of several runs after a warm-up [s].
+
+    Args:
+        work: Function to time.
+        count: Number of units in one call.
+    """
     work()
     took = []
     for _ in range(REPEATS):
@@ -99,7 +120,7 @@ def best(work: Callable[[], object], count: int) -> float:
 
 
 def _step_seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> float:
-    """Time of one step [s], always the same ones."""
+    """CPU time of one step [s]; every repetition runs the same steps."""
     mujoco.mj_step(model, start, 50)
 
     def work() -> None:
@@ -116,7 +137,7 @@ def _step_seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> fl
 
 
 def chain(joints: float) -> dict[str, Any]:
-    """A step of a chain at level full, its ratio to the rigid chain."""
+    """Time of one step of a chain at level ``full``, and its ratio to a rigid chain."""
     n = int(joints)
     steps = max(20, 4000 // n**2)
     rigid = _step_seconds(*chain_model(n, level="rigid"), steps)
@@ -130,7 +151,7 @@ def chain(joints: float) -> dict[str, Any]:
 
 
 def batch(arms: float) -> dict[str, Any]:
-    """Time of one step of all arms of a batch on one thread, and wall time on two."""
+    """CPU time of one step of a batch, and step rates on one and two threads."""
     from mujoco.batch import Batch
 
     n = int(arms)
@@ -152,13 +173,13 @@ def batch(arms: float) -> dict[str, Any]:
 
 
 def step_with_harmonics(count: float) -> dict[str, Any]:
-    """A step of one joint at level full."""
+    """Time of one step of a single joint at level ``full``."""
     seconds = _step_seconds(*chain_model(1, harmonics=int(count)), 2000)
     return {"model": "full", "seconds": seconds, "steps_per_s": 1.0 / seconds}
 
 
 def evaluation(count: float) -> dict[str, Any]:
-    """Torques of a map at a thousand states at once."""
+    """Time of one torque of a map, evaluated at 1000 states at once."""
     drive, rng = map_with(int(count)), np.random.default_rng(1)
     low, high = drive.torsion_knots[[0, -1]]
     torsion = rng.uniform(low, high, 1000)

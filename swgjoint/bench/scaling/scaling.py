@@ -1,10 +1,10 @@
-"""``swgjoint bench scaling``: how time grows with the size of what is computed.
+"""``swgjoint bench scaling``: growth of the run time with the size of the problem.
 
-Steps of a chain of driven joints, of batches, and of a joint whose map has ever more
-harmonics; evaluations of the map in Python; positions of the plane finite elements over
-teeth, nodes, torque and their number. Time is that of one core's process; an exponent p
-is fitted to time ~ size^p, and of the chain and the harmonics to the end of the sweep,
-where what does not grow no longer counts.
+Measured are time steps of a chain of driven joints, of batches and of a joint whose map
+has more and more harmonics; evaluations of the map in Python; and positions of the 2D
+finite elements over teeth, nodes, torque and number of positions. Times are CPU times.
+An exponent p is fitted to time ~ size^p. For chain, harmonics and teeth the fit uses
+only the larger sizes, where constant overhead is negligible.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from swgjoint.view.plots.scaling import scaling_picture
 
 @dataclass(frozen=True, kw_only=True)
 class SizeSweep:
-    """One parameter, and what takes time with it."""
+    """One varied parameter and the function that measures the run time."""
 
     name: str
     label: str
     """Label of the axis."""
     per: str
-    """What ``seconds`` of a row are per."""
+    """Unit of work that ``seconds`` of a row refer to."""
     sizes: tuple[float, ...]
     measure: Callable[[float], dict[str, Any]]
-    """By size: ``seconds`` and more columns of the row."""
+    """Function of the size that returns ``seconds`` and further columns of the row."""
     from_size: float = 0.0
-    """From which on the exponent is fitted."""
+    """Smallest size used for the fit of the exponent."""
 
 
 SWEEPS = (
@@ -93,14 +93,14 @@ SWEEPS = (
     ),
     SizeSweep(
         name="torque",
-        label="torque over the rated one",
+        label="torque / rated torque",
         per="position",
         sizes=(0.25, 1, 4),
         measure=scaling_fe.torque,
     ),
     SizeSweep(
         name="angles",
-        label="positions of a turn",
+        label="positions in a turn",
         per="turn",
         sizes=(2, 8, 32),
         measure=scaling_fe.angles,
@@ -116,13 +116,19 @@ def run_scaling(
 ) -> dict[str, Any]:
     """Measure all sweeps.
 
+    Args:
+        folder: Folder for table, JSON and picture; None writes nothing.
+        sweeps: Sweeps to measure.
+        progress: Called after every size.
+
     Returns:
         ``rows``: ``bench``, ``sweep``, ``model``, ``setting``, ``size``, ``seconds``,
         ``per``, ``wall_s`` of the measurement, ``outcome``; ``error``, ``unit`` and
-        ``reference`` as in the other parts, null: nothing is compared here. ``fits``:
-        ``sweep``, ``exponent``, ``coefficient``, ``from_size``, ``spread``, the largest
-        factor between fit and measurement, ``seconds_per_unit`` between the smallest
-        and the largest size. ``provenance``, ``files``, ``wall_s``.
+        ``reference`` exist as in the other benchmarks but are null, because nothing is
+        compared. ``fits``: ``sweep``, ``per``, ``exponent``, ``coefficient``,
+        ``from_size``, ``spread`` (largest factor between fit and measurement),
+        ``seconds_per_unit`` (slope between the smallest and the largest size). Also
+        ``provenance``, ``files``, ``wall_s``.
     """
     begin = time.perf_counter()
     rows: list[dict[str, Any]] = []
@@ -169,7 +175,15 @@ def run_scaling(
 def fit_exponent(
     sweep: SizeSweep, rows: Sequence[dict[str, Any]]
 ) -> dict[str, Any] | None:
-    """Least squares of the logarithms; None with fewer than two sizes."""
+    """Fit an exponent by least squares of the logarithms.
+
+    Args:
+        sweep: Sweep to fit.
+        rows: Rows of all sweeps.
+
+    Returns:
+        Entry of ``fits``; None for fewer than two sizes.
+    """
     used = [r for r in rows if r["sweep"] == sweep.name and r["seconds"]]
     used = [r for r in used if r["size"] >= sweep.from_size]
     if len(used) < 2:

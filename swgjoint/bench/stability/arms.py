@@ -1,9 +1,9 @@
-"""Arms with catalogue drives in all joints: falling freely, and under control.
+"""Arms with catalogue drives in all joints: in free fall, and under control.
 
-A falling arm without damping, control or joint limits keeps kinetic, torsion and
-gravity energy together. Under control the arm runs its bundled scene, and the largest
-error of a link is that against the explicit integrator RK4 at a small step; it holds
-the part of a step by which the positions of the engine lead.
+A falling arm without damping, control or joint limits conserves the sum of kinetic,
+torsion and gravity energy. Under control the arm runs its bundled scene. The error is
+the largest difference of a link angle from the explicit integrator RK4 at a small step;
+it includes the part of a step by which the positions of the engine lead.
 """
 
 from __future__ import annotations
@@ -28,26 +28,27 @@ from swgjoint.view.run import run_scene
 
 SCENES = ("ur5e-catalogue", "iiwa14-sweep", "kinova-sweep", "panda-sweep")
 STEPS = (5e-4, 1e-3, 2e-3)
-"""[s]."""
+"""Time steps [s]."""
 FALL = 2.0
-"""Time that an arm falls [s]."""
+"""Duration of a fall [s]."""
 FALL_SPEED = 100.0
-"""Of the rotors that the region is asked for in a fall [rad/s]; they reach 2000."""
+"""Rotor speed for which the stability region is checked in a fall [rad/s]; the rotors
+reach 2000 rad/s."""
 SAMPLES = 200
 EXACT_STEP = 1e-4
-"""Of the reference RK4 [s]."""
+"""Time step of the RK4 reference [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmTask:
-    """One arm."""
+    """One arm and its time steps."""
 
     scene: str
     steps: tuple[float, ...] = STEPS
 
 
 def run_arm(task: ArmTask) -> list[StabilityRow]:
-    """Fall and controlled motion of one arm at all steps."""
+    """Run fall and controlled motion of one arm at all time steps."""
     scene = Scene.load_file(task.scene)
     names = {
         scene.joint_settings(joint).drive or "" for joint in RigidArm(scene.arm).joints
@@ -106,7 +107,7 @@ def run_arm(task: ArmTask) -> list[StabilityRow]:
 def _fall(
     task: ArmTask, scene: Scene, drives: dict[str, DriveMap], step: float
 ) -> StabilityRow:
-    """The arm let go from the first pose of its scene."""
+    """Release the arm from the first pose of its scene."""
     arm = RigidArm(scene.arm)
     spec = arm.spec()
     spec.option.timestep = step
@@ -172,7 +173,7 @@ def _let_go(
     for k in range(SAMPLES + 1):
         if k:
             mujoco.mj_step(model, data, steps // SAMPLES * parts)
-        # the scheme lives half a step back
+        # the midpoint rule refers to positions half a step earlier
         weighed.qpos[:] = data.qpos - 0.5 * h * data.qvel
         weighed.qvel[:] = data.qvel
         mujoco.mj_fwdPosition(model, weighed)

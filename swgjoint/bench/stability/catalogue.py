@@ -1,4 +1,4 @@
-"""Catalogue drives with kinematic error: ten seconds of free running, torque steps."""
+"""Catalogue drives with kinematic error: free running for 10 s, and torque steps."""
 
 from __future__ import annotations
 
@@ -12,29 +12,30 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import rpm
 
 FREE_STEP, FREE_TIME = 1e-3, 10.0
-"""[s]."""
+"""Time step and duration of free running [s]."""
 FREE_SPEEDS = (200.0 * rpm, 2000.0 * rpm)
-"""Of the rotor: that at which catalogues rate drives, and a tenth of it [rad/s]."""
+"""Rotor speeds [rad/s]: the rated speed of catalogues and a tenth of it."""
 STEPS = (5e-4, 1e-3, 2e-3)
-"""At which a drive is hit by its ratcheting torque [s]."""
+"""Time steps of the runs with a step of the ratcheting torque [s]."""
 LINKS = (1e-2, 1.0)
-"""Inertia of the link [kg·m²]: a wrist, a shoulder."""
+"""Link inertias of a wrist and of a shoulder [kg·m²]."""
 COUNT, SHORTEST = 2000, 0.5
+"""Minimum number of time steps, and minimum duration [s], after a torque step."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueDrive:
-    """A row of the catalogue."""
+    """One drive of the catalogue."""
 
     name: str
     rotor: float
-    """Its wave generator alone, the lightest rotor that it can have [kg·m²]."""
+    """Inertia of the wave generator alone, the lightest possible rotor [kg·m²]."""
     ratcheting: float
-    """Torque at which a tooth is skipped [N·m]."""
+    """Ratcheting torque [N·m]."""
 
 
 def catalogue_drives() -> list[CatalogueDrive]:
-    """All rows with ratings."""
+    """All drives of the catalogue that have ratings."""
     return [
         CatalogueDrive(
             name=f"CSG-{row['size']:.0f}-{row['ratio']:.0f}",
@@ -46,7 +47,7 @@ def catalogue_drives() -> list[CatalogueDrive]:
 
 
 def run_drive(task: CatalogueDrive) -> list[StabilityRow]:
-    """Free running and torque steps of one drive."""
+    """Run free running and torque steps of one drive."""
     drive = with_kinematic_error(
         DriveMap.from_catalogue(task.name, kinematic_error_arcmin=0.0)
     )

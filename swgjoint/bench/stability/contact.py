@@ -1,10 +1,11 @@
-"""Chains of two links that lie on a floor or press against joint limits for seconds.
+"""Chains of two links resting on a floor or against joint limits for seconds.
 
-Gravity lets a chain with catalogue drives fall on a floor or into the limits of its
-joints, where it stays. Kinetic, torsion and gravity energy together may then only fall,
-but for what a contact stores while it is pressed; so a gain is the rise of the mean
-over a part of the run above the lowest one before. Chains without losses have the
-contact damping of :data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO`.
+Gravity lets a chain with catalogue drives fall onto a floor or against the limits of
+its joints, where it comes to rest. From then on, the sum of kinetic, torsion and
+gravity energy may only decrease, except for the energy stored in a compressed contact.
+A gain is therefore the rise of the mean over a part of the run above the lowest earlier
+mean. Lossless chains have the contact damping of
+:data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO`.
 """
 
 from __future__ import annotations
@@ -26,23 +27,24 @@ from swgjoint.typing import Array
 
 KINDS = ("floor", "limit")
 MASSES = (0.3, 3.0)
-"""Of each link [kg]."""
+"""Mass of each link [kg]."""
 DAMPING_RATIOS = (0.0, 0.001, 0.02)
 STEPS = (5e-4, 1e-3, 2e-3)
-"""[s]."""
+"""Time steps [s]."""
 DURATION = 4.0
-"""[s]; a chain has come down after 0.2."""
+"""Duration of a run [s]; a chain reaches the floor after 0.2 s."""
 SPEED = 100.0
-"""Of the rotors that the region is asked for [rad/s]; falling they reach ten times
-that."""
+"""Rotor speed for which the stability region is checked [rad/s]; during the fall the
+rotors reach ten times this speed."""
 PARTS = 10
-"""Of a run, over which the energy is averaged: a bounce gives back what it stored."""
+"""Number of parts of a run over which the energy is averaged, because a bounce returns
+the energy that it stored."""
 SAMPLES = 2000
 FINE = 4
-"""Steps in one of the runs that tell what contacts give by themselves."""
+"""Step refinement of the runs that show the energy gain of the contacts alone."""
 LIFTS = (-0.02, -0.01, 0.01, 0.02)
-"""Angles of the upper link at the start of those runs: bounces tell small differences
-apart [rad]."""
+"""Initial angles of the upper link in those runs [rad]; they are varied because bounces
+amplify small differences."""
 
 _XML = """
 <mujoco>
@@ -76,12 +78,12 @@ class ContactTask:
 
     @property
     def name(self) -> str:
-        """Drive, mass of a link and what it comes to lie on."""
+        """Drive, mass of a link and kind of contact."""
         return f"{self.drive.name} {self.mass:g} kg, {self.kind}"
 
 
 def contact_tasks(*, full: bool) -> list[ContactTask]:
-    """All drives of the catalogue, both kinds and masses, or a few of them."""
+    """Tasks for all catalogue drives, kinds and masses, or for a subset."""
     drives, masses = catalogue_drives(), list(MASSES)
     if not full:
         drives, masses = drives[3::8], masses[:1]
@@ -92,7 +94,7 @@ def contact_tasks(*, full: bool) -> list[ContactTask]:
 
 
 def run_contact(task: ContactTask) -> list[StabilityRow]:
-    """All rows of one chain."""
+    """Run one chain at all time steps and damping ratios."""
     return [
         _row(task, step, damping)
         for step, damping in product(task.steps, task.damping_ratios)
@@ -142,7 +144,16 @@ def _row(task: ContactTask, step: float, damping: float) -> StabilityRow:
 def chain(
     task: ContactTask, step: float, damping: float
 ) -> tuple[mujoco.MjSpec, list[JointDrive]]:
-    """The chain of a task, lossless but for a damping ratio."""
+    """Chain of a task, lossless except for a damping ratio.
+
+    Args:
+        task: Drive, kind of contact and mass.
+        step: Time step [s].
+        damping: Damping ratio of the drives [-].
+
+    Returns:
+        Specification and the drives of shoulder and elbow.
+    """
     drive = with_kinematic_error(
         DriveMap.from_catalogue(task.drive.name, kinematic_error_arcmin=0.0)
     )
@@ -168,7 +179,18 @@ def chain(
 def lie_down(
     spec: mujoco.MjSpec, drives: list[JointDrive], step: float, lift: float = 0.0
 ) -> Array:
-    """Mean energies of the parts of a run, over what the fall sets free; inf if bad."""
+    """Run a chain and average its energy over the parts of the run.
+
+    Args:
+        spec: Specification of the chain.
+        drives: Drives of its joints.
+        step: Time step [s].
+        lift: Initial angle of the upper link [rad].
+
+    Returns:
+        Mean change of energy in each part, relative to the energy that the fall
+        releases, shape (PARTS,) [-]; infinite if the run diverged.
+    """
     spec.option.timestep = step
     model = spec.compile()
     data, weighed = mujoco.MjData(model), mujoco.MjData(model)
@@ -183,7 +205,7 @@ def lie_down(
     stored, energy = [], []
     for _ in range(round(DURATION / step / every)):
         mujoco.mj_step(model, data, every)
-        # the scheme lives half a step back
+        # the midpoint rule refers to positions half a step earlier
         weighed.qpos[:] = data.qpos - 0.5 * step * data.qvel
         weighed.qvel[:] = data.qvel
         mujoco.mj_fwdPosition(model, weighed)
@@ -204,7 +226,7 @@ def lie_down(
 
 
 def gain(energy: Array) -> float:
-    """Largest rise of a mean above the lowest one before."""
+    """Largest rise of a mean above the lowest earlier mean [-]."""
     if not np.isfinite(energy).all():
         return float("inf")
     return float((energy - np.minimum.accumulate(energy)).max())

@@ -1,12 +1,13 @@
 r"""Numerical damping of the torsional vibration, measured on one step of the engine.
 
-A small linear vibration of rotor against link goes from (torsion, rate) to the next
-step by a matrix of two columns, one step each. With its eigenvalue
-:math:`\lambda = |\lambda| e^{j\varphi}`,
+For a small vibration of rotor against link, one step multiplies (torsion, rate) by a
+2 x 2 matrix, whose columns are measured with one step each. Its eigenvalue
+:math:`\lambda = |\lambda| e^{j\varphi}` gives the damping ratio
 
-.. math:: \zeta = -\ln|\lambda| / \sqrt{\varphi^2 + \ln^2|\lambda|}
+.. math:: \zeta = -\ln|\lambda| / \sqrt{\varphi^2 + \ln^2|\lambda|},
 
-is to be read beside the damping ratio of the drive itself. Negative: the step pumps.
+which compares with the damping ratio of the drive itself. If it is negative, the
+integrator adds energy.
 """
 
 from __future__ import annotations
@@ -20,15 +21,18 @@ from swgjoint.bench.stability.joint import RATIO, REACH, Joint
 from swgjoint.typing import Array
 
 SMALL = 1e-5
-"""Torsion of the vibration over that at full torque [-]."""
+"""Torsion of the vibration relative to the torsion at full torque [-]."""
 
 
 def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
-    """Damping ratio that the steps give to a joint that has none, None if no number.
+    """Damping ratio that the integrator gives to an undamped joint.
 
     Args:
-        joint: Without kinematic error and damping.
-        sub_steps: Parts of a step.
+        joint: Joint without kinematic error and damping.
+        sub_steps: Number of parts of a time step.
+
+    Returns:
+        Damping ratio [-]; None if the step gives values that are not finite.
     """
     model, attached = joint.model, joint.attached
     whole = float(model.opt.timestep)
@@ -42,7 +46,7 @@ def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
     data = mujoco.MjData(model)
 
     def after(torsion: float, speed: float) -> Array:
-        """Torsion and rate over the frequency, one step later."""
+        """Torsion, and rate divided by the frequency, one step later."""
         mujoco.mj_resetData(model, data)
         rate = np.array([ratio * speed * frequency, 0.0])
         data.qpos[joint.q] = np.array([ratio * torsion, 0.0]) + behind * rate
@@ -55,7 +59,7 @@ def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
     small = SMALL * REACH
     try:
         model.opt.timestep = h
-        # a native tendon of no length at all is left out of the engine's metric
+        # nonzero torsion in both: the engine's metric omits a tendon of zero length
         first = after(small, 0.0)
         second = after(small, small) - first
     finally:

@@ -1,4 +1,4 @@
-"""The grid of stiffness, inertias and steps, and what happens to each joint of it."""
+"""Grid of stiffness, inertias and time steps, and the runs of each of its joints."""
 
 from __future__ import annotations
 
@@ -26,50 +26,50 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import rpm
 
 STIFFNESS = (1e2, 1e3, 1e4, 1e5, 1e6, 1e7)
-"""[N·m/rad]."""
+"""Stiffnesses at zero torque [N·m/rad]."""
 ROTOR = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
-"""[kg·m²]."""
+"""Rotor inertias [kg·m²]."""
 LINK = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2)
-"""[kg·m²]."""
+"""Link inertias [kg·m²]."""
 STEPS = (1e-5, 1e-4, 5e-4, 1e-3, 2e-3, 5e-3)
-"""[s]."""
+"""Time steps [s]."""
 FEWER_ROTOR = (1e-7, 1e-5, 1e-3)
 FEWER_LINK = (1e-4, 1e-2, 1.0, 1e2)
 FEWER_STEPS = (1e-4, 1e-3, 2e-3, 5e-3)
 FAST = 2000.0 * rpm
-"""Rotor running free: the speed at which catalogues rate drives [rad/s]."""
+"""Speed of the free-running rotor [rad/s]: the rated speed of catalogues."""
 SLOW = 20.0
-"""Rotor under load [rad/s]."""
+"""Speed of the rotor under load [rad/s]."""
 RATCHETING = 5.0
-"""Torque step over the repeated peak torque: in the catalogue ratcheting begins at 2.7
-to 4.9 times that torque."""
+"""Torque step divided by the repeated peak torque [-]; in the catalogue the ratcheting
+torque is 2.7 to 4.9 times the repeated peak torque."""
 COUNT, SHORTEST = 2000, 0.2
-"""A run has so many steps and lasts so long at least [s]."""
+"""Minimum number of time steps, and minimum duration [s], of a run."""
 FINE = 1e-5
-"""Step of the run that tells what contacts give by themselves [s]."""
+"""Time step of the run that shows the energy gain of the contacts alone [s]."""
 
 OTHERS = {
     "discrete, never cut": ("full", "discrete"),
     "native tendon": ("native", "discrete"),
     "RK4": ("full", "RK4"),
 }
-"""Other schemes: level and integrator, at the whole step and without a region."""
+"""Other schemes: level and integrator, run at the full step without region check."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GridJoint:
-    """One joint of the grid with the steps at which it is run."""
+    """One joint of the grid with its time steps, in SI units."""
 
     stiffness: float
     rotor: float
     link: float
     steps: tuple[float, ...]
     others: bool = False
-    """Whether the other schemes run it, too."""
+    """Whether the other schemes are run as well."""
 
     @property
     def name(self) -> str:
-        """Its numbers, SI."""
+        """Stiffness and inertias in SI units."""
         return f"K={self.stiffness:.0e} J={self.rotor:.0e} Jl={self.link:.0e}"
 
     @property
@@ -80,7 +80,7 @@ class GridJoint:
 
 
 def grid(*, full: bool) -> list[GridJoint]:
-    """All joints, the slowest first, or a third of them at fewer steps."""
+    """All joints, or a subset at fewer time steps; the slowest run first."""
     rotors, links = (ROTOR, LINK) if full else (FEWER_ROTOR, FEWER_LINK)
     joints = [
         GridJoint(
@@ -96,11 +96,11 @@ def grid(*, full: bool) -> list[GridJoint]:
 
 
 def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
-    """How the joints of the grid are run, with the speed that the region is asked for.
+    """Starts of the joints of the grid, with the rotor speed for the region check.
 
-    ``free``: turning at rated speed without torque. ``loaded``: turning slowly under
-    full torque. ``released``: at rest under full torque, let go. ``step``: turning
-    slowly, hit by a torque that would make a real drive ratchet.
+    ``free``: rotation at rated speed without torque. ``loaded``: slow rotation under
+    full torque. ``released``: release at rest from full torque. ``step``: slow
+    rotation, then a torque step at which a real drive would ratchet.
     """
     full = drive.ratings.repeated_peak
     return {
@@ -112,7 +112,7 @@ def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
 
 
 def run_joint(task: GridJoint) -> list[StabilityRow]:
-    """All rows of one joint."""
+    """Run one joint at all time steps."""
     drive = hardening_drive(task.stiffness)
     references = {
         group: reference(
@@ -136,7 +136,7 @@ def _default(
     step: float,
     references: dict[str, TwoMassReference],
 ) -> Iterator[StabilityRow]:
-    """The default scheme, cut into sub-steps or refused as its region asks for."""
+    """Rows of the default scheme, with the sub-steps that its region requires."""
     joint = make_joint(drive, rotor=task.rotor, link=task.link, step=step)
     plain = _without_error(task, drive, step)
     for group, (start, speed) in situations(drive).items():
@@ -165,7 +165,7 @@ def _default(
 
 
 def _dropped(task: GridJoint, drive: DriveMap, step: float) -> StabilityRow:
-    """The default scheme with the link dropped on a floor."""
+    """Row of the default scheme for a link dropped on a floor."""
     joint = drop_joint(drive, rotor=task.rotor, link=task.link, step=step)
     region = joint.region(impact_speed(), contacts=True)
     parts = region.sub_steps
@@ -175,7 +175,7 @@ def _dropped(task: GridJoint, drive: DriveMap, step: float) -> StabilityRow:
     course = drop(joint, duration=duration, sub_steps=parts)
     own = 0.0
     if course.gain > GAIN:
-        # bounces tell small differences apart, so the start is varied
+        # bounces amplify small differences, so the start is varied
         finer = max(4 * parts, round(step / FINE))
         own = max(
             drop(joint, duration=duration, sub_steps=finer, speed=speed).gain
@@ -202,7 +202,7 @@ def _others(
     step: float,
     references: dict[str, TwoMassReference],
 ) -> Iterator[StabilityRow]:
-    """What the other schemes make of the same joint."""
+    """Rows of the other schemes for the same joint."""
     for scheme, (level, integrator) in OTHERS.items():
         joint = make_joint(
             drive,

@@ -1,7 +1,7 @@
-"""Contact impacts: a link with its drive and rotor dropped on a floor.
+"""Contact impacts: a link with drive and rotor is dropped on a floor.
 
-The rotor turns with the link. Kinetic, torsion and gravity energy together may only
-fall: the floor takes some, and what it stores while it is pressed comes back.
+The rotor turns with the link. The sum of kinetic, torsion and gravity energy may only
+decrease: the floor dissipates energy, and returns what it stores under compression.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
 
 LENGTH = 0.3
-"""From the joint to the ball at the end of the link [m]."""
+"""Distance from the joint to the ball at the end of the link [m]."""
 HEIGHT = 0.05
-"""Angle of the link above its contact with the floor at the start [rad]."""
+"""Initial angle of the link above its contact with the floor [rad]."""
 TIP_SPEED = 1.0
-"""Of the ball, towards the floor [m/s]."""
+"""Initial speed of the ball towards the floor [m/s]."""
 GRAVITY = 9.81
 
 _BALL = 0.03
@@ -40,8 +40,15 @@ _XML = """
 
 
 def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Joint:
-    """A joint whose link is a bar with a ball above a floor; see :func:`drop`."""
-    # nearly all of the inertia is the mass at the end
+    """Joint whose link is a bar with a ball above a floor; see :func:`drop`.
+
+    Args:
+        drive: Map of the drive.
+        rotor: Inertia of rotor and wave generator [kg·m²].
+        link: Inertia of the link about the joint [kg·m²].
+        step: Time step [s].
+    """
+    # almost all of the inertia is the mass at the end
     own = 0.01 * link
     text = _XML.format(
         step=step,
@@ -73,20 +80,20 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
 
 
 def impact_speed() -> float:
-    """Impact speed of the rotor before the impact [rad/s]."""
+    """Rotor speed before the impact [rad/s]."""
     return RATIO * TIP_SPEED / LENGTH
 
 
 def drop(
     joint: Joint, *, duration: float, sub_steps: int, speed: float = 1.0
 ) -> Course:
-    """Let the link fall on the floor and lie there.
+    """Let the link fall on the floor and come to rest.
 
     Args:
-        joint: From :func:`drop_joint`.
-        duration: [s].
-        sub_steps: Parts of a step.
-        speed: Of the ball at the start over :data:`TIP_SPEED`.
+        joint: Joint from :func:`drop_joint`.
+        duration: Duration of the run [s].
+        sub_steps: Number of parts of a time step.
+        speed: Initial speed of the ball relative to :data:`TIP_SPEED` [-].
     """
     model, law = joint.model, joint.law
     whole = float(model.opt.timestep)
@@ -128,6 +135,6 @@ def drop(
 
 
 def _weight(model: mujoco.MjModel, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Energy of the link in gravity [J]."""
+    """Gravity energy of the link [J]."""
     mass = float(model.body("link").mass[0])
     return np.asarray(mass * GRAVITY * LENGTH * np.sin(angle))

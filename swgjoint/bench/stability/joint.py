@@ -1,12 +1,14 @@
-r"""One joint for the stability study: rotor, drive and link, run and weighed.
+r"""One joint of the stability study: rotor, drive and link, and their energy.
+
+Without damping, if the load applies a constant torque T and the motor a torque T/i, the
+energy
 
 .. math::
     E = \tfrac12 J\dot\theta^2 + \tfrac12 J_l\dot\psi^2 + V(\Delta)
         - \frac{T}{i}\theta + T\psi
 
-is constant without damping when the load takes a constant torque T and the motor gives
-T/i: the last two terms are their work, taken off. The discrete scheme is a midpoint
-rule in positions half a step back, and E is measured there.
+is constant; the last two terms subtract the work of both torques. The discrete scheme
+is a midpoint rule for positions half a step earlier, where E is evaluated.
 """
 
 from __future__ import annotations
@@ -31,15 +33,16 @@ RATIO = 100
 ORDERS = (2, 4)
 """Orders of the kinematic error per turn of the input."""
 ERROR = 1.0 * arcmin
-"""Amplitude of each [rad]."""
+"""Amplitude of each order [rad]."""
 REACH = 4e-3
-"""Torsion at full torque, repeated peak [rad]; CSG-25-100: 204 N·m over 5e4 N·m/rad."""
+"""Torsion at full torque, the repeated peak torque [rad]; for comparison, CSG-25-100
+has 204 N·m and 5e4 N·m/rad."""
 HARDENING = 2.0
-"""Rise of the stiffness from no torque to full torque over its value there, less 1."""
+"""Relative increase of the stiffness from zero to full torque [-]."""
 SAMPLES = 400
-"""Samples of the energy along a run."""
+"""Number of energy samples along a run."""
 GAIN = 0.05
-"""Share of kinetic and torsion energy that counts as a gain."""
+"""Fraction of kinetic and torsion energy above which a rise counts as a gain [-]."""
 
 _XML = """
 <mujoco>
@@ -55,7 +58,7 @@ _XML = """
 
 
 def with_kinematic_error(drive: DriveMap) -> DriveMap:
-    """The mean curve of a drive, without losses, with the study's kinematic error."""
+    """Mean torsion curve of a drive, with the study's kinematic error and no losses."""
     count = len(ORDERS)
     potential = np.zeros((1 + count, *drive.potential.shape[1:]))
     ends = np.zeros((1 + count, 2, 2))
@@ -74,7 +77,10 @@ def with_kinematic_error(drive: DriveMap) -> DriveMap:
 
 
 def hardening_drive(stiffness: float) -> DriveMap:
-    """A hardening spring with kinematic error; stiffness at no torque [N·m/rad]."""
+    """Map of a hardening spring with kinematic error.
+
+    ``stiffness`` is the value at zero torque [N·m/rad].
+    """
     knots = np.linspace(-REACH, REACH, 9)
     quartic = stiffness * HARDENING / 12.0 / REACH**2
     # V = K s²/2 + c s⁴, expanded about every knot
@@ -117,41 +123,43 @@ def hardening_drive(stiffness: float) -> DriveMap:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """How a run starts."""
+    """Initial conditions of a run."""
 
     torque: float = 0.0
-    """Torque of the drive on the link at the start [N·m]."""
+    """Initial torque of the drive on the link [N·m]."""
     load: float = 0.0
-    """Torque of the load against the link from then on; the motor gives T/i [N·m]."""
+    """Constant load torque T on the link during the run [N·m]; the motor applies T/i.
+    """
     speed: float = 0.0
-    """Speed of the rotor [rad/s]."""
+    """Initial rotor speed [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """States of a run, the first included, and what became of it."""
+    """Sampled states of a run, including the initial one."""
 
     time: Array
-    """[s]. Shape (n,)."""
+    """Sample times [s], shape (n,)."""
     position: Array
-    """Rotor and link where the scheme lives [rad]. Shape (n, 2)."""
+    """Angles of rotor and link at the instants of the scheme [rad], shape (n, 2)."""
     velocity: Array
-    """[rad/s]. Shape (n, 2)."""
+    """Speeds of rotor and link [rad/s], shape (n, 2)."""
     energy: Array
-    """Less the work put in [J]. Shape (n,)."""
+    """Energy minus the work of the applied torques [J], shape (n,)."""
     scale: float
-    """Kinetic and torsion energy at the start, with what the load winds up [J]."""
+    """Initial kinetic and torsion energy plus the energy that the load stores in the
+    drive [J]."""
     diverged: bool
     sub_steps: int
 
     @property
     def balance(self) -> float:
-        """Mean energy of the last tenth, less that at the start, over the scale."""
+        """Mean change of energy in the last tenth, divided by the scale [-]."""
         return self._tenths()[-1]
 
     @property
     def gain(self) -> float:
-        """Largest sustained gain: of the mean over a tenth of the run, at least 0."""
+        """Largest mean gain over a tenth of the run, divided by the scale, >= 0 [-]."""
         return max(0.0, *self._tenths())
 
     def _tenths(self) -> list[float]:
@@ -163,21 +171,29 @@ class Course:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Joint:
-    """A compiled joint."""
+    """A compiled joint of rotor, drive and link."""
 
     model: mujoco.MjModel
     attached: JointDrive
     law: DriveMap
-    """What acts between rotor and link."""
+    """Map that acts between rotor and link."""
     q: NDArray[np.intp]
+    """Indices of rotor and link in the positions."""
     v: NDArray[np.intp]
+    """Indices of rotor and link in the velocities."""
     midpoint: bool
-    """Whether the scheme lives half a step behind the positions."""
+    """Whether the scheme refers to positions half a step earlier."""
 
     def region(
         self, speed: float, *, torque: float = 0.0, contacts: bool = False
     ) -> Region:
-        """Whether its integration holds at a speed of the rotor and a torque."""
+        """Check whether the integration of the joint is stable.
+
+        Args:
+            speed: Largest rotor speed [rad/s].
+            torque: Largest output torque [N·m].
+            contacts: Whether the link touches other bodies.
+        """
         return check_region(
             self.attached,
             timestep=float(self.model.opt.timestep),
@@ -187,7 +203,12 @@ class Joint:
         )
 
     def energy(self, position: Array, velocity: Array) -> Array:
-        """Kinetic and torsion energy [J]. Shape (n,)."""
+        """Kinetic and torsion energy [J], shape (n,).
+
+        Args:
+            position: Angles of rotor and link [rad], shape (n, 2).
+            velocity: Speeds of rotor and link [rad/s], shape (n, 2).
+        """
         theta, psi = position.T
         inertia = np.array([self.attached.rotor_inertia, self.attached.link_inertia])
         torsion = self.law.torsion(theta, psi)
@@ -202,7 +223,14 @@ class Joint:
         sub_steps: int = 1,
         samples: int = SAMPLES,
     ) -> Course:
-        """Run it for a time, with steps cut into equal parts."""
+        """Run the joint.
+
+        Args:
+            start: Initial conditions and load.
+            duration: Duration [s].
+            sub_steps: Number of equal parts of a time step.
+            samples: Largest number of samples after the initial one.
+        """
         model = self.model
         whole = float(model.opt.timestep)
         try:
@@ -254,15 +282,15 @@ def make_joint(
     level: str = "full",
     integrator: str = "discrete",
 ) -> Joint:
-    """A joint without damping.
+    """Build a joint without damping.
 
     Args:
-        drive: Map.
+        drive: Map of the drive.
         rotor: Inertia of rotor and wave generator [kg·m²].
         link: Inertia of the link about the joint [kg·m²].
         step: Time step [s].
-        level: As for :func:`swgjoint.joint.attach.attach`.
-        integrator: MuJoCo's name.
+        level: Level of the joint, see :func:`swgjoint.joint.attach.attach`.
+        integrator: Name of the integrator in MuJoCo.
     """
     text = _XML.format(step=step, integrator=integrator, link=link)
     spec = mujoco.MjSpec.from_string(text)

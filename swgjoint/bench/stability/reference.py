@@ -1,11 +1,13 @@
-r"""Independent reference of the stability study: the two-mass equations by DOP853.
+r"""Independent reference of the stability study: two-mass equations, by DOP853.
+
+The equations of motion are
 
 .. math::
     J\ddot\theta = -T(\Delta)\,(1/i + e_0'(\theta)) + T_l/i, \qquad
     J_l\ddot\psi = T(\Delta) - T_l
 
-with :math:`\Delta = \theta/i + e_0(\theta) - \psi` and the spring written out, so that
-neither the map nor the engine is used.
+with :math:`\Delta = \theta/i + e_0(\theta) - \psi`. The spring is written out, so that
+the reference uses neither the map nor the engine.
 """
 
 from __future__ import annotations
@@ -30,9 +32,9 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 WINDOW = 0.1
-"""Time over which a run is compared [s]."""
+"""Longest time over which a run is compared [s]."""
 PHASE = 100.0
-"""Phase of the fastest torsion over which it is compared at most [rad]."""
+"""Largest phase of the torsional vibration over which a run is compared [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,14 +42,21 @@ class TwoMassReference:
     """Solution of one joint from one start."""
 
     window: float
-    """[s]."""
+    """Duration of the comparison [s]."""
     link: Callable[[Array], Array]
-    """Link angle at times inside the window [rad]."""
+    """Function that returns the link angle [rad] at times inside the window [s]."""
 
     def error(self, joint: Joint, start: Start, sub_steps: int) -> float | None:
         """Largest error of the link angle over the window [arcmin].
 
-        None where it holds fewer than four steps, or the run diverged.
+        Args:
+            joint: Joint to compare.
+            start: Initial conditions of the reference.
+            sub_steps: Number of parts of a time step.
+
+        Returns:
+            Error [arcmin]; None if the window contains fewer than four steps or the run
+            diverged.
         """
         step = float(joint.model.opt.timestep)
         steps = int(self.window / step)
@@ -68,10 +77,13 @@ def reference(
     """Solve the two-mass equations.
 
     Args:
-        stiffness: Of the drive at no torque [N·m/rad].
-        rotor: Inertia [kg·m²].
-        link: Inertia [kg·m²].
-        start: Torque, load and speed at the start.
+        stiffness: Stiffness of the drive at zero torque [N·m/rad].
+        rotor: Rotor inertia [kg·m²].
+        link: Link inertia [kg·m²].
+        start: Initial torque and speed, and load.
+
+    Raises:
+        ComputationError: If the integration fails.
     """
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq

@@ -1,17 +1,20 @@
-"""Stability of the joint on stiff and extreme cases: everything that can go wrong.
+"""Stability of the joint in stiff and extreme cases.
 
 - ``free``, ``loaded``, ``released``, ``step``, ``drop``: a grid of stiffness, inertias
-  and steps (:mod:`stability_grid`), kinematic error of 1 arcmin at 2 and 4 per turn;
-- ``free 10 s``, ``ratchet``: every CSG row of the catalogue
-  (:mod:`stability_catalogue`);
-- ``fall``, ``sweep``: four arms with catalogue drives (:mod:`stability_arms`);
-- ``contact``: chains of two links that lie on a floor or press against joint limits
-  (:mod:`stability_contact`).
+  and time steps (:mod:`swgjoint.bench.stability.grid`), with a kinematic error of
+  1 arcmin at orders 2 and 4 per input turn;
+- ``free 10 s``, ``ratchet``: every CSG drive of the catalogue
+  (:mod:`swgjoint.bench.stability.catalogue`);
+- ``fall``, ``sweep``: four arms with catalogue drives
+  (:mod:`swgjoint.bench.stability.arms`);
+- ``contact``: chains of two links that rest on a floor or against joint limits
+  (:mod:`swgjoint.bench.stability.contact`).
 
-But for two thirds of the last, no run has physical damping, so whatever energy appears
-is the integrator's, or the contacts', which a much finer run tells. A gain is
-sustained: the mean of energy less work over a tenth of the run, above that at the
-start, over the kinetic and torsion energy at the start and what the load winds up.
+Except for two thirds of the ``contact`` runs, no run has physical damping. Any energy
+gain therefore comes from the integrator or from the contacts; a run with a much smaller
+step shows the gain of the contacts alone. A gain is the mean of energy minus work over
+a tenth of the run, minus the initial value. It is divided by the sum of the initial
+kinetic and torsion energy and the energy that the load stores in the drive.
 """
 
 from __future__ import annotations
@@ -55,8 +58,8 @@ REFERENCE = (
 )
 SCHEME = (
     "discrete gradient of the potential, predicted per joint and solved with the arm by"
-    " MuJoCo's discrete integrator; steps outside its region in up to"
-    f" {MAX_SUB_STEPS} sub-steps, else refused"
+    " MuJoCo's discrete integrator; steps outside its stability region are divided into"
+    f" up to {MAX_SUB_STEPS} sub-steps, or refused"
 )
 
 
@@ -70,15 +73,15 @@ def run_stability(
     """Run the study.
 
     Args:
-        full: The whole grid instead of a third of its joints at four steps.
-        jobs: Processes.
-        folder: Where table and picture go; None writes nothing.
+        full: Whether the whole grid is run instead of a subset at four time steps.
+        jobs: Number of processes.
+        folder: Folder for table and picture; None writes nothing.
         progress: Called after every joint, drive or arm.
 
     Returns:
-        ``rows``, ``default_scheme``, ``unexplained``, ``counts`` by group and scheme,
-        ``shares`` of the outcomes of the default scheme, ``refused_share``,
-        ``arms_refused``, ``free_running``, what the columns mean, ``files``,
+        ``rows``, ``default_scheme``, ``scheme``, ``unexplained``, ``counts`` by group
+        and scheme, ``shares`` of the outcomes of the default scheme, ``refused_share``,
+        ``arms_refused``, ``free_running``, ``error_unit``, ``reference``, ``files``,
         ``wall_s``.
     """
     begin = time.perf_counter()
@@ -116,8 +119,8 @@ def run_stability(
 
 
 def run_task(task: Task) -> list[StabilityRow]:
-    """All rows of one joint, drive or arm."""
-    # schemes that diverge are counted, the engine need not print them too
+    """Run one joint, drive, arm or chain."""
+    # a diverging scheme becomes a row, so the engine need not print a warning
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         if isinstance(task, GridJoint):
@@ -132,7 +135,15 @@ def run_task(task: Task) -> list[StabilityRow]:
 
 
 def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
-    """Table and picture in a folder; their paths."""
+    """Write table and picture.
+
+    Args:
+        rows: Rows of the study.
+        folder: Folder of the files.
+
+    Returns:
+        Paths of the written files.
+    """
     from swgjoint.view.plots.stability import stability_picture
 
     table = [row.to_json() for row in rows]
@@ -145,21 +156,21 @@ def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
 
 
 def summary(result: dict[str, Any]) -> list[str]:
-    """Lines for the terminal: what the study adds up to."""
+    """Summary of the study as lines for the terminal."""
     share, free = result["shares"], result["free_running"]
     own = [row for row in result["rows"] if row["scheme"] == DEFAULT]
     parts = ", ".join(f"{name} {100.0 * share[name]:.1f} %" for name in OUTCOMES)
     lines = [
         f"default scheme: {result['scheme']}",
-        f"{len(own)} runs of it: {parts}",
+        f"{len(own)} runs with the default scheme: {parts}",
         f"arms with catalogue drives at 0.5 to 2 ms: {result['arms_refused']} refused",
-        f"{free['runs']} free joints over 10 s at 1 ms: lost"
-        f" {100.0 * free['largest_loss']:.2f} % at most, gained"
+        f"{free['runs']} free joints over 10 s at 1 ms: energy loss at most"
+        f" {100.0 * free['largest_loss']:.2f} %, gain at most"
         f" {100.0 * max(0.0, free['largest_gain']):.2g} %",
         f"error in arcmin: {result['reference']}",
     ]
     if not result["unexplained"]:
-        return [*lines, "no run of it gained energy or diverged without saying so"]
+        return [*lines, "no run of the default scheme gained energy or diverged"]
     return [
         *lines,
         f"unexplained: {len(result['unexplained'])}",

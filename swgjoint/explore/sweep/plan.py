@@ -72,7 +72,7 @@ class Parameter(Section):
 
 
 def _tabled(value: Any) -> bool:
-    """Whether tables and JSON can hold a value; TOML times, for example, they cannot."""
+    """Whether tables and JSON can hold a value, unlike the times of TOML."""
     if isinstance(value, dict):
         return all(map(_tabled, value.values()))
     if isinstance(value, list | tuple):

@@ -237,7 +237,7 @@ def _parts(
 
 
 def _drives(scene: Scene) -> dict[str, str | None]:
-    """Content of the drives that a scene names; catalogue drives are part of the code."""
+    """Content of the drives of a scene; catalogue drives are part of the code."""
     from swgjoint.drives.references import find_drive
 
     names = {section.drive for section in (scene.defaults, *scene.joints.values())}
