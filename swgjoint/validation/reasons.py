@@ -1,4 +1,4 @@
-"""Why a value differs from the printed one, from what the runs themselves show."""
+"""Reasons why a value differs from the printed one, derived from the runs."""
 
 from __future__ import annotations
 
@@ -8,58 +8,65 @@ from dataclasses import dataclass, field
 WITHIN = 15.0
 """Deviation beyond which a row needs a reason [%]."""
 MESH = 5.0
-"""Change between the mesh of the thesis and the finest one that is worth a word [%]."""
+"""Change between the mesh of the thesis and the finest mesh that is reported [%]."""
 SETTLED = 2.0
-"""Change from the last mesh but one to the finest up to which a value settles [%]."""
+"""Largest change from the second finest to the finest mesh of a settled value [%]."""
 
 _PLACES = {
     "fillet": "in the tooth fillets",
     "flank": "on the flanks",
     "bore": "on the bore, under the wave generator",
     "inside": "inside the teeth",
-    "contact": "beside loaded tooth contacts",
+    "contact": "next to loaded tooth contacts",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
-    """What is known about one row [MPa]."""
+    """Stresses of one row [MPa], and where they occur."""
 
     printed: float | None
+    """Value of the source."""
     value: float | None
-    """At the load by which rows are judged."""
+    """Stress at the load by which rows are judged."""
     nominal: float | None
-    """At T."""
+    """Stress at T."""
     away: float | None
-    """At the first load, away from loaded tooth contacts."""
+    """Stress at the judged load, away from loaded tooth contacts."""
     fine: float | None
-    """The same on the finest mesh."""
+    """Stress at the judged load on the finest mesh."""
     places: Mapping[str, int]
-    """How often the largest stress sat where."""
+    """Number of positions with the largest stress at each place."""
     load: str = "T/10"
-    """By which rows are judged."""
+    """Load by which rows are judged."""
     tenth: float | None = None
-    """At T/10 where rows are judged at T."""
+    """Stress at T/10 if rows are judged at T."""
     by_mesh: Mapping[float, float] = field(default_factory=dict)
-    """At T by refinement, where that is told of every row: contacts at edges, which are
-    the largest stresses in space, grow with the mesh."""
+    """Stress at T by refinement; empty unless every row reports it. The largest
+    stresses in 3D, at edge contacts, grow with mesh refinement."""
     failures: tuple[str, ...] = ()
     note: str = ""
 
 
 def percent(value: float | None, reference: float | None) -> float | None:
-    """Deviation of a value from a reference [%]; None without both."""
+    """Deviation of a value from a reference [%]; None if either is None.
+
+    Args:
+        value: Value to compare.
+        reference: Nonzero reference, in the same unit.
+    """
     if value is None or reference is None:
         return None
     return 100.0 * (value / reference - 1.0)
 
 
 def reason_for(facts: Facts) -> str | None:
-    """Reason of a row, None where there is nothing to explain.
+    """Reason of a row; None if there is nothing to explain.
 
-    Failures always, and what the meshes say where that is told; beyond 15 % at T/10 (in
-    space at T) where the stress sits, what the contacts and the mesh have to do with
-    it, and what the source leaves open; beyond 15 % at T only, the torque.
+    Failures are always listed, and so are the stresses by mesh if they are known. If
+    the deviation exceeds 15 % at the judged load (T/10, in 3D T), the reason names the
+    place of the stress, the influence of contacts and mesh, and what the source leaves
+    open. If it exceeds 15 % only at T, the reason is the torque.
     """
     parts = list(facts.failures)
     value = percent(facts.value, facts.printed)
@@ -69,15 +76,15 @@ def reason_for(facts: Facts) -> str | None:
     elif nominal is not None and value is not None and abs(nominal) > WITHIN:
         assert facts.nominal is not None and facts.value is not None
         parts.append(
-            f"torque: {nominal:+.0f} % at T, {value:+.0f} % at T/10; from T/10 to T"
-            f" ours changes by {facts.nominal - facts.value:+.0f} MPa"
+            f"torque: {nominal:+.0f} % at T, {value:+.0f} % at T/10; from T/10 to T our"
+            f" value changes by {facts.nominal - facts.value:+.0f} MPa"
         )
     parts += _ladder(facts.by_mesh)
     return "; ".join(parts) or None
 
 
 def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
-    """Stress mesh by mesh, and whether it settles."""
+    """Stress by mesh, and whether it settles."""
     if len(by_mesh) < 2:
         return []
     *_, before, last = by_mesh.values()
@@ -86,7 +93,8 @@ def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
     meshes = ", ".join(f"{mesh:g}" for mesh in by_mesh)
     settled = "settles" if abs(change) <= SETTLED else "has no converged value"
     return [
-        f"{values} MPa at refinement {meshes}, {change:+.1f} % at the end: {settled}"
+        f"{values} MPa at refinement {meshes}, {change:+.1f} % in the last step:"
+        f" {settled}"
     ]
 
 
@@ -111,7 +119,7 @@ def _deviation(facts: Facts, value: float) -> list[str]:
         if abs(change) > MESH:
             parts.append(f"the finest mesh changes it by {change:+.0f} %")
         else:
-            parts.append(f"no matter of the mesh ({change:+.0f} % on the finest)")
+            parts.append(f"independent of the mesh ({change:+.0f} % on the finest)")
     if facts.note:
         parts.append(facts.note)
     return parts

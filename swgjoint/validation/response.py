@@ -1,8 +1,8 @@
 """``swgjoint study response``: two-mass frequency response of a joint.
 
-At level ``linear`` resonance and anti-resonance are compared with closed forms. At
-``full`` the same chirp at rising torque shows what an amplitude-dependent stiffness,
-and hysteresis where the map has it, make of the one resonance.
+At level ``linear``, resonance and anti-resonance are compared with closed forms. At
+level ``full``, the same chirp with increasing torque shows how the amplitude-dependent
+stiffness, and the hysteresis if the map has one, change the resonance.
 """
 
 from __future__ import annotations
@@ -28,53 +28,57 @@ from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 LINK_RATIO = 1.0
-"""Link inertia over the reflected rotor's where no load is given: both masses take part
-in the resonance."""
+"""Default link inertia divided by the reflected rotor inertia [-]; with this value both
+masses take part in the resonance."""
 ROTOR_INERTIA = 1e-4
-"""A small motor with its wave generator, where no rotor is given [kg·m²]."""
+"""Default inertia of a small motor with wave generator [kg·m²]."""
 PERIOD = 16.0, 128.0
-"""Of the chirp, and the longest that a low anti-resonance may ask for [s]."""
+"""Default and longest period of the chirp [s]; a low anti-resonance needs a long one.
+"""
 AMPLITUDES = (0.002, 0.02, 0.1, 0.3)
-"""Motor torque at the output over the rated torque; the resonance multiplies it."""
+"""Motor torque at the output divided by the rated torque [-]; the resonance amplifies
+it."""
 STEP = 1e-4
+"""Time step [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Predicted:
-    """Closed forms at one stiffness."""
+    """Closed-form frequencies for one stiffness."""
 
     key: str
     stiffness: float
-    """[N·m/rad]."""
+    """Torsional stiffness [N·m/rad]."""
     meaning: str
-    """Which of the stiffnesses of a drive it is."""
+    """Definition of the stiffness."""
     locked: float
-    """Load on the drive with the motor locked: the anti-resonance [Hz]."""
+    """Anti-resonance: load on the drive with the motor locked [Hz]."""
     free: float
-    """Load and rotor against each other: the resonance [Hz]."""
+    """Resonance: load and rotor oscillating against each other [Hz]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredResponse:
-    """One response with what it should be and how it changes with the step."""
+    """One response with its closed forms and the response at half the time step."""
 
     case: str
     response: FrequencyResponse
     half_step: FrequencyResponse | None
+    """Response at half the time step; None if it was not computed."""
     expected: tuple[float, float] | None
-    """Anti-resonance and resonance in closed form [Hz]."""
+    """Closed forms of anti-resonance and resonance [Hz]."""
     reason: str | None = None
 
 
 def run_response(options: StudyOptions) -> StudyResult:
-    """Chirp one joint; ``only`` names other drives, maps or designs.
+    """Measure the response of one joint; ``only`` names other drives, maps or designs.
 
     Raises:
         InputError: If a drive is unknown or a fidelity does not fit it.
     """
     references = options.only or (DRIVE,)
     drives = {
-        # the closed forms are those of a drive without kinematic error
+        # the closed forms assume a drive without kinematic error
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
         for name in references
     }
@@ -109,14 +113,19 @@ def run_response(options: StudyOptions) -> StudyResult:
 
 
 def _masses(drive: DriveMap, options: StudyOptions) -> TwoMass:
-    """Rotor and load that are asked for, or those of the study."""
+    """Inertias of the options, or the defaults of the study."""
     rotor = options.rotor_inertia or ROTOR_INERTIA
     load = options.load_inertia or LINK_RATIO * drive.ratio**2 * rotor
     return TwoMass(rotor_inertia=rotor, link_inertia=load)
 
 
 def predictions(drive: DriveMap, masses: TwoMass) -> list[Predicted]:
-    """Frequencies with the stiffness at small torque and up to the rated torque."""
+    """Closed-form frequencies for K1 and for the mean stiffness up to rated torque.
+
+    Args:
+        drive: Map of the drive.
+        masses: Inertias of rotor and load.
+    """
     K1 = drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"]
     kinds = [
         ("K1", K1, f"K1, up to {drive.ratings.T1:.4g} N·m"),
@@ -156,7 +165,7 @@ def _closed_rows(name: str, one: Predicted) -> list[Row]:
 def _described(
     name: str, drive: DriveMap, masses: TwoMass, closed: list[Predicted]
 ) -> dict[str, Any]:
-    """Inertias and closed forms as keys of the JSON object."""
+    """Inertias and closed forms for the JSON object."""
     return {
         "drive": name,
         "ratio": drive.ratio,
@@ -188,7 +197,7 @@ def _closed_summary(
 def _measured(
     drive: DriveMap, masses: TwoMass, progress: Any
 ) -> list[MeasuredResponse]:
-    """The linear level at two steps, then ``full`` at every amplitude."""
+    """Measure level ``linear`` at two time steps, then ``full`` at every amplitude."""
 
     def expected(stiffness: float) -> tuple[float, float]:
         resonance = masses.resonance(stiffness, drive.ratio)
@@ -202,9 +211,10 @@ def _measured(
     if not fits:
         raise InputError(
             f"drive {drive.name!r} with a rotor of {masses.rotor_inertia:g} kg·m² and a"
-            f" load of {masses.link_inertia:g} kg·m²: {low:.3g} and {high:.3g} Hz;"
-            f" accepted in the simulation: {10.0 / PERIOD[1]:.2g} to"
-            f" {0.05 / STEP / 1.5:.0f} Hz; --closed-form needs none"
+            f" load of {masses.link_inertia:g} kg·m²: anti-resonance {low:.3g} Hz,"
+            f" resonance {high:.3g} Hz; accepted in the simulation:"
+            f" {10.0 / PERIOD[1]:.2g} to {0.05 / STEP / 1.5:.0f} Hz; --closed-form"
+            " needs no simulation"
         )
     chirp = Chirp(low=low / 6.0, high=top, period=period)
 
@@ -234,8 +244,8 @@ def _measured(
                 response=response,
                 half_step=None,
                 expected=expected(peak) if small else None,
-                reason=f"largest torque of the drive {response.largest_torque:.3g} N·m"
-                + ("; closed form: tangent without load" if small else ""),
+                reason=f"largest drive torque {response.largest_torque:.3g} N·m"
+                + ("; closed form for the tangent at zero load" if small else ""),
             )
         )
         progress(len(found))
@@ -278,7 +288,12 @@ def _summary(name: str, found: list[MeasuredResponse]) -> list[str]:
 
 
 def response_picture(name: str, found: list[MeasuredResponse]) -> bytes:
-    """PNG: magnitude of rotor and link speed per torque over frequency."""
+    """PNG: magnitude of rotor and link speed per motor torque over frequency.
+
+    Args:
+        name: Name of the drive, for the titles.
+        found: Responses to plot.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")

@@ -1,11 +1,12 @@
 """``swgjoint study ring``: the deflection test of a plain ring, thesis appendix A.
 
-A ring is pulled apart by two rollers in its bore. a_G is the deflection above a roller,
-b_G the inward one at 45 deg, and the thesis wants a_G + b_G to reach the whole depth of
-the teeth. Finite elements with large displacements stand beside a thin ring, with small
-deflections (closed form) and large rotations (elastica). The two differ by a factor of
-two in b_G: small deflections nearly vanish at 45 deg, and what the bent ring loses in
-mean radius grows with their square.
+Two rollers in the bore pull a ring apart. a_G is the outward deflection above a roller
+and b_G the inward deflection at 45 deg. The thesis requires a_G + b_G to reach the
+whole depth of the teeth. Finite elements with large displacements are compared with a
+thin ring, both for small deflections (closed form) and for large rotations (elastica).
+The two thin-ring results differ by a factor of two in b_G: the deflection at 45 deg
+almost vanishes for small deflections, while the loss of mean radius of the bent ring
+grows with the square of the deflection.
 """
 
 from __future__ import annotations
@@ -48,24 +49,34 @@ class RingCase:
     name: str
     ring: FreeRing
     pulled: dict[int, PulledRing]
-    """By refinement."""
+    """Results by mesh refinement."""
 
     def inward(self, crown: float, refinement: int) -> float:
-        """b_G at a deflection a_G of the crown [m]."""
+        """Inward deflection b_G at a given a_G [m].
+
+        Args:
+            crown: Deflection a_G above a roller [m].
+            refinement: Mesh refinement.
+        """
         found = self.pulled[refinement].deflection
         return float(-CubicSpline(found[:, 0], found[:, 1])(crown))
 
     def crown_at(self, total: float, refinement: int) -> float:
-        """a_G where a_G + b_G reaches a total [m]."""
+        """Deflection a_G at which a_G + b_G reaches a total [m].
+
+        Args:
+            total: Total a_G + b_G [m].
+            refinement: Mesh refinement.
+        """
         found = self.pulled[refinement].deflection
         return float(CubicSpline(found[:, 0] - found[:, 1], found[:, 0])(total))
 
     def elastica_inward(self, crown: float) -> float:
-        """b_G of a thin ring of the same mean radius [m]."""
+        """Inward deflection b_G of a thin ring with the same mean radius [m]."""
         return -float(elastica(self.ring.mean_radius, crown, ANGLES).deflection[1])
 
     def elastica_crown_at(self, total: float) -> float:
-        """a_G of that ring where a_G + b_G reaches a total [m]."""
+        """Deflection a_G of the thin ring at which a_G + b_G reaches a total [m]."""
         crown = np.linspace(0.8, 1.0, 5) * total
         inward = np.array([self.elastica_inward(float(a)) for a in crown])
         return float(CubicSpline(crown + inward, crown)(total))
@@ -75,7 +86,7 @@ def run_ring(options: StudyOptions) -> StudyResult:
     """Run the study: scaling of Table A.1, then the ring at two thicknesses.
 
     Raises:
-        InputError: If parts are chosen: the ring has none.
+        InputError: If parts are chosen, because the study has none.
     """
     if options.only:
         raise InputError(f"--only {','.join(options.only)}: the ring has no parts")
@@ -107,7 +118,7 @@ def run_ring(options: StudyOptions) -> StudyResult:
 
 
 def _scaling() -> list[Row]:
-    """Dimensions of Table A.1 from those of the reference design."""
+    """Dimensions of Table A.1, scaled from the reference design."""
     module = OUTSIDE_mm / REFERENCE_OUTSIDE_mm
     depth = (ADDENDUM + DEDENDUM) * module
     outside = (TEETH + 2.0 * ADDENDUM) * module
@@ -135,7 +146,7 @@ def _scaling() -> list[Row]:
 
 
 def _rows(case: RingCase) -> list[Row]:
-    """Deflections of one ring, and those of thin-ring theory."""
+    """Deflections of one ring, compared with thin-ring theory."""
     first, fine = REFINEMENTS[0], REFINEMENTS[-1]
     small = -float(small_deflection(pi / 4))
 

@@ -1,4 +1,4 @@
-"""Rows that a study file describes: printed value, place of our value, and reason."""
+"""Rows of a study file: printed value, location of our value, and reason."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from swgjoint.validation.rows import Row
 
 Text = Annotated[str, Field(min_length=1, max_length=300)]
 Path = Annotated[tuple[Text, ...], Field(strict=False, min_length=2)]
-"""Name of a computation, then keys of its result."""
+"""Name of a computation, followed by the keys of its result."""
 
 Values = Mapping[str, Mapping[str, Any]]
 """Results by the name of the computation; ``fault`` is the only key of a failed one."""
 
 
 class RowEntry(Section):
-    """One row. ``$name`` in a text stands for a text that the study supplies."""
+    """One row; ``$name`` in a text is replaced by a text of the study."""
 
     quantity: Text
     unit: Text
     source_value: float | None = None
-    """Value that the source prints; without it none is printed or it is held back."""
+    """Printed value; None if the source withholds it or prints none."""
     source: Path | None = None
-    """Place of the printed value instead, where it is one of a series."""
+    """Path of the printed value, if it is one of a series."""
     ours: Path
-    """Place of our value."""
+    """Path of our value."""
     converged: Path | None = None
-    """Place of the value on a finer mesh."""
+    """Path of the value on a finer mesh."""
     reason: Text
-    """Why ours differs, or what the source leaves open."""
+    """Why our value differs, or what the source leaves open."""
     columns: Mapping[str, Path] = {}
     """Further columns of the row."""
 
@@ -43,7 +43,7 @@ def value_at(values: Values, path: Sequence[str] | None) -> Any:
 
     Args:
         values: Results by computation.
-        path: Name of the computation and keys of its result.
+        path: Name of the computation, then keys of its result.
     """
     if path is None:
         return None
@@ -64,11 +64,11 @@ def fill_rows(
     """Rows of a study file with their values.
 
     Args:
-        entries: Rows as the file describes them.
-        values: Results by computation; a failed one is the reason of its rows.
-        texts: Texts by the name that stands for them.
+        entries: Rows as described in the file.
+        values: Results by computation; a failure becomes the reason of its rows.
+        texts: Replacements for ``$name`` in quantities and reasons, by name.
         case: Case of all rows.
-        **more: Columns that are the same in all rows.
+        **more: Further columns, equal in all rows.
     """
     rows = []
     for entry in entries:

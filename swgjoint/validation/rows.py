@@ -11,41 +11,42 @@ from swgjoint.errors import InputError
 from swgjoint.progress import Progress, silent
 
 Page = Callable[[], bytes | str | None]
-"""Makes the content of a file when it is written; None writes no file."""
+"""Function that makes the content of a file when it is written; None writes no file."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions:
-    """Options of ``swgjoint study``; a study refuses those that it has no use for."""
+    """Options of ``swgjoint study``; a study refuses options that it does not use."""
 
     only: tuple[str, ...] = ()
-    """Parts to run; all without."""
+    """Parts to run; empty for all."""
     model: str | None = None
-    """Fidelity, ``2d`` or ``3d``; None for the study's own."""
+    """Model, ``2d`` or ``3d``; None for the default of the study."""
     jobs: int = 1
-    """Processes."""
+    """Number of processes."""
     seeds: int | None = None
-    """Specimens to draw; None for the study's own number."""
+    """Number of specimens to draw; None for the default of the study."""
     folder: Path | None = None
-    """Where tables, report and plots go; None writes nothing."""
+    """Folder for tables, report and plots; None writes nothing."""
     load_inertia: float | None = None
-    """Inertia of the load about the output [kg·m²]; None for the study's own."""
+    """Load inertia about the output [kg·m²]; None for the default of the study."""
     rotor_inertia: float | None = None
-    """Of rotor and wave generator about the input [kg·m²]; None for the study's own."""
+    """Inertia of rotor and wave generator about the input [kg·m²]; None for the
+    default of the study."""
     closed_form: bool = False
     """Whether closed forms are enough, without simulation."""
     progress: Progress = silent
 
     def chosen(self, parts: Sequence[str]) -> list[str]:
-        """Those of a study's parts that are to be run, in its order.
+        """Parts of a study to run, in the order of the study.
 
         Raises:
-            InputError: If one is wanted that the study does not have.
+            InputError: If an unknown part is chosen.
         """
         unknown = [part for part in self.only if part not in parts]
         if unknown:
             raise InputError(
-                f"--only {','.join(unknown)}: no such part; accepted:"
+                f"--only {','.join(unknown)}: unknown part; accepted:"
                 f" {', '.join(parts)}"
             )
         return [part for part in parts if not self.only or part in self.only]
@@ -59,25 +60,25 @@ class Row:
     quantity: str
     unit: str
     source_value: float | None
-    """None where the source holds it back or prints no number."""
+    """Value of the source; None if the source withholds it or prints none."""
     ours: float | None
-    """None where the computation failed; ``reason`` then says why."""
+    """Our value; None if the computation failed, see ``reason``."""
     converged: float | None = None
-    """Mesh-converged value; None where it was not computed."""
+    """Mesh-converged value; None if it was not computed."""
     reason: str | None = None
-    """Why ours differs or is missing."""
+    """Why our value differs or is missing."""
     more: dict[str, Any] = field(default_factory=dict)
     """Further columns of this study."""
 
     def to_json(self) -> dict[str, Any]:
-        """All columns side by side."""
+        """All columns of the row."""
         named = {k: getattr(self, k) for k in self.__dataclass_fields__ if k != "more"}
         return named | self.more
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyResult:
-    """Rows of a study, what they add up to, and the files written."""
+    """Rows of a study, their summary, and the files written."""
 
     rows: tuple[Row, ...]
     summary: tuple[str, ...] = ()
@@ -85,8 +86,8 @@ class StudyResult:
     more: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON object."""
     content: Mapping[str, Any] | None = None
-    """Keys of the JSON file besides ``rows``; None: the file is the list of rows."""
+    """Keys of the JSON file besides ``rows``; if None, the file is a list of rows."""
     pages: Mapping[str, Page] = field(default_factory=dict)
     """Pictures and texts by file name."""
     files: tuple[str, ...] = ()
-    """Paths of the files that were written."""
+    """Paths of the written files."""

@@ -1,7 +1,7 @@
-"""One runner for all studies: their computations, their rows and their files.
+"""Runner of all studies: computations, rows and files.
 
 A study is a function that takes :class:`StudyOptions` and returns a
-:class:`StudyResult`. It computes and writes nothing to disk; :func:`run_study` does.
+:class:`StudyResult`. It does not write to disk; :func:`run_study` writes its files.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from swgjoint.validation.rows import StudyOptions, StudyResult
 
 @dataclass(frozen=True, kw_only=True)
 class StudyEntry:
-    """One study: where its function is, and what it compares."""
+    """One study: its function, title and models."""
 
     function: str
-    """``module:function``; the module is imported only when the study runs."""
+    """Function as ``module:function``; the module is imported when the study runs."""
     title: str
-    """What is compared, one line."""
+    """Description of the comparison in one line."""
     models: tuple[str, ...] = ()
-    """Values of ``--model`` that the study accepts; its own without."""
+    """Accepted values of ``--model``; empty if the study sets its own models."""
     model_reason: str = ""
-    """Why no other fidelity is accepted."""
+    """Why no other model is accepted."""
 
     def load(self) -> Callable[[StudyOptions], StudyResult]:
         """Import the function of the study."""
@@ -65,11 +65,11 @@ STUDIES = {
         function="catalogue.catalogue:run_catalogue",
         title="stiffness, losses and ratcheting of a family of drives, compared with"
         " a catalogue",
-        model_reason="every quantity here has its own fidelity",
+        model_reason="the model of each quantity is fixed",
     ),
     "response": StudyEntry(
         function="response:run_response",
-        title="two-mass frequency response of a joint against its closed form",
+        title="two-mass frequency response of a joint, compared with its closed form",
         models=("2d", "3d"),
     ),
     "control": StudyEntry(
@@ -85,18 +85,19 @@ STUDIES = {
 def run_study(name: str, options: StudyOptions) -> StudyResult:
     """Run a study and write its files.
 
-    A folder receives ``<name>.json``, ``<name>.csv`` with all rows, and the study's own
-    pictures and texts. A file that fails is a warning and costs no other.
+    The folder receives ``<name>.json`` and ``<name>.csv`` with all rows, and the
+    study's own pictures and texts. If a file cannot be written, a warning is issued and
+    the other files are still written.
 
     Args:
         name: Key of :data:`STUDIES`.
-        options: Parts, fidelity, processes and folder.
+        options: Parts, model, processes and folder.
 
     Returns:
-        The rows and what they add up to, with the paths of the files.
+        Rows and summary, with the paths of the files.
 
     Raises:
-        InputError: If there is no such study, or it does not accept an option.
+        InputError: If the study is unknown or does not accept an option.
     """
     entry = STUDIES.get(name)
     if entry is None:
@@ -118,7 +119,7 @@ def write_study(name: str, result: StudyResult, folder: Path) -> StudyResult:
     Args:
         name: Name of the study and of its tables.
         result: Rows and pages.
-        folder: Made if missing.
+        folder: Folder of the files, created if it does not exist.
 
     Returns:
         The result with the paths of the files.
@@ -142,7 +143,7 @@ class Computation(Protocol):
 
     @property
     def work(self) -> float:
-        """Rough work, so that long computations start first."""
+        """Estimated relative work, so that long computations start first."""
 
 
 Task = TypeVar("Task", bound=Computation)
@@ -156,13 +157,13 @@ def compute_all(
     *,
     stage: str = "computations",
 ) -> dict[str, Found]:
-    """Results of all computations by name; equal names are computed once.
+    """Results of all computations by name; computations of equal name run once.
 
     Args:
-        compute: Computes one task; picklable, called in other processes.
+        compute: Picklable function of one task, called in other processes.
         tasks: Computations of all parts.
-        options: Processes and progress.
-        stage: Name of the work for the progress.
+        options: Number of processes and progress.
+        stage: Name of the stage for the progress.
     """
     by_name = {task.name: task for task in tasks}
     ordered = sorted(by_name.values(), key=lambda task: -task.work)

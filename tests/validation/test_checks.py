@@ -135,18 +135,18 @@ def test_reasons_come_from_the_runs():
     failed = reason_for(facts(nominal=None, failures=("T: stuck",)))
     assert failed == "T: stuck"
     assert reason_for(facts(nominal=140.0)) == (
-        "torque: +40 % at T, +0 % at T/10; from T/10 to T ours changes by +40 MPa"
+        "torque: +40 % at T, +0 % at T/10; from T/10 to T our value changes by +40 MPa"
     )
     high = facts(value=130.0, places={"contact": 30, "fillet": 5}, away=104.0)
     assert reason_for(high) == (
-        "+30 % at T/10; largest beside loaded tooth contacts at 30 of 35 positions;"
+        "+30 % at T/10; largest next to loaded tooth contacts at 30 of 35 positions;"
         " +4 % away from the contacts"
     )
     mesh = reason_for(facts(value=80.0, fine=98.4, note="the source is silent"))
     assert "largest in the tooth fillets at 35 of 35 positions" in mesh
     assert "the finest mesh changes it by +23 %" in mesh
     assert mesh.endswith("the source is silent")
-    assert "no matter of the mesh (+1 %" in reason_for(facts(value=80.0, fine=81.0))
+    assert "independent of the mesh (+1 %" in reason_for(facts(value=80.0, fine=81.0))
 
 
 def test_values_at_both_loads_and_on_all_meshes():
@@ -161,9 +161,9 @@ def test_values_at_both_loads_and_on_all_meshes():
     )
     assert reason_for(told) == (
         "+50 % at T; -20 % at T/10, the torque adds +70 MPa; 150, 160, 162 MPa at"
-        " refinement 1, 1.3, 1.6, +1.2 % at the end: settles"
+        " refinement 1, 1.3, 1.6, +1.2 % in the last step: settles"
     )
     grows = reason_for(facts(by_mesh={1: 100.0, 1.3: 110.0, 1.6: 120.0}))
     assert grows is not None and grows.endswith(
-        "+9.1 % at the end: has no converged value"
+        "+9.1 % in the last step: has no converged value"
     )

@@ -245,7 +245,7 @@ def test_table_of_micro_geometry(tmp_path, monkeypatch):
     improved = rows_of(result, "table-7.4 improved")["compressive"]
     assert improved.reason.startswith("-25 % at T; ")
     assert improved.reason.endswith(
-        "290, 290, 290 MPa at refinement 1, 1.3, 1.6, +0.0 % at the end: settles"
+        "290, 290, 290 MPa at refinement 1, 1.3, 1.6, +0.0 % in the last step: settles"
     )
     assert result.more["shares"]["converged"]["computed"] == 6
     # the sign of the slope, stated by the study and its report

@@ -1,1 +1,1 @@
-"""Three articles on flexsplines, computed again."""
+"""Recomputation of three articles on flexsplines."""

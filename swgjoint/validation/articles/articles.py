@@ -1,10 +1,10 @@
-"""``swgjoint study articles``: three articles on flexsplines, computed again.
+"""``swgjoint study articles``: recomputation of three articles on flexsplines.
 
-Parts: ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, ``stress``
-and ``fatigue`` of a cup. The printed closed forms are compared with 3D finite elements;
-``converged`` is the same on a finer mesh, where computed: twice the elements of the
-thesis per direction for small deflections, those of the thesis instead of 0.6 of them
-where a wave generator is in contact.
+The parts are ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, and
+``stress`` and ``fatigue`` of a cup. The printed closed forms are compared with 3D
+finite elements. Where computed, ``converged`` is the result on a finer mesh: for small
+deflections refinement 2 instead of 1, and with a wave generator in contact refinement 1
+instead of 0.6. Refinement 1 is the mesh of the thesis.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ FINE = {"mesh.refinement": 2}
 COARSE = {"mesh.refinement": 0.6}
 """The coarsest mesh with a plane in the middle of the face width."""
 FINE_TORQUES = slice(0, None, 3)
-"""Torques at which the finer mesh is computed, too."""
+"""Torques at which the finer mesh is also computed."""
 
 
 def run_articles(options: StudyOptions) -> StudyResult:
     """Run the chosen parts, or all of them.
 
     Raises:
-        InputError: If a part or the fidelity is unknown.
+        InputError: If a part is unknown.
     """
     parts = options.chosen(PARTS)
     from swgjoint.view.plots.articles import articles_picture
@@ -58,7 +58,12 @@ def run_articles(options: StudyOptions) -> StudyResult:
 
 
 def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
-    """What a part computes."""
+    """Computations of a part.
+
+    Args:
+        study: Study file.
+        part: One of :data:`PARTS`.
+    """
     if part == "deflection":
         own = changed_design(study.deflection.base)
         tasks = _deflected("deflection", own, fine=True)
@@ -119,7 +124,7 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
 
 
 def _deflected(name: str, design: Design, *, fine: bool = False) -> list[ArticleTask]:
-    """On the wave generator, on one mesh or two."""
+    """Deflection on the wave generator, on one or two meshes."""
     coarse = design.with_changes(COARSE)
     tasks = [ArticleTask(name=name, kind="deflected", design=coarse, work=2)]
     if fine:
@@ -131,7 +136,13 @@ def _deflected(name: str, design: Design, *, fine: bool = False) -> list[Article
 
 
 def rows_of(study: ArticlesFile, part: str, found: Mapping[str, Found]) -> list[Row]:
-    """Rows of a part from what its tasks found."""
+    """Rows of a part.
+
+    Args:
+        study: Study file.
+        part: One of :data:`PARTS`.
+        found: Results by computation.
+    """
     build = {
         "deflection": lambda: deflection_rows(study.deflection, found),
         "force": lambda: [
@@ -155,8 +166,8 @@ def _summary(part: str, study: ArticlesFile, found: Mapping[str, Found]) -> str:
         ]
         return (
             f"radial stiffness of {study.force.base}: {found['force']['mid_face']:.3g}"
-            f" N/mm at mid-face; {min(values):.3g} to {max(values):.3g} with what the"
-            " article leaves open, each changed alone"
+            f" N/mm at mid-face; {min(values):.3g} to {max(values):.3g} if each"
+            " assumption that the article leaves open is varied alone"
         )
     if part == "fatigue" and "fault" not in found["fatigue"]:
         rows = found["fatigue"]["by_torque"]

@@ -21,7 +21,7 @@ Series = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
 
 class ArticleVariation(Section):
-    """Something that a source leaves open, chosen otherwise."""
+    """Another choice for something that a source leaves open."""
 
     name: Text
     changes: Mapping[str, Any]
@@ -33,7 +33,7 @@ class Deflection(Section):
     source: Text
     base: Text
     coefficient: Positive
-    """Printed lobe height over the theoretical one, w_0*."""
+    """Printed lobe height divided by the theoretical one, w_0* [-]."""
     varied_quantity: Text
     """Quantity that the rows of the variations compare."""
     variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
@@ -41,17 +41,17 @@ class Deflection(Section):
 
 
 class Springs(Section):
-    """An elastic wave generator, chosen: the source prints none."""
+    """An assumed elastic wave generator; the source prints none."""
 
     name: Text
     stiffness_N_mm: Annotated[float, Field(ge=0, le=1e6)]
-    """Of each lobe."""
+    """Stiffness of each lobe."""
     preload_N: Annotated[float, Field(ge=0, le=1e6)]
     """Force of each lobe at the lobe height of the drive."""
 
 
 class Force(Section):
-    """Force that deforms XB1-100-80."""
+    """Deformation force of XB1-100-80."""
 
     source: Text
     base: Text
@@ -63,14 +63,14 @@ class Force(Section):
 
 
 class StressAndFatigue(Section):
-    """Stress of a cup without and with torque."""
+    """Stress and fatigue of a cup without and with torque."""
 
     source: Text
     base: Text
     rows: Rows
     """Stress without torque."""
     fatigue_rows: Rows
-    """Fatigue, whatever the torque."""
+    """Fatigue results that do not depend on the torque."""
     torque_rows: Rows
     """Stress and fatigue at each torque."""
     crowned: Mapping[str, Any]
@@ -92,7 +92,7 @@ class StressAndFatigue(Section):
 
 
 class ArticlesFile(Section):
-    """The study file."""
+    """File of the study."""
 
     source: Text
     deflection: Deflection
@@ -112,9 +112,13 @@ class ArticlesFile(Section):
 
 
 def changed_design(base: str, changes: Mapping[str, Any] | None = None) -> Design:
-    """A bundled design with some keys changed.
+    """Bundled design with changed keys.
+
+    Args:
+        base: Name of the design.
+        changes: Values by dotted key; None for no changes.
 
     Raises:
-        DesignError: If there is no such design.
+        DesignError: If the design is unknown or the changed design is invalid.
     """
     return Design.preset(base).with_changes(changes or {})

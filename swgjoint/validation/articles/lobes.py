@@ -1,4 +1,4 @@
-"""Rows on an elastic wave generator, which the deformation-force article is for."""
+"""Rows of an elastic wave generator, for which the article needs the force."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from swgjoint.validation.rows import Row
 
 PLACE = "two loads at mid-face, large rotations"
 LOADED = (
-    "2P at each of two points in the article's text, P at each in its work and in the"
-    " formula that follows"
+    "the article's text applies 2P at each of two points, its expression for the work"
+    " and the formula that follows apply P"
 )
 PRELOAD = (
-    "the article has this force preload the teeth; it bends the cup, and teeth chosen"
-    " here take up at the force below"
+    "in the article this force preloads the teeth; in fact it bends the cup, and the"
+    " play of the teeth assumed here vanishes at the force listed below"
 )
 
 
 def characteristic_of(found: Found) -> LobeCharacteristic:
-    """What :func:`swgjoint.validation.articles.runs.run_task` computed, in SI."""
+    """Characteristic from a result of ``run_task`` of kind ``lobes``, in SI units."""
     return LobeCharacteristic(
         height=found["height_mm"] * mm,
         deflection=np.array(found["deflection_mm"]) * mm,
@@ -40,7 +40,12 @@ def characteristic_of(found: Found) -> LobeCharacteristic:
 
 
 def lobe_rows(own: Force, found: Found) -> list[Row]:
-    """Force and play of the deflected cup, and what springs make of them."""
+    """Force and play of the deflected cup, and working points with springs.
+
+    Args:
+        own: Section of the study file.
+        found: Result of the computation of kind ``lobes``.
+    """
     cup = None if "fault" in found else characteristic_of(found)
 
     def row(quantity: str, unit: str, ours: float | None, reason: str) -> Row:
@@ -73,21 +78,22 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
             "lobe deflection at which play vanishes",
             "mm",
             None if cup is None else cup.take_up / mm,
-            "not printed; under two loads, less than on an ellipse: the cup is pointed",
+            "not printed; smaller under two loads than on an ellipse, because the cup"
+            " becomes pointed",
         ),
         row("lobe force at which play vanishes", "N", closed, "not printed"),
         row(
             "play that a micrometre of lobe takes up",
             "arcmin",
             slope,
-            "not printed; nearly 2 tan(alpha)/r of the flanks",
+            "not printed; approximately 2 tan(alpha)/r of the flanks",
         ),
     ]
     for springs in own.springs:
         generator = ElasticWaveGenerator(
             stiffness=1e3 * springs.stiffness_N_mm, preload=springs.preload_N
         )
-        name, reason = f"springs, {springs.name}", "chosen: the article prints none"
+        name, reason = f"springs, {springs.name}", "assumed; the article prints none"
         values: tuple[float | None, ...] = (None,) * 4
         if cup is not None:
             try:

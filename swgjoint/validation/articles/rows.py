@@ -1,4 +1,4 @@
-"""Rows of the study of the articles: closed forms, computed values and open points."""
+"""Rows of the articles study: closed forms, computed values and open points."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from swgjoint.validation.row_entry import RowEntry, fill_rows
 from swgjoint.validation.rows import Row
 
 PLACES = ("mid_face", "open_edge", "face_width")
-"""Where the two loads of a pinched cup act."""
+"""Places at which the two loads of a pinched cup act."""
 
 
 def deflection_rows(own: Deflection, found: Mapping[str, Found]) -> list[Row]:
-    """Deflection of the 80:1 drive and the place of its largest stress.
+    """Deflection of the 80:1 drive, and place of its largest stress.
 
     Args:
         own: Section of the study file.
@@ -69,7 +69,7 @@ def deflection_rows(own: Deflection, found: Mapping[str, Found]) -> list[Row]:
 def _varied(
     variation: ArticleVariation, part: str, key: str, unit: str, quantity: str = ""
 ) -> RowEntry:
-    """The row of a variation, which changes one thing that an article leaves open."""
+    """Row of a variation, which changes one point that an article leaves open."""
     return RowEntry(
         quantity=f"{quantity}, {variation.name}" if quantity else variation.name,
         unit=unit,
@@ -109,7 +109,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         low, high = (min(known), max(known)) if known else (None, None)
         values[f"variations, {place}"] = {"low": low, "high": high}
         texts[f"span_{place}"] = (
-            f"; {low:.3g} to {high:.3g} with what it leaves open" if known else ""
+            f"; {low:.3g} to {high:.3g} over its open points" if known else ""
         )
     base = found["force"]
     values["influence"] = (
@@ -148,7 +148,7 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
 
 
 def _at(found: Found, torque: float) -> Found:
-    """Result of a computation at one torque; empty if it has none there."""
+    """Result of a computation at one torque; empty if it was not computed there."""
     if "fault" in found:
         return found
     rows = found["by_torque"]

@@ -1,4 +1,4 @@
-"""Computations of the study of the articles, each a picklable task."""
+"""Computations of the articles study, each a picklable task."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Found = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class ArticleTask:
-    """One computation; ``fault`` is the one key of what it returns where it failed."""
+    """One computation; a failed one returns ``fault`` as its only key."""
 
     name: str
     kind: str
@@ -34,13 +34,13 @@ class ArticleTask:
     design: Design
     toothless: bool = False
     torques: tuple[float, ...] = ()
-    """[N·m]."""
+    """Output torques [N·m]."""
     work: float = 1.0
-    """Rough work, so that long computations start first."""
+    """Estimated relative work, so that long computations start first."""
 
 
 def run_task(task: ArticleTask) -> Found:
-    """Compute; what fails is part of the result, not an error."""
+    """Run a computation; a failure is part of the result, not an error."""
     try:
         return KINDS[task.kind](task)
     except (ComputationError, DesignError) as error:
@@ -48,7 +48,7 @@ def run_task(task: ArticleTask) -> Found:
 
 
 def _pinched(task: ArticleTask) -> Found:
-    """Radial stiffness by place [N/mm]."""
+    """Radial stiffness [N/mm] by place of the loads."""
     cup = pinched_cup(task.design, toothless=task.toothless)
     return {
         place: cup.pull(1.0, place).stiffness / 1e3
@@ -57,7 +57,7 @@ def _pinched(task: ArticleTask) -> Found:
 
 
 def _rotated(task: ArticleTask) -> Found:
-    """The same at mid-face with large rotations, at about the lobe height."""
+    """Radial stiffness [N/mm] at mid-face with large rotations, near lobe height."""
     cup = pinched_cup(task.design)
     deflection = 0.5 * task.design.drive.module_mm * task.design.tooth_difference * mm
     force = cup.pull(1.0).stiffness * deflection
@@ -81,7 +81,7 @@ def _lobes(task: ArticleTask) -> Found:
 
 
 def _four(task: ArticleTask) -> Found:
-    """Load case of the article by torque; radial displacement [mm], stress [MPa]."""
+    """Load case of the article by torque: radial displacement [mm], stress [MPa]."""
     cup = pinched_cup(task.design)
     shell = ShellDimensions.from_design(task.design)
     loaded = four_forces(cup, shell.deflection)
@@ -107,14 +107,14 @@ def _four(task: ArticleTask) -> Found:
 
 
 def _fatigue(task: ArticleTask) -> Found:
-    """Safety factors on the wave generator of the design."""
+    """Safety factors by torque on the wave generator of the design."""
     return {"by_torque": [a.to_json() for a in fatigue(task.design, task.torques)]}
 
 
 def _deflected(task: ArticleTask) -> Found:
-    """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
-    model = solid_sector_model(task.design, half="auto", elastic_circular_spline=False)
-    state = SolidContinuation(model=model, ratio=task.design.ratio).deflect()
+    """Displacement [mm] and stress [MPa] on the wave generator, no tooth contact."""
+    ring = solid_sector_model(task.design, half="auto", elastic_circular_spline=False)
+    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflect()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")
     frame, teeth = model.frames(state)[0], model.strip.teeth

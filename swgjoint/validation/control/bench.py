@@ -1,9 +1,9 @@
-"""Motions of the bench joint that tell controllers apart, and what they tell.
+"""Motions of the bench joint for the comparison of controllers, and their figures.
 
-A fast move (tracking), one slow turn of the output in one direction (positioning), a
-turn at constant speed after some turns of learning (ripple), each of one specimen of a
-drive under a load that the controllers know but for a part, read by noisy encoders
-whose readings are a control period old.
+The motions are a fast move (tracking), one slow output turn in one direction
+(positioning), and a turn at constant speed after some turns of learning (ripple). Each
+runs on one specimen of a drive. The controllers know the load except for an unknown
+part. The encoders are noisy, and their readings are one control period old.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from swgjoint.validation.control.specimens import nominal, specimen
 from swgjoint.view.run import run_scene
 
 FREQUENCY = 20.0
-"""Natural frequency of every rung's loop on the motor [Hz]; damping ratio 1."""
+"""Natural frequency of the motor loop of every controller [Hz]; damping ratio 1."""
 LOAD, RECORD_LOAD = 0.3, 0.6
-"""Known load of the motions and of the record, over the rated torque."""
+"""Known load of the motions and of the record, divided by the rated torque [-]."""
 UNKNOWN = 0.1
-"""Largest part of the load that the controllers do not know."""
+"""Largest unknown part of the load, as a fraction of the known load [-]."""
 MOTOR_COUNTS, LINK_NOISE, DELAY = 2**17, 2.0, 1e-3
-"""Counts of the motor's encoder; noise of the link's [arcsec]; age of the readings of
-both [s], one period, which the controllers know."""
+"""Counts per turn of the motor encoder, noise of the link encoder [arcsec], and age of
+both readings [s]. The age is one control period, and the controllers know it."""
 TWO_PER_TURN = ((2, 0), (0, 2), (1, 1))
 
 UNITS = {
@@ -46,9 +46,9 @@ UNITS = {
     "two_per_turn": "N·m",
     "effort_rms": "N·m",
 }
-"""Figures of a rung: error of the link on the move, its peak to peak on the slow turn,
-ripple of the output torque at constant speed and its part of 2 per turn, torque of the
-motor on the move."""
+"""Figures of a controller with their units: link error during the move, peak-to-peak
+link error on the slow turn, ripple of the output torque at constant speed and its
+component at 2 per turn, and motor torque during the move."""
 
 MOVE: dict[str, Any] = {
     "trajectory": {
@@ -79,7 +79,12 @@ MOTIONS = {"move": MOVE, "slow": SLOW, "even": EVEN}
 
 
 def record_turn(drive: DriveMap, seed: int) -> JointRecord:
-    """A noisy slow turn at another load, of a drive with another random part."""
+    """Record a noisy slow turn at another load, with another random part of the drive.
+
+    Args:
+        drive: Nominal drive.
+        seed: Seed of the specimen.
+    """
     recorder = TurnRecorder(MotorPID(rigid_plan, frequency=FREQUENCY))
     plant = specimen(drive, seed, random_seed=1)
     run_motion(drive, plant, recorder, "slow", seed + 1000, load=RECORD_LOAD)
@@ -95,7 +100,17 @@ def run_motion(
     load: float = LOAD,
     delay: float = DELAY,
 ) -> Run:
-    """One motion of a specimen under an unknown share of the load, delay and noise."""
+    """Run one motion of a specimen with unknown load, delay and noise.
+
+    Args:
+        drive: Nominal drive, which the controller knows.
+        plant: Specimen to move.
+        controller: Controller of the joint.
+        motion: Key of :data:`MOTIONS`.
+        seed: Seed of unknown load and sensor noise.
+        load: Known load divided by the rated torque [-].
+        delay: Age of the encoder readings [s].
+    """
     torque = load * drive.ratings.rated_torque
     more = UNKNOWN * torque * np.random.default_rng([seed, 2]).uniform(-1.0, 1.0)
     scene = Scene.from_data(
@@ -136,7 +151,7 @@ def run_motion(
 
 
 def figures_of(runs: dict[str, Run]) -> dict[str, float]:
-    """Figures of :data:`UNITS` from the runs of all motions."""
+    """Figures of :data:`UNITS` from the runs by motion."""
     move, slow, even = (runs[motion] for motion in MOTIONS)
     moving = move.time >= MOVE["trajectory"]["hold_s"]
     off = (move.position - move.reference)[moving, 0] / arcmin
@@ -153,7 +168,7 @@ def figures_of(runs: dict[str, Run]) -> dict[str, float]:
 
 
 def two_per_turn(run: Run) -> float:
-    """Amplitude of the ripple of 2 per turn, root of the squares of its lines [N·m]."""
+    """Torque ripple at 2 per turn: root sum of squares of its amplitudes [N·m]."""
     theta, psi, torque = (
         x[run.steady, 0] for x in (run.motor_position, run.position, run.output_torque)
     )
@@ -171,7 +186,7 @@ def two_per_turn(run: Run) -> float:
 
 
 def signals_of(runs: dict[str, Run]) -> dict[str, Array]:
-    """Signals of the runs for the picture."""
+    """Signals of the runs by motion, for the picture."""
     move, slow, even = (runs[motion] for motion in MOTIONS)
     turn = slice(slow.steady.start, slow.steady.stop, 10)
     last = slice(even.time.size - 1000, even.time.size)

@@ -1,14 +1,15 @@
-"""``swgjoint study control``: the ladder of baselines for the control of one joint.
+"""``swgjoint study control``: a ladder of baseline controllers for one joint.
 
-Specimens of a drive on the bench joint, ten by default: phases of the errors, friction,
-load and sensor noise are drawn. Every controller adds one thing to the one before it
-and is made for one figure, named in :data:`RUNGS` before any run; that of predictive
-control after a trial on two specimens. Three motions tell the figures: a fast move
-(tracking), one slow turn of the output in one direction (positioning), a turn at
-constant speed after learning (ripple). All loops read the motor alone, but for learning
-and predictive control, which read the link's encoder, too; the table was recorded with
-it. Readings are one control period of 1 ms old, as in the environments, and the
-controllers know it: they hold a reading against the plan of the instant it was taken.
+The controllers run on specimens of a drive on the bench joint, ten by default. Phases
+of the errors, friction, load and sensor noise of a specimen are random. Every
+controller adds one feature to another one and targets one figure, which :data:`RUNGS`
+named before any run; the target of predictive control was chosen after a trial on two
+specimens. The figures come from three motions: a fast move (tracking), one slow output
+turn in one direction (positioning), and a turn at constant speed after learning
+(ripple). All controllers read the motor encoder. Learning and predictive control also
+read the link encoder, which was used to record the table as well. Readings are one
+control period of 1 ms old, as in the environments. The controllers know this age and
+compare a reading with the plan at the time of the reading.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 DRIVE = "CSG-25-100"
 SEEDS = 10
 LEARNED = ((1, 1), *((p, 0) for p in range(1, 9)), *((0, q) for q in range(1, 9)))
-"""Orders that are learned: up to 8 of either member."""
+"""Learned orders: up to 8 of either member."""
 
 Build = Callable[[KinematicErrorTable], Controller]
 
@@ -63,11 +64,11 @@ class Rung:
 
     name: str
     build: Build
-    """From the table of the specimen."""
+    """Function that builds the controller from the error table of the specimen."""
     made_for: str | None = None
-    """Figure of :data:`UNITS` that it shall improve."""
+    """Figure of :data:`UNITS` that the controller targets."""
     over: str | None = None
-    """Rung that it adds to; None for the first."""
+    """Rung that this one extends; None for the first."""
 
 
 def _plan(planner: Any) -> Build:
@@ -130,11 +131,11 @@ NAMES = tuple(rung.name for rung in RUNGS)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ladder:
-    """What the rungs came to on one drive."""
+    """Results of the rungs on one drive."""
 
     drive: DriveMap
     figures: dict[str, dict[str, Array]]
-    """By rung and figure, one value a seed."""
+    """Values by rung and figure, shape (n_seeds,) each."""
     shown: dict[str, dict[str, Array]]
     """Signals of the first seed by rung, for the picture."""
 
@@ -145,11 +146,15 @@ class Ladder:
 
     @property
     def made_for(self) -> dict[str, str | None]:
-        """Every rung and the figure that it shall improve."""
+        """Target figure by rung."""
         return {rung.name: rung.made_for for rung in RUNGS}
 
     def improvement(self, rung: Rung) -> tuple[float, int]:
-        """Figure of a rung over that of the one below, mean; seeds that got better."""
+        """Improvement of the target figure compared with the extended rung.
+
+        Returns:
+            Ratio of the mean figures [-], and the number of seeds that improved.
+        """
         assert rung.made_for is not None and rung.over is not None
         after, before = (
             self.figures[name][rung.made_for] for name in (rung.name, rung.over)
@@ -168,11 +173,11 @@ def climb(
     """Run the rungs on specimens of a drive.
 
     Args:
-        drive: Of which specimens are drawn; the controllers know its mean curve.
-        seeds: Specimens.
-        jobs: Processes.
-        rungs: Names of those that are run.
-        progress: Called with the stage, the specimens done and their number.
+        drive: Nominal drive of the specimens; the controllers know its mean curve.
+        seeds: Number of specimens.
+        jobs: Number of processes.
+        rungs: Names of the rungs to run.
+        progress: Called with the stage, the number of finished specimens and the total.
     """
     tasks = [(drive, seed, rungs) for seed in range(seeds)]
     found = run_all(_one_seed, tasks, jobs=jobs, stage="specimens", progress=progress)
@@ -189,7 +194,7 @@ def climb(
 def _one_seed(
     task: tuple[DriveMap, int, tuple[str, ...]],
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, Array]]]:
-    """Figures and shown signals of all rungs on one specimen."""
+    """Figures and plotted signals of all rungs on one specimen."""
     drive, seed, names = task
     table = identify_kinematic_error(record_turn(drive, seed), nominal(drive))
     plant = specimen(drive, seed)
@@ -207,7 +212,7 @@ def _one_seed(
 
 
 def run_control(options: StudyOptions) -> StudyResult:
-    """The ladder; ``only`` names other drives, maps or designs.
+    """Run the ladder; ``only`` names other drives, maps or designs.
 
     Raises:
         InputError: If a drive is unknown or a fidelity does not fit it.
@@ -217,7 +222,7 @@ def run_control(options: StudyOptions) -> StudyResult:
     pages: dict[str, Page] = {}
     references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
     drives = {
-        # the errors of specimens are the study's own, of more orders
+        # the study draws its own errors, with more orders
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
         for name in references
     }
@@ -247,7 +252,12 @@ def run_control(options: StudyOptions) -> StudyResult:
 
 
 def ladder_rows(name: str, found: Ladder) -> list[Row]:
-    """One row for every rung and figure."""
+    """One row per rung and figure.
+
+    Args:
+        name: Name of the drive.
+        found: Results of the rungs.
+    """
     made_for = {rung.name: rung.made_for for rung in RUNGS}
     return [
         Row(
@@ -256,7 +266,7 @@ def ladder_rows(name: str, found: Ladder) -> list[Row]:
             unit=UNITS[key],
             source_value=None,
             ours=float(values.mean()),
-            reason="what it is made for" if made_for[rung] == key else None,
+            reason="target of this controller" if made_for[rung] == key else None,
             more={"spread": float(values.std(ddof=min(1, values.size - 1)))},
         )
         for rung, figures in found.figures.items()
@@ -265,7 +275,7 @@ def ladder_rows(name: str, found: Ladder) -> list[Row]:
 
 
 def ladder_claims(found: Ladder) -> list[str]:
-    """What each rung did to the figure that it is made for, a line each."""
+    """One line per rung: the change of its target figure."""
     lines = []
     for rung in RUNGS:
         if rung.made_for is None or not {rung.name, rung.over} <= set(found.figures):
@@ -273,7 +283,7 @@ def ladder_claims(found: Ladder) -> list[str]:
         share, better = found.improvement(rung)
         count = len(found.figures[rung.name][rung.made_for])
         lines.append(
-            f"{rung.name}: {rung.made_for} {share:.3g} of that of {rung.over!r},"
-            f" better on {better} of {count}"
+            f"{rung.name}: {rung.made_for} {share:.3g} times that of {rung.over!r},"
+            f" better on {better} of {count} specimens"
         )
     return lines

@@ -1,11 +1,11 @@
-"""Specimens of one drive: what a maker's tolerances leave different between two.
+"""Specimens of one drive, which differ within manufacturing tolerances.
 
-The errors of a drive are drawn, not built: amplitudes are those of finite elements of a
-drive at the limits of its tolerances (:mod:`swgjoint.maps.fit.error_spectrum`), phases
-come from a seed. The *systematic* part, low orders of cumulative pitch, roundness and
-centring, belongs to the specimen; the *random* part, higher orders of single pitches,
-is drawn from a seed of its own, so that a record may be taken on a drive that differs
-from the one that is compensated.
+The errors of a specimen are drawn as a spectrum. The amplitudes come from finite
+elements of a drive at the limits of its tolerances
+(:mod:`swgjoint.maps.fit.error_spectrum`), the phases from a seed. The *systematic* part
+belongs to the specimen: low orders from cumulative pitch error, roundness and centring.
+The *random* part has higher orders from single pitch errors and a separate seed.
+A record can therefore be taken on a drive that differs from the compensated one.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from swgjoint.maps.fit.error_spectrum import AMPLITUDES
 from swgjoint.units import arcmin
 
 RANDOM = 0.07
-"""Over the amplitude of 2 alpha: what single pitches leave in every order of
-:data:`RANDOM_ORDERS`."""
+"""Amplitude of each of :data:`RANDOM_ORDERS`, which single pitch errors cause, relative
+to the amplitude of order 2 alpha [-]."""
 RANDOM_ORDERS = (*((p, 0) for p in range(5, 13)), *((0, q) for q in range(5, 13)))
 LOW = 4
-"""Orders of a map up to this belong to its systematic part."""
+"""Largest order of a map that belongs to its systematic part."""
 ACCURACY = 1.0
-"""Transmission accuracy of a drive for which none is stated [arcmin]."""
+"""Transmission accuracy of a drive whose catalogue states none [arcmin]."""
 FRICTION = 0.2
-"""Friction of a specimen is within this share of the nominal one."""
+"""Largest relative deviation of the friction of a specimen from the nominal one [-]."""
 
 
 def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
-    """One specimen of a drive.
+    """Draw one specimen of a drive.
 
-    A map with kinematic error keeps its amplitudes and gets other phases, potential and
-    error alike; others get the orders of :mod:`swgjoint.maps.fit.error_spectrum` and
-    the random ones, with a peak to peak over one turn that is the transmission accuracy
-    which the catalogue states.
+    A map with kinematic error keeps its amplitudes and gets other phases, equal for
+    potential and error. A map without gets the orders of
+    :mod:`swgjoint.maps.fit.error_spectrum` and the random orders. Their peak-to-peak
+    value over one turn is the transmission accuracy that the catalogue states.
 
     Args:
         base: Nominal drive.
-        seed: Of systematic part and friction.
-        random_seed: Of the random part.
+        seed: Seed of systematic part and friction.
+        random_seed: Seed of the random part.
     """
     systematic = np.random.default_rng([seed, 0])
     random = np.random.default_rng([seed, 1, random_seed])
@@ -61,7 +61,7 @@ def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
 
 
 def nominal(base: DriveMap) -> DriveMap:
-    """What is known of every specimen of a drive: its mean curve and friction."""
+    """Known properties of every specimen of a drive: mean curve and friction."""
     return base.with_harmonics(np.zeros(len(base.orders), dtype=bool))
 
 
