@@ -171,7 +171,7 @@ def test_rows_hold_brackets_and_failures(computed):
     # mean over the angles; mu of 0.05 and one flank to 0.1 and the other
     assert [slow.more["low"], slow.more["high"]] == pytest.approx([3.0, 12.0])
     assert slow.more["conditions"].startswith("2000 rpm, +20 C, grease")
-    assert "25 % of it, 3 pairs touch" in slow.reason and "seals" in slow.reason
+    assert "teeth 25 %, 3 pairs in contact" in slow.reason and "seals" in slow.reason
     start = rows["size 25, ratio 100", "starting torque"]
     assert [start.more["low"], start.more["high"]] == pytest.approx([3.5, 15.5])
     assert "a lower bound in 4 of 4 cases" in "".join(found.summary)
@@ -212,7 +212,7 @@ def test_friction_above_the_catalogue_is_told(monkeypatch):
     )
     found = study.run_catalogue(options(only=("losses",)))
     (line,) = (s for s in found.summary if "running" in s and "lower bound" in s)
-    assert "in 2 of 4 cases, above it in size 14, ratio 100, size 17" in line
+    assert "in 2 of 4 cases, above the catalogue in size 14, ratio 100, size 17" in line
 
 
 def test_the_command_writes_table_and_plot(computed, capsys, tmp_path):

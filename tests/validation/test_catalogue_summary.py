@@ -83,7 +83,7 @@ def test_failed_cases_count_as_not_met(monkeypatch):
     assert "3 of 5 without a middle" in line
     assert line.endswith("within 25 %: 1 of 4 (3 lack variants: not met)")
     line = line_of(found, "K1 < K2")
-    assert line.endswith("of 15 cases and cannot be told in 3")
+    assert line.endswith("of 15 cases and is unknown in 3")
 
 
 def test_a_bracket_that_lost_a_variant_is_not_met(monkeypatch):

@@ -251,5 +251,5 @@ def test_table_of_micro_geometry(tmp_path, monkeypatch):
     # the sign of the slope, stated by the study and its report
     assert any("figure 7.33 lowers it" in line for line in result.summary)
     text = (tmp_path / "out/thesis.md").read_text(encoding="utf-8")
-    assert "figure 7.33 lowers it" in text and "the studies in space" in text
+    assert "figure 7.33 lowers it" in text and "the 3D studies" in text
     assert "| T/10 |" in text and "at T only" in text

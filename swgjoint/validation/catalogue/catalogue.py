@@ -1,14 +1,18 @@
 """``swgjoint study catalogue``: the drive family compared with a catalogue.
 
-Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin rings
-with the bearing of the wave generator, and the share of each mechanism),
-``individuals`` (gears with errors of their own) and ``accuracy`` (transmission error
-over an output turn) by the same rings, ``ratcheting`` (finite elements in the plane),
-``losses`` (no-load running and starting torque, from the friction of teeth and race).
-``coning``, when asked for: the wave generator in space, rigid and on its
-bearing, at two ratios (some twenty minutes of a core). What is run is stated in
-``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
-is the middle of their bracket.
+The parts are:
+
+- ``stiffness``: K1, K2, K3, hysteresis loss and lost motion by thin rings with the
+  bearing of the wave generator, and the share of each mechanism;
+- ``individuals``: individual gears with errors, by the same rings;
+- ``accuracy``: transmission error over an output turn, by the same rings;
+- ``ratcheting``: ratcheting torque by 2D finite elements;
+- ``losses``: no-load running and starting torque from the friction of teeth and race;
+- ``coning``, only if requested: the wave generator in 3D, rigid and on its bearing, at
+  two ratios, which takes about 20 CPU minutes.
+
+``models/studies/catalogue.toml`` lists the designs. If the sources leave a choice open,
+several variants are run, and ``ours`` is the middle of their bracket.
 """
 
 from __future__ import annotations
@@ -47,18 +51,18 @@ from swgjoint.validation.runner import compute_all
 
 PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
 EXTRA = ("coning",)
-"""Parts that run when they are asked for."""
+"""Parts that run only if requested."""
 REFERENCE = 25
-"""Size at which a computation stands for all, scaled."""
+"""Size from which results are scaled to the other sizes."""
 CHECK = (14, 80)
-"""Size and ratio at which that is computed, too."""
+"""Size and ratio that are also computed, to check the scaling."""
 
 
 def run_catalogue(options: StudyOptions) -> StudyResult:
-    """Run the chosen parts, or all of them.
+    """Run the chosen parts, or :data:`PARTS`.
 
     Raises:
-        InputError: If a part is unknown or a fidelity is given.
+        InputError: If a part is unknown.
     """
     from swgjoint.view.plots.catalogue import catalogue_picture
 
@@ -104,7 +108,12 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
 
 
 def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
-    """What a part computes."""
+    """Computations of a part.
+
+    Args:
+        study: Study file.
+        part: One of :data:`PARTS` or :data:`EXTRA`.
+    """
     if part == "losses":
         return loss_tasks(study)
     if part == "coning":
@@ -180,7 +189,13 @@ def _teeth(name: str, design: Design, work: float) -> CatalogueTask:
 
 
 def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:
-    """Rows of a part from what its tasks found."""
+    """Rows of a part; none for ``individuals`` and ``coning``.
+
+    Args:
+        study: Study file.
+        part: One of :data:`PARTS` or :data:`EXTRA`.
+        found: Results by computation.
+    """
     cases = [(size, ratio) for ratio in study.ratios for size in study.sizes]
     build = {
         "stiffness": lambda row: stiffness_rows(study, row, found),

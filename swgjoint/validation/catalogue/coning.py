@@ -1,8 +1,9 @@
-"""Why the plane is too stiff at a low ratio: wave generator and teeth in space.
+"""Why the 2D model is too stiff at a low ratio: wave generator and teeth in 3D.
 
-The cup cones, so that teeth and wave generator press at the open end. Cases: a rigid
-wave generator and one on its bearing, teeth and wave generator straight or relieved
-along the face width, and the thin rings, which do not cone.
+The cup cones, so that the contact forces of teeth and wave generator move to the open
+end. The cases are a rigid wave generator and one on its bearing, each with teeth and
+wave generator straight or relieved along the face width, and the thin rings, which do
+not cone.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ CASES = (
     ("bearing, relieved", "coning free", False),
     ("bearing held axially, relieved", "coning held", False),
 )
-"""Name, kind, and whether nothing is relieved along the face width."""
+"""Name, kind of computation, and whether the face width is straight (no relief)."""
 
 
 def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
-    """All cases at all ratios."""
+    """Computations of all cases at all ratios."""
     size = study.coning.size
     return [
         CatalogueTask(
@@ -50,7 +51,15 @@ def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
 
 
 def coning_summary(study: CatalogueFile, found: Mapping[str, Found]) -> dict[str, Any]:
-    """K1, K2, K3 of each case over the catalogue, and where the teeth press."""
+    """K1, K2, K3 of each case relative to the catalogue, and centres of the forces.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+
+    Returns:
+        ``rows``, ``lines`` for the terminal and ``assumptions``.
+    """
     rows, lines = [], []
     for ratio in study.coning.ratios:
         row = catalogue_row(study.coning.size, ratio)
@@ -59,7 +68,7 @@ def coning_summary(study: CatalogueFile, found: Mapping[str, Found]) -> dict[str
             one = found[f"coning {ratio} {name}"]
             if "fault" in one:
                 continue
-            # the mid-line of a loop begins at zero: half the play counts in K1
+            # the centre line of a loop starts at zero: K1 includes half the play
             K = np.diff(torques) / np.diff(one["torsion_rad"], prepend=0.0)
             rows.append(
                 {
@@ -93,7 +102,7 @@ def _line(size: int, row: Mapping[str, Any]) -> str:
 
 
 def _drops(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """K of a case over that of another, low ratio and high."""
+    """Ratio of K between pairs of cases, at each ratio of the drive."""
     K = {(row["ratio"], row["case"]): np.array(row["over_catalogue"]) for row in rows}
     ratios = sorted({ratio for ratio, _ in K})
     lines = []
@@ -116,7 +125,7 @@ def _drops(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def coning_picture(rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """PNG: K over the catalogue's by case, and the centre of the tooth forces."""
+    """PNG: K relative to the catalogue by case, and centre of the tooth forces."""
     from matplotlib.figure import Figure
 
     ratios = sorted({row["ratio"] for row in rows})

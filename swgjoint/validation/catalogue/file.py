@@ -1,4 +1,4 @@
-"""What the study of the catalogue runs, from ``models/studies/catalogue.toml``."""
+"""Study file of the catalogue study, ``models/studies/catalogue.toml``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Text = Annotated[str, Field(min_length=1, max_length=300)]
 
 
 class Variant(Section):
-    """Changes of the family design, where no source decides."""
+    """Changes of the family design for a choice that the sources leave open."""
 
     name: Text
     cup: Text
@@ -32,7 +32,7 @@ class Variant(Section):
 
 
 class Goal(Section):
-    """Deviation of the middle of the bracket that is aimed at."""
+    """Accepted deviation of the middle of the bracket from the catalogue [-]."""
 
     ratios: Numbers
     sizes: Numbers
@@ -42,13 +42,13 @@ class Goal(Section):
 
 
 class NoClaim(Section):
-    """Sizes that are reported without a goal."""
+    """Sizes that are reported without an accuracy goal."""
 
     sizes: Numbers
 
 
 class Individuals(Section):
-    """Individual gears of one design, one a seed."""
+    """Individual gears of one design, one per seed."""
 
     seeds: Numbers
     variant: Text
@@ -60,7 +60,7 @@ class Individuals(Section):
 
 
 class ConingSection(Section):
-    """The wave generator in space, rigid and on its bearing, at one size."""
+    """The wave generator in 3D, rigid and on its bearing, at one size."""
 
     size: Whole
     ratios: Numbers
@@ -71,7 +71,7 @@ class ConingSection(Section):
 
 
 class CatalogueFile(Section):
-    """The study file."""
+    """File of the study."""
 
     source: Text
     sizes: Numbers
@@ -97,11 +97,17 @@ class CatalogueFile(Section):
 
     @property
     def coefficients(self) -> tuple[float, ...]:
-        """Coefficients of friction."""
+        """Coefficients of tooth friction [-]."""
         return tuple(float(mu) for mu in self.stated["tooth_friction"]["coefficients"])
 
     def goal(self, size: int, ratio: int, quantity: str) -> float | None:
-        """Deviation that is aimed at; None where nothing is claimed."""
+        """Accepted relative deviation from the catalogue; None without a goal.
+
+        Args:
+            size: Size of the drive.
+            ratio: Ratio of the drive.
+            quantity: ``K1``, ``K2`` or ``K3``.
+        """
         for goal in self.goals:
             if ratio in goal.ratios and size in goal.sizes:
                 value = getattr(goal, quantity, None)
@@ -109,7 +115,12 @@ class CatalogueFile(Section):
         return None
 
     def coned_design(self, ratio: int, *, straight: bool) -> Design:
-        """Design for the 3D model; straight: without relief along the face width."""
+        """Design for the 3D model.
+
+        Args:
+            ratio: Ratio of the drive.
+            straight: Whether relief along the face width is omitted.
+        """
         own = self.coning
         variant = next(v for v in self.variants if v.name == own.variant)
         design = variant_design(own.size, ratio, variant)
@@ -117,7 +128,7 @@ class CatalogueFile(Section):
         return design.with_changes({**changes, **(own.straight if straight else {})})
 
     def individual(self, seed: int) -> Design:
-        """A gear with errors of its own and a clearance drawn from its class."""
+        """Individual gear with random errors and a clearance drawn from its class."""
         own = self.individuals
         variant = next(v for v in self.variants if v.name == own.variant)
         design = variant_design(own.size, own.ratio, variant)
@@ -134,7 +145,13 @@ class CatalogueFile(Section):
 
 
 def variant_design(size: int, ratio: int, variant: Variant) -> Design:
-    """A member of the family with the changes of a variant."""
+    """Member of the drive family with the changes of a variant.
+
+    Args:
+        size: Size of the drive.
+        ratio: Ratio of the drive.
+        variant: Changes of the family design.
+    """
     design = Design.preset(f"size-{size}-{ratio}")
     changes = dict(variant.changes)
     for table, unit in (

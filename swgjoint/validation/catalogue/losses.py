@@ -1,8 +1,8 @@
 """No-load running torque and starting torque compared with the catalogue.
 
-Only sliding teeth and the rim on its race are in ours; the catalogue's has grease,
-seals and the rolling of balls besides, so ours is a lower bound. Whether it is one, the
-summary says.
+Our values include only the friction of sliding teeth and of the rim on its race. The
+catalogue values also include grease, seals and rolling balls. Our values should
+therefore be lower bounds; the summary reports whether they are.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ _MILLI = 1e-3
 
 
 def loss_tasks(study: CatalogueFile) -> list[CatalogueTask]:
-    """Every drive whose losses are stated, with either flank; the cup takes nothing."""
+    """Computations for every drive with stated losses and every flank angle.
+
+    The cup has no losses, so variants that differ only in the cup share a computation.
+    """
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
     return [
         CatalogueTask(
@@ -48,7 +51,7 @@ def _name(size: int, ratio: int, flank: float) -> str:
 
 
 def running_of(found: Found) -> RunningFriction:
-    """What a task found, as it was computed."""
+    """Convert a result of kind ``running`` to its original form."""
     return RunningFriction(
         input_angle=np.array(found["input_angles_rad"]),
         elastic=np.array(found["elastic_Nm"]),
@@ -61,7 +64,16 @@ def running_of(found: Found) -> RunningFriction:
 def loss_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found]
 ) -> list[Row]:
-    """Both torques, brackets over flanks and coefficients; none that is not stated."""
+    """Rows of both torques, with brackets over flank angles and friction coefficients.
+
+    Args:
+        study: Study file.
+        row: Ratings of the drive.
+        found: Results by computation.
+
+    Returns:
+        Two rows; none if the catalogue states no losses of the drive.
+    """
     stated = stated_losses(row)
     if stated is None:
         return []
@@ -84,9 +96,10 @@ def loss_rows(
         bending = bending_torque(variant_design(row.size, row.ratio, study.variants[0]))
         coefficients = " to ".join(f"{mu:g}" for mu in study.coefficients)
         why.append(
-            f"slow, Coulomb friction {coefficients} of the rim on its race and of the"
-            f" teeth alone ({share:.3g} % of it, {pairs:.2g} pairs touch); not in it:"
-            f" {LEFT_OUT} ({bending / _MILLI:.2g} mN·m, loss factor assumed)"
+            f"slow rotation, only Coulomb friction {coefficients} of the rim on its"
+            f" race and of the teeth (teeth {share:.3g} %, {pairs:.2g} pairs in"
+            f" contact); not included: {LEFT_OUT} ({bending / _MILLI:.2g} mN·m, loss"
+            " factor assumed)"
         )
     printed = {
         RUNNING: (stated.no_load_running, f"2000 rpm, {LOSS_CONDITIONS}"),
@@ -108,7 +121,7 @@ def loss_rows(
 
 
 def loss_lines(rows: Sequence[Row]) -> list[str]:
-    """Whether ours is below the catalogue's, as what lacks grease and seals must be."""
+    """One line per quantity: whether our torques are below the catalogue values."""
     lines = []
     for quantity in (RUNNING, STARTING):
         over = {
@@ -124,9 +137,9 @@ def loss_lines(rows: Sequence[Row]) -> list[str]:
         )
         lines.append(
             f"{quantity}: friction of teeth and race is at most {least:.2g} to"
-            f" {most:.2g} % of the catalogue's; a lower bound in"
+            f" {most:.2g} % of the catalogue value; a lower bound in"
             f" {len(over) - len(above)} of {len(over)} cases"
-            + f", above it in {', '.join(above)}"
+            + f", above the catalogue in {', '.join(above)}"
             * bool(above)
         )
     return lines

@@ -1,4 +1,4 @@
-"""What the catalogue prints of a component set."""
+"""Catalogue values of a component set."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ from swgjoint.typing import Array
 
 STIFFNESS = ("K1", "K2", "K3")
 RATIO_CLASS = 80
-"""Of the stiffness and accuracy tables: this ratio and above."""
+"""Ratio class of the stiffness and accuracy tables for this ratio and above."""
 
 
 def catalogue_row(size: int, ratio: int) -> CatalogueRow:
     """Ratings of a component set.
 
+    Args:
+        size: Size.
+        ratio: Ratio.
+
     Raises:
-        InputError: If the catalogue has none.
+        InputError: If the catalogue does not list the component set.
     """
     for row in catalogue_rows():
         if (row.size, row.ratio) == (size, ratio):
@@ -27,18 +31,18 @@ def catalogue_row(size: int, ratio: int) -> CatalogueRow:
 
 
 def edges(row: CatalogueRow) -> tuple[float, float, float, float]:
-    """0, T1, T2 and the end of the standard loop [N·m]."""
+    """Torques 0, T1, T2 and the end of the standard loop [N·m]."""
     return 0.0, row.T1, row.T2, largest_torque(row)
 
 
 def torques_of(row: CatalogueRow) -> tuple[float, ...]:
-    """Torques of a path: lost motion, rated, and the ends of the segments [N·m]."""
+    """Torques of a path: lost motion, rated torque, and segment ends [N·m]."""
     lost = LOST_MOTION_TORQUE * row.rated_torque
     return tuple(sorted({lost, row.rated_torque, *edges(row)[1:]}))
 
 
 def catalogue_stiffness(row: CatalogueRow) -> Array:
-    """K1, K2, K3 as printed [N·m/rad]."""
+    """Printed K1, K2, K3 [N·m/rad], shape (3,)."""
     ratio_class = float(min(row.ratio, RATIO_CLASS))
     for line in table("stiffness"):
         if (line["size"], line["ratio_class"]) == (float(row.size), ratio_class):
@@ -48,7 +52,10 @@ def catalogue_stiffness(row: CatalogueRow) -> Array:
 
 
 def printed_accuracy(row: CatalogueRow) -> dict[str, float | None]:
-    """Upper bounds of transmission accuracy, hysteresis loss and lost motion."""
+    """Printed upper bounds of transmission accuracy, hysteresis loss and lost motion.
+
+    The keys state the unit; a value that is not printed is None.
+    """
     ratio_class = float(min(row.ratio, RATIO_CLASS))
     keys = ("transmission_accuracy_arcmin", "hysteresis_loss_arcmin")
     for line in table("accuracy"):

@@ -27,7 +27,12 @@ from swgjoint.validation.rows import Row
 
 
 def friction_of_path(found: Found, design: Design) -> RubbedPath:
-    """A path of the rings behind the cup of a design."""
+    """Path of the thin rings in series with the cup of a design.
+
+    Args:
+        found: Result of kind ``path``.
+        design: Design with the cup.
+    """
     torque = np.array(found["torque_Nm"])
     series = series_compliance(design, cup=True)
     work = np.array(found["work_per_mu_J"])
@@ -51,7 +56,14 @@ def friction_of_path(found: Found, design: Design) -> RubbedPath:
 
 
 def stiffnesses(path: RubbedPath, row: CatalogueRow) -> Array:
-    """K1, K2, K3: both signs are mirror images, so torsion begins at zero [N·m/rad]."""
+    """K1, K2, K3 of a path [N·m/rad], shape (3,).
+
+    Both signs of torque are mirror images, so that the torsion starts at zero.
+
+    Args:
+        path: Path of the drive.
+        row: Ratings with the torques of the segments.
+    """
     torques = edges(row)
     x = np.array([0.0, *map(path.torsion_at, torques[1:])])
     return np.asarray(np.diff(torques) / np.diff(x))
@@ -60,7 +72,13 @@ def stiffnesses(path: RubbedPath, row: CatalogueRow) -> Array:
 def stiffness_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found]
 ) -> list[Row]:
-    """K1, K2, K3, hysteresis loss and lost motion, brackets over the variants."""
+    """Rows of K1, K2, K3, hysteresis loss and lost motion, with brackets over variants.
+
+    Args:
+        study: Study file.
+        row: Ratings of the drive.
+        found: Results by computation.
+    """
     values: dict[str, list[float]] = {}
     faults = []
     for variant in study.variants:
@@ -117,21 +135,21 @@ def bracket_row(
     above: Sequence[float] = (),
     conditions: str | None = None,
 ) -> Row:
-    """Middle of the bracket compared with the catalogue.
+    """Row that compares the middle of a bracket with the catalogue.
 
     Args:
-        row: The catalogue's.
-        quantity: Name.
-        unit: Of the values.
-        source: Of the catalogue.
-        values: Of the variants.
-        reason: See :class:`Row`.
-        goal: Deviation of the middle that is aimed at; a bracket that is not whole
-            does not meet it.
+        row: Ratings of the drive.
+        quantity: Name of the quantity.
+        unit: Unit of all values.
+        source: Value of the catalogue.
+        values: Values of the variants.
+        reason: Reason of the row, see :class:`Row`.
+        goal: Accepted relative deviation of the middle; an incomplete bracket does not
+            meet it.
         whole: Whether every variant has a value.
-        above: Lower bounds of variants without one: nothing is known of the upper end
-            of the bracket then.
-        conditions: Under which the catalogue states its value.
+        above: Lower bounds of variants without a value; the upper end of the bracket is
+            then unknown.
+        conditions: Conditions under which the catalogue states its value.
     """
     known = [*values, *above]
     low = min(known) if known else None
@@ -171,7 +189,16 @@ def bracket_row(
 def ratcheting_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found], size: int
 ) -> list[Row]:
-    """Limits of both flanks at one size, scaled by the cube of the size."""
+    """Row of the ratcheting torque, scaled by the cube of the size.
+
+    The bracket covers all flank angles.
+
+    Args:
+        study: Study file.
+        row: Ratings of the drive.
+        found: Results by computation.
+        size: Size at which the limits were computed.
+    """
     scale = (row.size / size) ** 3
     values, above, notes, whole = [], [], [], True
     for flank in dict.fromkeys(v.flank_deg for v in study.variants):
@@ -191,7 +218,7 @@ def ratcheting_rows(
         bound = scale * fixed["limit_Nm"]
         sign = "limit" if fixed["passed"] else "no limit up to"
         notes.append(f"circular spline fixed outside: {sign} {bound:.3g} N·m")
-    notes.insert(0, "circular spline free outside, wave generator rigid, in the plane")
+    notes.insert(0, "2D, circular spline free outside, wave generator rigid")
     if row.size != size:
         notes.append(f"scaled from size {size}")
     return [
@@ -211,13 +238,23 @@ def ratcheting_rows(
 def accuracy_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found], size: int
 ) -> list[Row]:
-    """Accuracy at one size; the errors are micrometres, so their angle scales down."""
+    """Row of the transmission accuracy, scaled from one size if not computed.
+
+    The errors are lengths, so that their angle is inversely proportional to the size.
+
+    Args:
+        study: Study file.
+        row: Ratings of the drive.
+        found: Results by computation.
+        size: Size from which the accuracy is scaled.
+    """
     one = found[f"accuracy {size} {row.ratio}"]
     own = found.get(f"accuracy {row.size} {row.ratio}", {"fault": "not computed"})
     source = printed_accuracy(row)["transmission_accuracy_arcmin"]
     why = (
-        "catalogue states an upper bound; one gear with the stated errors; from"
-        " what low orders or samples show to 2 rms of the rest beyond either peak"
+        "catalogue states an upper bound; one gear with the stated errors; bracket from"
+        " the peaks of low orders or samples to 2 rms of the other orders beyond either"
+        " peak"
     )
     values: list[float] = []
     if "fault" not in own:

@@ -1,4 +1,4 @@
-"""Computations of the comparison with the catalogue, kept from run to run."""
+"""Computations of the catalogue study, stored in the cache."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 Found = dict[str, Any]
 
 OUTSIDE = 1.37
-"""Outer diameter of the circular spline over the pitch diameter, for ratcheting: mean
-of 1.34 to 1.41 of component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm; dimension
-tables from memory, not checked)."""
+"""Outer diameter of the circular spline divided by the pitch diameter [-], for
+ratcheting: mean of 1.34 to 1.41 for component sets of sizes 14 to 32 (50, 60, 70, 85,
+110 mm; dimensions quoted from memory, not verified)."""
 ANGLES = 96
-"""Input angles over one output turn from which the accuracy is read."""
+"""Number of input angles over one output turn for the accuracy."""
 INDIVIDUAL_ANGLES = 8
-"""Input angles over one output turn at which an individual gear is loaded."""
+"""Number of input angles over one output turn at which an individual gear is loaded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,13 +41,13 @@ class CatalogueTask:
     """Key of :data:`KINDS`."""
     design: Design
     torques: tuple[float, ...] = ()
-    """[N·m]."""
+    """Output torques [N·m]."""
     work: float = 1.0
-    """Rough, to start long ones first."""
+    """Estimated relative work, so that long computations start first."""
 
 
 def run_task(task: CatalogueTask) -> Found:
-    """The result of a task, kept or computed; ``fault`` where it failed."""
+    """Result of a task, from the cache or computed; ``fault`` if it failed."""
     parts = {
         "study": _own_version(),
         "kind": task.kind,
@@ -73,7 +73,7 @@ def _own_version() -> str:
 
 
 def _whole_path(task: CatalogueTask, angles: Array | None = None) -> RubbedPath:
-    """The path of the rings to the last torque of a task."""
+    """Path of the rings up to the last torque of a task."""
     from swgjoint.fe.rings.friction import friction_path
 
     path = friction_path(task.design, task.torques, angles=angles)
@@ -87,7 +87,7 @@ def _whole_path(task: CatalogueTask, angles: Array | None = None) -> RubbedPath:
 
 
 def _path(task: CatalogueTask) -> Found:
-    """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
+    """Torsion without cup [rad] and sliding work per mu [J] over the torque."""
     path = _whole_path(task)
     work = path.teeth_work + path.race_work
     return {
@@ -106,14 +106,14 @@ def _path(task: CatalogueTask) -> Found:
 
 
 def _ratcheting(task: CatalogueTask) -> Found:
-    """Largest torque in the plane, with what the design's circular spline sits in."""
+    """Ratcheting torque of the 2D model, with the mounting of the circular spline."""
     from swgjoint.fe.plane.ratcheting import ratcheting_path
 
     return ratcheting_path(task.design).as_dict()
 
 
 def _individual(task: CatalogueTask) -> Found:
-    """Torsion behind the cup [rad] over the torque, at angles over an output turn."""
+    """Torsion without cup [rad] over the torque, at angles over an output turn."""
     from swgjoint.fe.rings.accuracy import output_turn_angles
 
     angles = output_turn_angles(task.design, INDIVIDUAL_ANGLES)
@@ -128,7 +128,7 @@ def _individual(task: CatalogueTask) -> Found:
 
 
 def _accuracy(task: CatalogueTask) -> Found:
-    """Kinematic error of the rings over one output turn at almost no load."""
+    """Kinematic error of the rings over one output turn at almost zero load."""
     from swgjoint.fe.rings.accuracy import output_turn_angles, transmission_error
 
     angles = output_turn_angles(task.design, ANGLES)
@@ -137,7 +137,7 @@ def _accuracy(task: CatalogueTask) -> Found:
 
 
 def _running(task: CatalogueTask) -> Found:
-    """Input torque of slow turning without load, and what rubs takes per mu."""
+    """Input torque of slow rotation without load, and friction torques per mu."""
     from swgjoint.fe.rings.running import running_friction
 
     found = running_friction(task.design)
@@ -151,7 +151,7 @@ def _running(task: CatalogueTask) -> Found:
 
 
 def _coning(task: CatalogueTask) -> Found:
-    """Torsion in space over the torque; the kind ends with that of the bearing."""
+    """Torsion of the 3D model over the torque; the kind ends with the bearing type."""
     from swgjoint.fe.solid.figures.torsion import solid_torsion
 
     bearing = {"rigid": None, "free": "free", "held": "held"}[task.kind.split()[1]]
@@ -169,7 +169,7 @@ def _coning(task: CatalogueTask) -> Found:
 
 
 def _coning_ring(task: CatalogueTask) -> Found:
-    """The same by the thin rings, the closed-form cup in series."""
+    """Torsion of the thin rings over the torque, with the closed-form cup in series."""
     path = _whole_path(task, np.zeros(1))
     at = np.searchsorted(path.torque, task.torques)
     return {
@@ -195,7 +195,7 @@ KINDS: dict[str, Callable[[CatalogueTask], Found]] = {
 
 
 def oval(design: Design) -> Design:
-    """The design with a circular spline as thick as those of component sets, free."""
+    """Design with a free circular spline as thick as in component sets."""
     drive = design.drive
     own = design.circular_spline
     root = drive.module_mm * (

@@ -1,4 +1,4 @@
-"""What lies behind the stiffness: size, mechanisms, the scatter of single gears."""
+"""Influences on the stiffness: size, mechanisms, scatter of individual gears."""
 
 from __future__ import annotations
 
@@ -23,11 +23,19 @@ from swgjoint.validation.catalogue.runs import Found
 def cube_scaling(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """How far the cube of the size goes: K of every size over that scaled from one.
+    """Compare K of every size with the values scaled by the cube of the size.
 
-    Segments end where both sizes have been loaded. Between their own torques curves
-    are cubics with the tangents that the rings tell: no value of one size is at the
-    scaled torque of another.
+    Segments end at the largest torque that both sizes reach. Between the computed
+    torques the curves are cubics with the computed tangents, because the scaled torques
+    of one size differ from the torques of another.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+        size: Size from which K is scaled.
+
+    Returns:
+        ``rows`` and ``lines`` for the terminal.
     """
     rows, worst = [], np.zeros(len(STIFFNESS))
     first = study.variants[0]
@@ -46,7 +54,7 @@ def cube_scaling(
             torques = np.minimum(edges(catalogue_row(other, ratio)), reach)
             own = np.diff(_smooth(there, torques))
             scaled = np.diff(_smooth(here, torques / scale))
-            both = np.diff(torques) > 0.0  # a last segment that neither reaches is none
+            both = np.diff(torques) > 0.0  # omit a last segment that neither reaches
             ratios = scaled[both] / own[both]
             worst[both] = np.maximum(worst[both], np.abs(ratios - 1.0))
             rows.append(
@@ -60,14 +68,14 @@ def cube_scaling(
     percent = "/".join(f"{100 * value:.0f}" for value in worst)
     line = (
         f"K1/K2/K3 computed at each size are within {percent} % of those of size"
-        f" {size} scaled by the cube, up to the torque that both reach: clearances do"
+        f" {size} scaled by the cube, up to the torque that both reach; clearances do"
         " not scale"
     )
     return {"rows": rows, "lines": [line]}
 
 
 def _smooth(path: RubbedPath, torques: Array) -> Array:
-    """Torsion, zero at no torque, on cubics with the tangents of the path [rad]."""
+    """Torsion by cubics with the tangents of the path [rad]; zero at zero torque."""
     curve = CubicHermiteSpline(path.torque, path.torsion, path.compliance)
     return np.concatenate([[0.0], curve(torques[1:])])
 
@@ -75,9 +83,18 @@ def _smooth(path: RubbedPath, torques: Array) -> Array:
 def shares(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Parts of the compliance over the torque, and K without the clearance.
+    """Shares of the mechanisms in the compliance, and K without bearing clearance.
 
-    Parts are of the tangent: clearance that is taken up has none, but shows in K.
+    The shares refer to the tangent compliance. A clearance that is taken up has no
+    share in it, but it reduces K.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+        size: Size of the drives.
+
+    Returns:
+        ``rows`` and ``lines`` for the terminal.
     """
     rows, lines = [], []
     first = study.variants[0]
@@ -104,7 +121,7 @@ def shares(
         )
         torques = "/".join(f"{torque:.3g}" for torque in path.torque)
         lines.append(
-            f"share in the compliance [%], size {size}, ratio {ratio}, at {torques}"
+            f"share of the compliance [%], size {size}, ratio {ratio}, at {torques}"
             f" N·m: {text}"
         )
         tight = found[f"{name} tight"]
@@ -133,7 +150,15 @@ def shares(
 def individual_summary(
     study: CatalogueFile, found: Mapping[str, Found]
 ) -> dict[str, Any]:
-    """Mean of K over the individual gears, scatter among them and within each."""
+    """Mean of K over individual gears, and its scatter between and within gears.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+
+    Returns:
+        ``rows`` and ``lines`` for the terminal.
+    """
     own = study.individuals
     row = catalogue_row(own.size, own.ratio)
     tables = [
@@ -163,7 +188,13 @@ def individual_summary(
 
 
 def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array:
-    """K1, K2, K3 at each wave-generator angle by itself (n_angles, 3) [N·m/rad]."""
+    """K1, K2, K3 at each wave-generator angle [N·m/rad], shape (n_angles, 3).
+
+    Args:
+        found: Result of kind ``individual``.
+        design: Individual gear, for the compliance of the cup.
+        row: Ratings with the torques of the segments.
+    """
     torque = np.array(found["torque_Nm"])
     series = series_compliance(design, cup=True)
     x = np.array(found["ring_torsion_rad"]) + series * torque
@@ -173,11 +204,16 @@ def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array
 
 
 def scatter(values: Array) -> tuple[Array, Array]:
-    """Standard deviations within and between gears, analysis of variance (textbook).
+    """Standard deviations within and between gears, by analysis of variance (textbook).
+
+    The mean of a gear over its angles also scatters because of the angles; this part is
+    subtracted.
 
     Args:
-        values: Shape (n_gears, n_angles, n). The mean of a gear over its angles still
-            scatters by the angles, which is taken off.
+        values: Values, shape (n_gears, n_angles, n).
+
+    Returns:
+        Standard deviations within and between gears, shape (n,) each.
     """
     within = values.var(axis=1, ddof=1).mean(axis=0)
     means = values.mean(axis=1).var(axis=0, ddof=1)
@@ -188,7 +224,16 @@ def scatter(values: Array) -> tuple[Array, Array]:
 def friction(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Loop by coefficient of friction and torque amplitude, at one size."""
+    """Hysteresis loop by friction coefficient and torque amplitude, at one size.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+        size: Size of the drives.
+
+    Returns:
+        ``rows`` and ``lines`` for the terminal.
+    """
     rows, lines = [], []
     first = study.variants[0]
     for ratio in study.ratios:
@@ -216,9 +261,10 @@ def friction(
         grows = np.polyfit(np.log(torque[2:]), np.log(work[2:]), 1)[0]
         mus = "/".join(f"{row['mu']:g}" for row in some)
         lines.append(
-            f"friction, size {size}, ratio {ratio}: {loss} arcmin wide at no load with"
-            f" mu {mus} (play included); with mu {some[-1]['mu']:g} {wide} arcmin wide"
-            f" between {', '.join(f'{t:.3g}' for t in torque)} N·m; work of a round"
-            f" grows with torque to the {grows:.1f}"
+            f"friction, size {size}, ratio {ratio}: loop width {loss} arcmin at zero"
+            f" load for mu {mus} (including play); for mu {some[-1]['mu']:g} loop width"
+            f" {wide} arcmin at torque amplitudes"
+            f" {', '.join(f'{t:.3g}' for t in torque)} N·m; work per cycle proportional"
+            f" to torque to the power {grows:.1f}"
         )
     return {"rows": rows, "lines": lines}

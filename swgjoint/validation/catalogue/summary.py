@@ -1,4 +1,4 @@
-"""What the rows of the comparison with the catalogue add up to."""
+"""Summary of the rows of the catalogue study."""
 
 from __future__ import annotations
 
@@ -12,9 +12,16 @@ from swgjoint.validation.rows import Row
 
 
 def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
-    """Range of model over catalogue by quantity and ratio, goals that are met.
+    """Range of model over catalogue by quantity and ratio, and the goals met.
 
-    A case without a value, or that lost a variant, counts as one that fails.
+    A case without a value, or with a failed variant, counts as a missed goal.
+
+    Args:
+        study: Study file.
+        rows: Rows of the study.
+
+    Returns:
+        Lines for the terminal.
     """
     lines = []
     for quantity in dict.fromkeys(row.quantity for row in rows):
@@ -50,7 +57,7 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
 
 
 def _range(rows: Sequence[Row]) -> str:
-    """Smallest and largest middle over the catalogue, and ends of the brackets."""
+    """Range of the middles relative to the catalogue, and ends of the brackets."""
     if not rows:
         return "no middle"
     middle = [row.more["over_source"] for row in rows]
@@ -62,12 +69,12 @@ def _range(rows: Sequence[Row]) -> str:
 
 
 def _part(value: float) -> str:
-    """Two decimals; two digits of what is far smaller."""
+    """Format with two decimals, or with two digits below 0.05."""
     return f"{value:.2f}" if value >= 0.05 else f"{value:.2g}"
 
 
 def _rising(rows: Sequence[Row]) -> list[str]:
-    """Numbers of cases in which K1 < K2 < K3 fails, or is unknown."""
+    """Number of cases in which K1 < K2 < K3 fails or is unknown."""
     cases: dict[str, list[float]] = {}
     for row in rows:
         if row.quantity in STIFFNESS:
@@ -75,19 +82,24 @@ def _rising(rows: Sequence[Row]) -> list[str]:
             values += [] if row.ours is None else [row.ours]
     if not cases:
         return []
-    told = [values for values in cases.values() if len(values) == len(STIFFNESS)]
-    fails = sum(not values[0] < values[1] < values[2] for values in told)
+    known = [values for values in cases.values() if len(values) == len(STIFFNESS)]
+    fails = sum(not values[0] < values[1] < values[2] for values in known)
     line = f"K1 < K2 < K3 fails in {fails} of {len(cases)} cases"
-    lost = len(cases) - len(told)
-    return [line + f" and cannot be told in {lost}" * (lost > 0)]
+    lost = len(cases) - len(known)
+    return [line + f" and is unknown in {lost}" * (lost > 0)]
 
 
 def ratcheting_orders(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> list[str]:
-    """Ratios from the largest ratcheting torque to the smallest, ours and theirs.
+    """Order of the ratios by ratcheting torque, in the model and in the catalogue.
 
-    By flank, among the ratios for which a limit was found.
+    There is one line per flank angle; it contains the ratios whose limit was found.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+        size: Size of the drives.
     """
     lines = []
     for flank in dict.fromkeys(v.flank_deg for v in study.variants):
@@ -116,7 +128,17 @@ def compare_scaling(
     size: int,
     check: tuple[int, int],
 ) -> list[str]:
-    """What is scaled from one size over what is computed at another, where both are."""
+    """Ratio of values scaled from one size to values computed at another.
+
+    Args:
+        study: Study file.
+        found: Results by computation.
+        size: Size from which values are scaled.
+        check: Size and ratio at which values are also computed.
+
+    Returns:
+        Lines for the terminal, for the quantities that were computed at both sizes.
+    """
     other, ratio = check
     first = study.variants[0]
 
@@ -128,8 +150,8 @@ def compare_scaling(
                 return ""
             values.append(value(result, variant_design(one, ratio, first)))
         return (
-            f"{kind}, ratio {ratio}: scaled from size {size} over computed at size"
-            f" {other}: {factor * values[0] / values[1]:.3f}"
+            f"{kind}, ratio {ratio}: value scaled from size {size} over value computed"
+            f" at size {other}: {factor * values[0] / values[1]:.3f}"
         )
 
     scale = other / size

@@ -1,4 +1,4 @@
-"""Cases of a study file: designs, loads and the values that a source prints."""
+"""Cases of a study file: designs, loads and printed values of the source."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ Listed = Field(strict=False)  # TOML has lists, the models tuples
 
 
 class CaseEntry(Section):
-    """One case: a design, a load and what the source prints for it."""
+    """One case: a design, a load and the printed values of the source."""
 
     name: Text | None = None
-    """Without it the case is named after the group's parameter."""
+    """Name; None for a name made of the parameter of the group."""
     value: float | None = None
-    """Value of the group's parameter."""
+    """Value of the parameter of the group."""
     base: Text | None = None
     changes: Mapping[str, Any] = {}
     torque_Nm: Torque | None = None
     state: Literal["turn", "wave_generator", "meshed"] = "turn"
-    """Mean of the per-position maxima over the turn, or one state of the set-up."""
+    """Mean over the turn of the largest stress at each position, or one state of the
+    set-up."""
     angle_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Read at this position of the wave generator instead of over the turn."""
+    """Wave-generator angle at which the stress is read [deg]; None for the turn."""
     tensile_MPa: Stress | None = None
     compressive_MPa: Stress | None = None
     von_mises_MPa: Stress | None = None
@@ -62,28 +63,30 @@ class GroupEntry(Section):
     changes: Mapping[str, Any] = {}
     torque_Nm: Torque | None = None
     positions: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Positions of the wave generator over the turn; those of the file without."""
+    """Number of wave-generator positions over the turn; None for the value of the file.
+    """
     turn_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Turn of the input [deg]; that of the file without."""
+    """Turn of the input [deg]; None for the value of the file."""
     keys: Annotated[tuple[str, ...], Listed] = ()
-    """Dotted keys of the design that take the value of a case: the parameter."""
+    """Parameter: dotted keys of the design that take the value of a case."""
     symbol: str = ""
     unit: str = ""
     lowest: Mapping[Kind, float] = {}
-    """Parameter with the lowest stress, as the source states it."""
+    """Parameter value of the lowest stress according to the source, by stress."""
     highest: Mapping[Kind, float] = {}
+    """Parameter value of the highest stress according to the source, by stress."""
     flat: Annotated[tuple[Kind, ...], Listed] = ()
-    """Stresses that do not depend on the parameter, as the source states it."""
+    """Stresses that do not depend on the parameter according to the source."""
     flat_range: Annotated[tuple[float, float], Listed] | None = None
-    """Values of the parameter between which that holds; all without."""
+    """Range of the parameter for ``flat``; None for all values."""
     over: str | None = None
-    """Group of the same parameter whose von Mises stress this one is compared with."""
+    """Group with the same parameter whose von Mises stress is the reference."""
     statement: str = ""
     note: str = ""
     converge: bool = False
     """Whether the cases are also computed on finer meshes."""
     rank: bool = False
-    """Whether the order of the printed values is compared with ours."""
+    """Whether the order of the printed values is compared with our order."""
     cases: Annotated[tuple[CaseEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
@@ -93,13 +96,13 @@ class GroupEntry(Section):
         for k, case in enumerate(self.cases):
             if (case.value is not None) != bool(self.keys):
                 faults.append(
-                    (f"cases[{k}].value", "accepted: exactly where the group has keys")
+                    (f"cases[{k}].value", "expected if and only if the group has keys")
                 )
             if case.name is None and case.value is None:
                 faults.append((f"cases[{k}].name", "missing; accepted: a string"))
         given = [value for value in values if value is not None]
         if any(b <= a for a, b in pairwise(given)):
-            faults.append(("cases", "accepted: values in increasing order"))
+            faults.append(("cases", "expected values in increasing order"))
         for key in ("lowest", "highest"):
             faults += [
                 (f"{key}.{kind}", f"{value:g}; accepted: the value of a case")
@@ -108,7 +111,7 @@ class GroupEntry(Section):
             ]
         names = [self.name_of(case) for case in self.cases]
         if len(set(names)) < len(names):
-            faults.append(("cases", "accepted: names that differ"))
+            faults.append(("cases", "expected different names"))
         if faults:
             raise Fault(*faults)
         return self
@@ -128,17 +131,18 @@ class StudyFile(Section):
     torque_Nm: Torque
     model: Literal["2d", "3d"] = "2d"
     positions: Annotated[int, Field(ge=1, le=1000)]
-    """Positions of the wave generator over the turn."""
+    """Number of wave-generator positions over the turn."""
     turn_deg: Annotated[float, Field(gt=0, le=360)] = 180.0
     """Turn of the input [deg]."""
     refinements: Annotated[tuple[Refinement, ...], Listed] = (2.0, 3.0)
-    """Meshes beyond that of the thesis for the groups that converge."""
+    """Refinements of the finer meshes, for groups with ``converge``."""
     fine_positions: Annotated[int, Field(ge=1, le=1000)] = 12
-    """On those meshes, over one pitch of the fixed member. Without tolerances the
-    pattern repeats with that pitch, and 35 positions over half a turn (61 pitches) are
-    35 equidistant phases of it: the mean over 12 phases agrees to 0.1 %."""
+    """Number of positions on the finer meshes, over one pitch of the fixed member.
+    Without tolerances the pattern repeats with that pitch, and 35 positions over half a
+    turn (61 pitches) are 35 equidistant phases of the pitch. The mean over 12 phases
+    agrees with the mean over 35 within 0.1 %."""
     contradictions: Annotated[tuple[Text, ...], Listed] = ()
-    """Contradictions of the source with itself, and what the cases follow."""
+    """Contradictions inside the source, and the version that the cases follow."""
     group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
@@ -146,10 +150,10 @@ class StudyFile(Section):
         ids = [group.id for group in self.group]
         twice = sorted({i for i in ids if ids.count(i) > 1})
         if twice:
-            raise Fault(("group", f"id {', '.join(twice)} more than once"))
+            raise Fault(("group", f"id {', '.join(twice)} used more than once"))
         keys = {group.id: group.keys for group in self.group}
         faults = [
-            (f"group[{k}].over", f"{g.over!r}; accepted: a group of the same keys")
+            (f"group[{k}].over", f"{g.over!r}: expected a group with the same keys")
             for k, g in enumerate(self.group)
             if g.over is not None and (keys.get(g.over) != g.keys or not g.keys)
         ]
@@ -173,9 +177,9 @@ class StudyFile(Section):
         return self.model == "2d"
 
     def chosen(self, only: tuple[str, ...]) -> tuple[GroupEntry, ...]:
-        """Groups whose id is, or starts with, one of the given parts; all without.
+        """Groups whose id equals or starts with one of the parts; all if none is given.
 
-        ``5.4`` chooses 5.4.1 to 5.4.4, ``table-5.6`` one table.
+        For example, ``5.4`` chooses 5.4.1 to 5.4.4, and ``table-5.6`` one table.
 
         Raises:
             InputError: If a part chooses nothing.
@@ -188,7 +192,7 @@ class StudyFile(Section):
         unknown = [p for p in only if not any(chooses(p, g) for g in self.group)]
         if unknown:
             accepted = ", ".join(group.id for group in self.group)
-            raise InputError(f"part {', '.join(unknown)}; accepted: {accepted}")
+            raise InputError(f"unknown part {', '.join(unknown)}; accepted: {accepted}")
         return tuple(
             g for g in self.group if not only or any(chooses(p, g) for p in only)
         )
@@ -201,7 +205,7 @@ class Case:
     group: GroupEntry
     entry: CaseEntry
     design: Design | None
-    """None where the design is refused; ``fault`` says why."""
+    """Design; None if it is refused, see ``fault``."""
     fault: str | None
     torque: float
     """Nominal torque T [N·m]."""
@@ -218,7 +222,13 @@ class Case:
 
 
 def case_of(study: StudyFile, group: GroupEntry, entry: CaseEntry) -> Case:
-    """Build the design of a case: its base with the changes of group and case."""
+    """Build the design of a case: its base with the changes of group and case.
+
+    Args:
+        study: Study file.
+        group: Group of the case.
+        entry: Entry of the case.
+    """
     base = Design.preset(entry.base or group.base)
     changes: Mapping[str, Any] = {
         **group.changes,

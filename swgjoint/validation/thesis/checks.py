@@ -1,4 +1,4 @@
-"""Rank orders and trends: what a source states that no single number holds."""
+"""Rank orders and trends that a source states about several values."""
 
 from __future__ import annotations
 
@@ -14,32 +14,33 @@ if TYPE_CHECKING:
     from swgjoint.validation.thesis.rows import CaseRecords
 
 RANK_GAP = 0.05
-"""Two printed values that differ by less have no rank (the mesh study of the thesis
-spreads one design over 15 %)."""
+"""Smallest relative difference of two printed values that have a rank [-]; in the mesh
+study of the thesis, the values of one design differ by 15 %."""
 TIE = 0.02
-"""A stress that exceeds the lowest by less counts as lowest."""
+"""Relative difference below which a stress counts as equal to the extreme one [-]."""
 FLAT = 0.05
-"""Spread over a sweep that counts as no influence."""
+"""Largest relative spread over a sweep that counts as no influence [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RankCheck:
-    """Whether the von Mises stresses of a table come in the printed order."""
+    """Whether the von Mises stresses of a table have the printed order."""
 
     part: str
     tenth: bool
+    """Whether the load is T/10 instead of T."""
     pairs: int
-    """Pairs whose printed values differ by more than 5 %."""
+    """Number of pairs whose printed values differ by more than 5 %."""
     swapped: tuple[tuple[str, str], ...]
-    """(printed lower, printed higher) that come out the other way round."""
+    """Pairs (printed lower, printed higher) that we find in the opposite order."""
     missing: tuple[str, ...]
     """Cases without a value."""
     added: dict[str, float]
-    """What the torque adds from T/10 to T, by case [MPa]: the cause of a swap at T."""
+    """Stress increase from T/10 to T by case [MPa], which explains a swap at T."""
 
     @property
     def agrees(self) -> bool:
-        """Whether every pair was found in the printed order."""
+        """Whether every pair has the printed order."""
         return not self.swapped and not self.missing
 
     @property
@@ -68,7 +69,7 @@ class RankCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class TrendCheck:
-    """Whether a stress is lowest, highest or constant where the source says so."""
+    """Whether a stress is lowest, highest or constant as the source states."""
 
     part: str
     kind: Kind
@@ -76,9 +77,9 @@ class TrendCheck:
     claim: str
     """``lowest``, ``highest`` or ``flat``."""
     stated: float | None
-    """Parameter that the source names."""
+    """Parameter value stated by the source."""
     ours: float | None
-    """Parameter that we find; for ``flat`` the spread, largest/smallest - 1."""
+    """Parameter value that we find; for ``flat`` the spread, largest/smallest - 1."""
     agrees: bool
     refinement: float
 
@@ -109,7 +110,7 @@ def _groups(results: Sequence[CaseRecords]) -> Iterator[list[CaseRecords]]:
 
 
 def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
-    """Rank orders of the tables that ask for it, at T/10 and at T."""
+    """Checks of the rank order at T/10 and at T, for all groups with ``rank``."""
     checks = []
     for cases in _groups(results):
         group = cases[0].case.group
@@ -153,9 +154,9 @@ def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
 
 
 def trend_checks(results: Sequence[CaseRecords]) -> list[TrendCheck]:
-    """Stated extremes and constancies of the sweeps, at T/10 and at T.
+    """Checks of the stated extremes and constant stresses, at T/10 and at T.
 
-    Where a sweep was also run on finer meshes, the finest is checked too.
+    If a sweep was also run on finer meshes, the finest mesh is checked as well.
     """
     checks = []
     for cases in _groups(results):
@@ -184,7 +185,7 @@ class _Sweep:
     refinement: float
 
     def values(self, kind: Kind) -> list[tuple[float, float]]:
-        """(parameter, stress) where both are known."""
+        """Pairs (parameter, stress), where both are known."""
         return [
             (case.case.entry.value, value)
             for case in self.cases
@@ -196,10 +197,10 @@ class _Sweep:
         return case.value(kind, tenth=self.tenth, refinement=self.refinement)
 
     def extreme(self, kind: Kind, claim: str, stated: float) -> TrendCheck:
-        """Whether the stress at the stated parameter is the lowest (highest)."""
+        """Check whether the stress at the stated parameter is the lowest (highest)."""
         sign = 1.0 if claim == "lowest" else -1.0
         values = self.values(kind)
-        several = len(values) > 1  # one value alone is no extreme
+        several = len(values) > 1  # a single value has no extreme
         ours = min(values, key=lambda item: sign * item[1]) if several else None
         there = next((stress for value, stress in values if value == stated), None)
         agrees = (
@@ -211,7 +212,7 @@ class _Sweep:
         return self._check(kind, claim, stated, found, agrees)
 
     def flat(self, kind: Kind) -> TrendCheck:
-        """Whether the stress is the same over the stated range."""
+        """Check whether the stress is constant over the stated range."""
         low, high = self.cases[0].case.group.flat_range or (-inf, inf)
         stresses = [s for p, s in self.values(kind) if low <= p <= high]
         spread = max(stresses) / min(stresses) - 1.0 if len(stresses) > 1 else None

@@ -1,4 +1,4 @@
-"""One simulation of meshing as the small record that a study keeps."""
+"""Record of one meshing simulation, with the values that the study stores."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ NUMBER = float | None
 
 @dataclass(frozen=True, kw_only=True)
 class RunSpec:
-    """What a simulation of meshing depends on."""
+    """Inputs of a meshing simulation."""
 
     design: Design
     torque: float
-    """T [N·m]."""
+    """Output torque [N·m]."""
     positions: int
     turn: float
-    """Turns of the input that the positions divide."""
+    """Input rotation over which the positions are distributed [turns]."""
     model: str = "2d"
 
     @property
     def parts(self) -> dict[str, Any]:
-        """The design, the load and the code of the record."""
+        """Parts of the cache key: design, load and the code of the record."""
         return {
             "study": _own_version(),
             "design": self.design.content_hash(),
@@ -47,12 +47,12 @@ class RunSpec:
 
     @property
     def name(self) -> str:
-        """Hash of the parts and of all other code."""
+        """Hash of the parts and of the other code of the package."""
         return key_of(self.parts)
 
     @property
     def work(self) -> float:
-        """Rough work, so that long runs start first: positions times nodes."""
+        """Estimated work, so that long runs start first: positions times nodes."""
         fine = float(self.design.mesh.refinement)
         work = fine**2 if self.model == "2d" else 30.0 * fine**3
         return self.positions * work
@@ -60,32 +60,33 @@ class RunSpec:
 
 @lru_cache
 def _own_version() -> str:
-    """Hash of the code of this part that decides a record."""
+    """Hash of the code in this package that determines a record."""
     here = "validation/thesis"
     return code_hash(f"{here}/record.py", f"{here}/stress_places.py")
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunRecord:
-    """Stresses of the flexspline in MPa by kind; None where there is none."""
+    """Stresses of the flexspline by kind [MPa]; None if there is no value."""
 
     outcome: str
-    """``converged``, the outcome of the first position that failed, ``failed`` where
-    not even the set-up was solved, or ``refused`` for a design that is no drive."""
+    """``converged``, the outcome of the first failed position, ``failed`` if the set-up
+    was not solved, or ``refused`` for an invalid design."""
     message: str | None = None
     failed_positions: int = 0
     wall_s: float = 0.0
     average: Mapping[str, NUMBER] = field(default_factory=dict)
-    """Mean over the positions of the largest nodal stress."""
+    """Largest nodal stress, averaged over the positions."""
     away: Mapping[str, NUMBER] = field(default_factory=dict)
-    """The same without the nodes next to loaded tooth contacts."""
+    """``average`` without the nodes next to loaded tooth contacts."""
     last: Mapping[str, NUMBER] = field(default_factory=dict)
     """Largest nodal stress at the last position."""
     places: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    """How often the largest stress sat where."""
+    """Number of positions with the largest stress at each place, by kind."""
     setup: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """By state of the set-up."""
+    """Largest stresses by state of the set-up."""
     per_position: Mapping[str, list[NUMBER]] = field(default_factory=dict)
+    """Largest nodal stress at each position, by kind."""
     angle_deg: list[float] = field(default_factory=list)
     pairs_in_contact: list[int | None] = field(default_factory=list)
 
@@ -96,12 +97,12 @@ class RunRecord:
 
 
 def record_run(spec: RunSpec) -> RunRecord:
-    """The record of a run, from the cache or computed and then kept."""
+    """Record of a run, from the cache or computed and stored."""
     return recall("studies", spec.parts, RunRecord, lambda: compute(spec))
 
 
 def compute(spec: RunSpec) -> RunRecord:
-    """Simulate meshing; what fails is part of the record, not an error."""
+    """Simulate meshing; a failure is part of the record, not an error."""
     from swgjoint.fe.meshing import simulate_meshing
 
     begin = time.perf_counter()
@@ -123,7 +124,7 @@ def compute(spec: RunSpec) -> RunRecord:
 
 
 _Largest = tuple[dict[str, float], dict[str, float], dict[str, str]]
-"""By kind: stress over all nodes, the same away from tooth contacts [Pa], the place."""
+"""By kind: largest stress over all nodes, and away from tooth contacts [Pa]; place."""
 
 
 def _plane(run: Any) -> list[_Largest | None]:
@@ -136,7 +137,7 @@ def _plane(run: Any) -> list[_Largest | None]:
 
 
 def _solid(run: Any) -> list[_Largest | None]:
-    """The same for the 3D model, which does not mark nodes next to contacts."""
+    """Largest stresses of the 3D model, which does not mark nodes next to contacts."""
     rows: list[_Largest | None] = []
     for step in run.steps:
         if step.stress is None:

@@ -1,4 +1,4 @@
-"""Report and plots of a study of the thesis."""
+"""Report and plots of the thesis study."""
 
 from __future__ import annotations
 
@@ -29,21 +29,22 @@ _COLUMNS = {
 }
 
 _HEAD = """\
-# {source}: the studies in {space}, run again
+# {source}: recomputation of the {space} studies
 
-Largest nodal stress of the flexspline in MPa, mean over {positions} positions of the
-wave generator in half a turn (refinement 1, the mesh of the thesis). T is the stated
-torque, T/10 {tenth}. Deviations are
-of ours from the thesis. "fine" is the finest mesh computed (refinement {finest:g}, mean
-over {fine_positions} positions in one pitch).
+The tables list the largest nodal stress of the flexspline in MPa, averaged over
+{positions} positions of the wave generator in half a turn (refinement 1, the mesh of
+the thesis). T is the stated torque. {tenth}
+Deviations are those of our values from the thesis. "fine" is the finest mesh
+(refinement {finest:g}, mean over {fine_positions} positions in one pitch).
 
 {summary}
 """
 _TENTH = {
-    "2d": """an inference about what the thesis applied: its stresses rise with torque
-about ten times less than statics of a ring of the stated width asks for""",
-    "3d": """stands beside it because in the plane the thesis' stresses speak for it;
-in space rows are judged at T, and finer meshes are at T only""",
+    "2d": """T/10 is the torque that the thesis probably applied: its
+stresses increase with torque about ten times less than the statics of a ring of the
+stated width requires.""",
+    "3d": """T/10 is listed because the 2D stresses of the thesis
+suggest this torque. Rows in 3D are judged at T, and finer meshes are at T only.""",
 }
 
 
@@ -54,10 +55,10 @@ def report_pages(
     trends: Sequence[TrendCheck],
     summary: Sequence[str],
 ) -> dict[str, Page]:
-    """``thesis.md`` and one plot for each part, by file name.
+    """``thesis.md`` and one plot per part, by file name.
 
     Args:
-        study: The study file.
+        study: Study file.
         results: Runs of all cases.
         rows: Rows of the study.
         trends: Checks of the stated trends.
@@ -80,7 +81,7 @@ def _markdown(
 ) -> str:
     head = _HEAD.format(
         source=study.source[:1].upper() + study.source[1:],
-        space="the plane" if study.model == "2d" else "space",
+        space="2D" if study.model == "2d" else "3D",
         positions=study.positions,
         tenth=_TENTH[study.model],
         finest=study.refinements[-1],
@@ -101,9 +102,9 @@ def _markdown(
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:
-    """Markdown table of one part, then its reasons."""
+    """Markdown table of one part, followed by its reasons."""
     plain_rows = [row.to_json() for row in rows]
-    # columns that are empty throughout say nothing
+    # omit empty columns
     keys = [k for k in _COLUMNS if any(row[k] is not None for row in plain_rows)]
     yield "| " + " | ".join(_COLUMNS[key] for key in keys) + " |"
     yield "|" + "---|" * len(keys)

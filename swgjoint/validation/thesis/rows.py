@@ -1,4 +1,4 @@
-"""Rows of the thesis study: one case and stress, at T and T/10, with its reason."""
+"""Rows of the thesis study: one stress of a case, at T and T/10, with its reason."""
 
 from __future__ import annotations
 
@@ -18,17 +18,24 @@ class CaseRecords:
 
     case: Case
     nominal: Mapping[float, RunRecord]
+    """Records at T by refinement."""
     tenth: Mapping[float, RunRecord]
+    """Records at T/10 by refinement."""
     by_tenth: bool = True
-    """Whether the rows are judged at T/10; else at T."""
+    """Whether the rows are judged at T/10 instead of T."""
 
     @property
     def meshes(self) -> tuple[float, ...]:
-        """Refinements, that of the thesis first."""
+        """Refinements in increasing order; the first one is the mesh of the thesis."""
         return tuple(sorted(self.nominal))
 
     def stress_by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
-        """Stress by refinement, where known [MPa]."""
+        """Stress by refinement, where known [MPa].
+
+        Args:
+            kind: Kind of stress.
+            tenth: Whether the load is T/10 instead of T.
+        """
         found = {
             mesh: self.value(kind, tenth=tenth, refinement=mesh) for mesh in self.meshes
         }
@@ -37,7 +44,14 @@ class CaseRecords:
     def value(
         self, kind: Kind, *, tenth: bool, refinement: float = 1, away: bool = False
     ) -> float | None:
-        """Stress [MPa]; None where the run failed or was not made."""
+        """Stress [MPa]; None if the run failed or does not exist.
+
+        Args:
+            kind: Kind of stress.
+            tenth: Whether the load is T/10 instead of T.
+            refinement: Mesh refinement.
+            away: Whether nodes next to loaded tooth contacts are excluded.
+        """
         record = (self.tenth if tenth else self.nominal).get(refinement)
         entry = self.case.entry
         if record is None:
@@ -52,17 +66,25 @@ class CaseRecords:
 
     @property
     def over_turn(self) -> bool:
-        """Whether the case is a mean over the turn, not one state or position."""
+        """Whether the case is a mean over the turn instead of one state or position."""
         return self.case.entry.state == "turn" and self.case.entry.angle_deg is None
 
     def places(self, kind: Kind, *, tenth: bool) -> dict[str, int]:
-        """How often the largest stress sat where; empty for a single state."""
+        """Number of positions with the largest stress at each place.
+
+        Args:
+            kind: Kind of stress.
+            tenth: Whether the load is T/10 instead of T.
+
+        Returns:
+            Number by place; empty for a single state.
+        """
         record = (self.tenth if tenth else self.nominal)[1]
         return dict(record.places.get(kind, {})) if self.over_turn else {}
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What failed at which torque, each advice once."""
+        """Failures with their torques; each message appears once."""
         lines: dict[str, list[str]] = {}
         for name, record in (("T", self.nominal[1]), ("T/10", self.tenth[1])):
             if not record.ok:
@@ -73,12 +95,12 @@ class CaseRecords:
 
 
 def stress_rows(results: Sequence[CaseRecords]) -> list[Row]:
-    """Three rows a case."""
+    """Three rows per case, one for each kind of stress."""
     return [_row(result, kind) for result in results for kind in KINDS]
 
 
 def increase_rows(results: Sequence[CaseRecords]) -> list[Row]:
-    """Von Mises stress over that of the group with less torque, where both were run."""
+    """Increase of the von Mises stress over the group with less torque, if run."""
     known = {(r.case.group.id, r.case.entry.value): r for r in results}
     rows = []
     for result in results:
@@ -182,7 +204,7 @@ _NUMBERS = (
 
 
 def _columns(result: CaseRecords, kind: Kind, **known: Any) -> dict[str, Any]:
-    """The study's own columns, the same for every row; what is not known is None."""
+    """Further columns of the study, equal for every row; unknown values are None."""
     case = result.case
     return {
         "part": case.group.id,

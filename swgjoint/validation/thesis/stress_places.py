@@ -1,4 +1,4 @@
-"""Where the largest stress of the flexspline sits: fillet, bore, contact or inside."""
+"""Place of the largest stress of the flexspline: fillet, bore, contact or inside."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from swgjoint.fe.plane.stress import KINDS, flexspline_stress
 
 PLACES = ("fillet", "flank", "bore", "inside", "contact")
 NEAR = 0.25
-"""A node this near to a tooth contact that carries force counts as its neighbourhood
-[modules]; a length, not elements, so that it means the same on every mesh. The patches
-of the contacts are smaller."""
+"""Distance from a loaded tooth contact within which a node counts as next to it
+[modules]. It is a length instead of a number of elements, so that it does not depend on
+the mesh. The contact patches are smaller."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StressPlaces:
-    """Place of every node of a model's flexspline sector."""
+    """Place of every node in a flexspline sector of a model."""
 
     model: SectorModel
 
     @cached_property
     def _of_node(self) -> NDArray[np.int64]:
-        """Index into :data:`PLACES`, contacts apart. Shape (n_nodes,)."""
+        """Index into :data:`PLACES` without contacts, shape (n_nodes,)."""
         element = self.model.element
         mesh, profile = element.mesh, element.profile
         place = np.full(mesh.mesh.p.shape[1], PLACES.index("inside"))
         names = [part.name for part in profile.segments]
-        # the fillet is the last segment before the root land, whatever its name
+        # the fillet is the last segment before the root land
         fillet = len(names) - (2 if names[-1] == "root_land" else 1)
         at_flank = mesh.flank_stations < profile.stations[fillet]
         for side in (mesh.flank_right, mesh.flank_left):
@@ -44,7 +44,7 @@ class StressPlaces:
         return place
 
     def near_contact(self, state: State) -> NDArray[np.bool_]:
-        """Nodes next to a loaded tooth contact. Shape (N, n_nodes)."""
+        """Nodes next to a loaded tooth contact, shape (n_sectors, n_nodes)."""
         element = self.model.element
         points = element.mesh.mesh.p.T
         near = np.zeros((self.model.sectors, len(points)), dtype=bool)
@@ -62,11 +62,12 @@ class StressPlaces:
     def largest(
         self, state: State
     ) -> tuple[dict[str, float], dict[str, float], dict[str, str]]:
-        """Largest nodal stress, the same away from tooth contacts, and where it is.
+        """Largest nodal stress, also away from tooth contacts, and its place.
 
         Returns:
-            By kind: over all nodes [Pa]; over the nodes that are not beside a tooth
-            contact [Pa]; the place of the first.
+            Three mappings by kind: largest stress over all nodes [Pa]; largest stress
+            over the nodes that are not next to a tooth contact [Pa]; place of the
+            former.
         """
         near = self.near_contact(state)
         stresses = stress_maxima(flexspline_stress(self.model, state))

@@ -1,14 +1,15 @@
-"""``swgjoint study thesis``: the studies of the thesis, run again.
+"""``swgjoint study thesis``: recomputation of the studies of the thesis.
 
-Chapters 4 to 6 by default, with the 2D model; chapter 7 with ``--model 3d``.
+By default these are the studies of chapters 4 to 6 with the 2D model; with
+``--model 3d`` they are those of chapter 7.
 
-Every case is simulated at the nominal torque T and at T/10: the stress increments with
-torque that the thesis prints are about ten times too small for its stated torque and
-face width, so T is the physics and T/10 an inference about what the thesis applied.
-Nothing else is scaled. One mesh (refinement 1) and one extraction rule hold for all
-rows: the mean over the positions of the largest nodal stress of the flexspline. The
-mean over the same positions away from loaded tooth contacts stands beside it. In space
-T is what the rows are judged by, T/10 stands beside it, and finer meshes are at T only.
+Every case is simulated at the nominal torque T and at T/10. The printed stress
+increments with torque are about ten times too small for the stated torque and face
+width. T is therefore the physical load, and T/10 the load that the thesis probably
+applied. Nothing else is scaled. All rows use the same mesh (refinement 1) and the same
+quantity: the largest nodal stress of the flexspline, averaged over the positions. The
+same average away from loaded tooth contacts is also listed. 3D rows are judged at T;
+T/10 is also listed, and finer meshes are computed at T only.
 """
 
 from __future__ import annotations
@@ -45,7 +46,12 @@ def run_thesis(options: StudyOptions) -> StudyResult:
 
 
 def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
-    """Simulate the cases of a study file and compare them with its printed values."""
+    """Simulate the cases of a study file and compare them with its printed values.
+
+    Args:
+        study: Study file.
+        options: Parts, number of processes and progress.
+    """
     begin = time.perf_counter()
     cases = [
         case_of(study, group, entry)
@@ -54,13 +60,13 @@ def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
     ]
     plan = {case.name: _specs(study, case) for case in cases}
     specs = [spec for row in plan.values() for spec in row.values()]
-    records = compute_all(record_run, specs, options, stage="simulations of meshing")
+    records = compute_all(record_run, specs, options, stage="meshing simulations")
     results = [_collect(study, case, plan[case.name], records) for case in cases]
     return _result(study, results, begin, len(records))
 
 
 def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, float], RunSpec]:
-    """Runs of a case by (whether at T/10, refinement)."""
+    """Runs of a case by (whether the load is T/10, refinement)."""
     if case.design is None:
         return {}
     specs: dict[tuple[bool, float], RunSpec] = {}
@@ -88,7 +94,7 @@ def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, float], RunSpec]:
 
 
 def _fixed_teeth(design: Design) -> int:
-    """Teeth of the member that stands: the pattern repeats with their pitch."""
+    """Number of teeth of the fixed member; the pattern repeats with its pitch."""
     drive = design.drive
     if drive.layout == "flexspline_fixed":
         return drive.teeth_flexspline
@@ -148,7 +154,7 @@ def _result(
     }
     summary = (
         *_summary(shares, ranks, trends, failed, runs),
-        *(f"the source contradicts itself: {text}" for text in study.contradictions),
+        *(f"contradiction in the source: {text}" for text in study.contradictions),
     )
     lines = (*summary, f"{time.perf_counter() - begin:.0f} s")
     return StudyResult(
@@ -160,7 +166,7 @@ def _result(
 
 
 def _share(rows: Sequence[Row], column: str) -> dict[str, int]:
-    """Rows with a printed value, those computed, and those within the limit."""
+    """Numbers of rows with a printed value, computed, and within the limit."""
     printed = [row for row in rows if row.source_value is not None]
     found = [d for row in printed if (d := row.more[column]) is not None]
     within = sum(abs(d) <= WITHIN for d in found)
@@ -175,7 +181,7 @@ def _summary(
     runs: int,
 ) -> tuple[str, ...]:
     lines = [
-        f"{runs} simulations of meshing; {len(failed)} cases with a failure"
+        f"{runs} meshing simulations; {len(failed)} cases with a failure"
         + (f": {'; '.join(failed)}" if failed else "")
     ]
     names = {
@@ -204,7 +210,7 @@ def _summary(
             agree = sum(check.agrees for check in here)
             lines.append(
                 f"at {name}, refinement {refinement:g}: {agree} of {len(here)} stated"
-                " trends found"
+                " trends confirmed"
             )
             lines += [f"{c.part} at {c.text}" for c in here if not c.agrees]
     return tuple(lines)
