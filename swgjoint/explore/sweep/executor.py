@@ -141,7 +141,7 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
         yield DaskPool(client)
 
 
-def _address(given: str) -> str:
+def _address(reference: str) -> str:
     """Check an address, or read it from a scheduler file.
 
     With an invalid address the client of dask would hang for half a minute.
@@ -153,21 +153,21 @@ def _address(given: str) -> str:
     from distributed.comm import parse_address, parse_host_port
     from distributed.comm.registry import get_backend
 
-    found: Any = given
-    if given.endswith(".json"):
-        content = json.loads(Path(given).read_bytes())
-        found = content.get("address") if isinstance(content, dict) else None
-        if not isinstance(found, str):
+    address: Any = reference
+    if reference.endswith(".json"):
+        content = json.loads(Path(reference).read_bytes())
+        address = content.get("address") if isinstance(content, dict) else None
+        if not isinstance(address, str):
             raise ValueError("expected a dask scheduler file with an address")
-    scheme, location = parse_address(found)
+    scheme, location = parse_address(address)
     get_backend(scheme)
     try:
         parse_host_port(location)
     except ValueError:
         raise ValueError(
-            f"{found!r}: expected host and port, such as tcp://host:8786"
+            f"{address!r}: expected host and port, such as tcp://host:8786"
         ) from None
-    return str(found)
+    return str(address)
 
 
 def slurm_cluster(settings: SlurmCluster) -> Any:

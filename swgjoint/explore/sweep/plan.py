@@ -154,7 +154,7 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
             if kind_of(key, kinds) is None:
                 faults.append((f"{where}.keys[{n}]", unknown(key, kinds)))
             if key in seen:
-                faults.append((f"{where}.keys[{n}]", f"{key!r} more than once"))
+                faults.append((f"{where}.keys[{n}]", f"{key!r} is listed more than once"))
             seen.add(key)
         ranged = parameter.values is None
         if isinstance(plan, List) and ranged:
@@ -170,8 +170,10 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
             faults.append((f"{where}.values", "missing; accepted: names of designs"))
     lengths = [len(p.values) for p in plan.parameters if p.values is not None]
     if isinstance(plan, List) and len(set(lengths)) > 1:
-        told = ", ".join(map(str, lengths))
-        faults.append(("plan.parameters", f"{told} values; accepted: equally many"))
+        counts = ", ".join(map(str, lengths))
+        faults.append(
+            ("plan.parameters", f"{counts} values: expected equally many values")
+        )
     if isinstance(plan, Grid):
         total = 1
         for parameter in plan.parameters:

@@ -126,10 +126,10 @@ class Remote:
         """
         target = f"{self._root}/{name}"
         folder, _, last = target.rpartition("/")
-        beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
+        temporary = f"{folder}/.{last}.{secrets.token_hex(4)}"
         self._files.makedirs(folder, exist_ok=True)
-        self._files.pipe_file(beside, data)
-        self._files.mv(beside, target)
+        self._files.pipe_file(temporary, data)
+        self._files.mv(temporary, target)
         return self.path_of(name)
 
     def remove(self, name: str) -> None:

@@ -35,8 +35,8 @@ class FigureTask(Section):
             if name not in self.known:
                 near = get_close_matches(name, self.known, n=1)
                 hint = f"did you mean {near[0]}? " if near else ""
-                told = ", ".join(self.known)
-                faults.append((f"figures[{k}]", f"{name!r}: {hint}accepted: {told}"))
+                known = ", ".join(self.known)
+                faults.append((f"figures[{k}]", f"{name!r}: {hint}accepted: {known}"))
         if faults:
             raise Fault(*faults)
         return self

@@ -29,8 +29,8 @@ def validity_of(file: AskedFile) -> dict[str, dict[str, Any]]:
 
     found: dict[str, dict[str, Any]] = {}
     if (meshing := file.meshing) is not None:
-        given = meshing.torque_Nm
-        torque = "rated torque" if given is None else f"{given:g} N·m"
+        load = meshing.torque_Nm
+        torque = "rated torque" if load is None else f"{load:g} N·m"
         found["meshing"] = _label(meshing.model, torque)
     if file.spec is not None:
         torque = "up to the repeated peak, or to the end of the map"

@@ -153,7 +153,7 @@ class StudyFile(Section):
             raise Fault(("group", f"id {', '.join(twice)} used more than once"))
         keys = {group.id: group.keys for group in self.group}
         faults = [
-            (f"group[{k}].over", f"{g.over!r}: expected a group with the same keys")
+            (f"group[{k}].over", f"{g.over!r}; accepted: a group of the same keys")
             for k, g in enumerate(self.group)
             if g.over is not None and (keys.get(g.over) != g.keys or not g.keys)
         ]
