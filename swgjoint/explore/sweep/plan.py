@@ -154,7 +154,8 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
             if kind_of(key, kinds) is None:
                 faults.append((f"{where}.keys[{n}]", unknown(key, kinds)))
             if key in seen:
-                faults.append((f"{where}.keys[{n}]", f"{key!r} is listed more than once"))
+                fault = f"{key!r} is listed more than once"
+                faults.append((f"{where}.keys[{n}]", fault))
             seen.add(key)
         ranged = parameter.values is None
         if isinstance(plan, List) and ranged:
