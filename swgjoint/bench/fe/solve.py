@@ -156,10 +156,10 @@ def _plane_rim(model: SectorModel, state: State) -> Array:
     return rim_shape(nodes.reshape(-1, 2), radius, state.wave_generator_angle)
 
 
-def _solid_rim(ring: SolidSectorModel, state: SolidState) -> Array:
+def _solid_rim(model: SolidSectorModel, state: SolidState) -> Array:
     """Rim shape of the bore at mid-face, interpolated between the adjacent planes."""
-    frame, strip = ring.frames(state)[0], ring.strip
-    points = np.einsum("sij,spj->spi", frame.turn, ring.bore_positions(frame, state))
+    frame, strip = model.frames(state)[0], model.strip
+    points = np.einsum("sij,spj->spi", frame.turn, model.bore_positions(frame, state))
     points = points.reshape(len(points), strip.planes, -1, 3)
     z = strip.mesh.teeth.z
     middle = 0.5 * (z[0] + z[-1])

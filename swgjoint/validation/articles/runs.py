@@ -113,8 +113,8 @@ def _fatigue(task: ArticleTask) -> Found:
 
 def _deflected(task: ArticleTask) -> Found:
     """Displacement [mm] and stress [MPa] on the wave generator, no tooth contact."""
-    ring = solid_sector_model(task.design, half="auto", elastic_circular_spline=False)
-    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflect()
+    model = solid_sector_model(task.design, half="auto", elastic_circular_spline=False)
+    state = SolidContinuation(model=model, ratio=task.design.ratio).deflect()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")
     frame, teeth = model.frames(state)[0], model.strip.teeth
