@@ -1,4 +1,4 @@
-"""Put drives on hinges of any MuJoCo model by editing its MjSpec."""
+"""Attach drives to the hinges of any MuJoCo model by editing its MjSpec."""
 
 from __future__ import annotations
 
@@ -41,36 +41,37 @@ def attach(
 ) -> JointDrive:
     """Turn a hinge into the output of a strain wave gear.
 
-    ``rigid`` gives the joint the reflected inertia i²J as armature. ``kinematic`` is
-    the same model; its kinematic error comes in through the inputs of a commanded
+    ``rigid`` gives the joint the reflected inertia i²J as armature. ``kinematic`` uses
+    the same model; the kinematic error enters through the inputs of a commanded
     motion, see :mod:`swgjoint.joint.prescribed`.
 
     ``linear``, ``native`` and ``full`` add a rotor (body ``<joint>_rotor`` with a hinge
-    of the same name, beside the link under the same parent) and a tendon
-    ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
-    same with a cubic part or tendons ``<joint>_corner<k>`` with dead bands (and
-    ``<joint>_hysteresis<k>`` where the map has hysteresis), or the carrier of the
-    engine plugin's instance of the same name, which evaluates ``drive``, hysteresis
-    included. Keyframes grow by the rotor, at the position without torsion.
+    of the same name, next to the link under the same parent) and a tendon
+    ``<joint>_drive`` with the length theta/i - psi. At ``linear`` the tendon is a
+    native spring and damper. ``native`` adds a cubic part or tendons
+    ``<joint>_corner<k>`` with dead bands, and ``<joint>_hysteresis<k>`` where the map
+    has hysteresis. At ``full`` the tendon carries the engine plugin's instance of the
+    same name, which evaluates ``drive`` including hysteresis. Keyframes gain the rotor
+    coordinate, at the position of zero torsion.
 
-    The rotor takes the place of the armature that the file gives the joint or its
-    actuators. Actuators that act on the joint turn the rotor instead, in the units of
-    the joint: the gear g becomes g/i, so that a motor's input is still torque at the
-    link and a servo's still the angle of the link, as the motor's encoder tells it, see
-    :func:`~swgjoint.joint.motors.move_to_rotor`. A sensor of the joint's actuator
-    torque reads the one actuator of gear 1 that the joint has; where there are several
-    or another gear, it reads the torque at the rotor, and a warning lists it. All else
-    stays with the link: damping, friction loss, springs and limits of the joint,
-    tendons, contacts, sensors (those of an actuator are on the motor side, like it).
-    Models that are put together with ``MjSpec.attach`` may have their drives before or
-    after, see :meth:`JointDrive.with_prefix`; integrator and step are those of the
-    outer one.
+    The rotor replaces the armature that the file gives the joint or its actuators.
+    Actuators that act on the joint turn the rotor instead, in the units of the joint:
+    the gear g becomes g/i. The input of a motor is still torque at the link, and the
+    input of a servo is still the link angle, now as measured by the motor's encoder,
+    see :func:`~swgjoint.joint.motors.move_to_rotor`. If the joint has a single actuator
+    of gear 1, a sensor of the joint's actuator torque reads that actuator; otherwise it
+    reads the torque at the rotor, and a warning lists it. Everything else stays with
+    the link: damping, friction loss, springs and limits of the joint, tendons,
+    contacts and sensors (sensors of an actuator move to the motor side with it).
+    Models that are assembled with ``MjSpec.attach`` may get their drives before or
+    after the assembly, see :meth:`JointDrive.with_prefix`; the outer model sets
+    integrator and step.
 
-    With ``friction`` the friction of the map is in the model, too: friction loss and
-    damping of the rotor at ``native``; at ``full`` the whole law, with a tendon
-    ``<joint>_friction`` that carries its part of the integrator's metric.
+    With ``friction`` the model includes the friction of the map: as friction loss and
+    damping of the rotor at ``native``, as the complete friction law at ``full``, where
+    a tendon ``<joint>_friction`` carries its part of the integrator's metric.
 
-    No actuator is added. A motor of its own units belongs on the rotor::
+    No actuator is added. A motor that is modelled in its own units acts on the rotor::
 
         got = attach(spec, joint="elbow", drive=drive, rotor_inertia=4e-5)
         motor = spec.add_actuator(name="elbow_motor", target=got.rotor or got.joint)
@@ -78,42 +79,43 @@ def attach(
         motor.gear[0] = 1.0 if got.rotor else got.ratio     # rigid: on the joint
 
     Levels with a rotor replace the integrators Euler (MuJoCo's default), ``implicit``
-    and ``implicitfast`` by ``discrete``, the latter two with a warning: they take the
-    drive as an explicit force. RK4 is the reference below its step limit and is kept.
-    Solver iterations and a tolerance that would leave the drives' stiffness half solved
-    become MuJoCo's defaults with a warning, see :mod:`swgjoint.joint.options`.
-    Under ``discrete`` a native spring (``linear``, ``native``) is damped by the step
-    itself, about h w/2 of critical at a torsion frequency w; ``full`` is not.
-    :func:`~swgjoint.joint.step_damping.step_mode` says what results, and
-    :func:`~swgjoint.joint.step_damping.damp_as_asked` takes it out for one step. Set
-    the timestep first.
+    and ``implicitfast`` by ``discrete``, the latter two with a warning, because they
+    treat the drive as an explicit force. RK4 is kept: it is the reference below its
+    step limit. Too few solver iterations or too coarse a tolerance are replaced by
+    MuJoCo's defaults with a warning, see :mod:`swgjoint.joint.options`.
+    Under ``discrete`` the step itself damps a native spring (``linear``, ``native``),
+    by about h w/2 of critical at a torsion frequency w; it does not damp ``full``.
+    :func:`~swgjoint.joint.step_damping.step_mode` computes the resulting damping, and
+    :func:`~swgjoint.joint.step_damping.damp_as_asked` compensates it for one step
+    size. Set the timestep before attaching drives.
 
     Args:
         spec: Model to edit.
-        joint: Name of a hinge, the first joint of its body, that follows no other
+        joint: Name of a hinge that is the first joint of its body, follows no other
             joint and is not moved through a tendon or by a muscle.
         drive: Map of the drive.
         level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
-        rotor_inertia: Rotor and wave generator about their axis [kg·m²].
-        damping_ratio: Share of critical damping of rotor against link with the link
-            inertia at qpos0, the other joints held; that of the map if None [-].
-        friction: Whether the model has the friction of the map, where it has any.
-        rotor: ``gyroscopic``, a body that its link carries along, or ``lumped``: its
-            kinetic energy is that of its rotation against that link alone (Spong
+        rotor_inertia: Inertia of rotor and wave generator about their axis [kg·m²].
+        damping_ratio: Fraction of critical damping of rotor against link, with the link
+            inertia at qpos0 and the other joints held [-]; None: that of the map.
+        friction: Whether the model includes the friction of the map, if it has any.
+        rotor: ``gyroscopic``: a body carried along by the parent link. ``lumped``: its
+            kinetic energy is that of its rotation relative to that link alone (Spong
             1987, J. Dyn. Sys. Meas. Control 109:310-319, assumption 2).
         variable: At ``full``, give the tendon the numbers by which one specimen of the
             drive may deviate from its map, see :mod:`swgjoint.joint.variation`.
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
-            cannot carry at it are left out. None keeps all.
+            cannot resolve at this speed are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
-        integrator: ``discrete`` replaces these options as said above, ``keep`` none.
-        watch: Whether a step outside the integrator's region is warned of, here and
+        integrator: ``discrete`` replaces these options as described above, ``keep``
+            replaces none.
+        watch: Whether to warn of a step outside the integrator's region, here and
             while the model runs; see :mod:`swgjoint.joint.watch`.
 
     Raises:
         InputError: If the joint, the level or a value cannot be used; the spec is
             then unchanged.
-        ComputationError: If the plugin cannot be loaded or the engine does not take
+        ComputationError: If the plugin cannot be loaded or the engine does not accept
             its metric.
     """
     fitting = Fitting(
@@ -137,24 +139,24 @@ def attach_all(
     integrator: str = "discrete",
     watch: bool = False,
 ) -> dict[str, JointDrive]:
-    """Give several hinges their drives at once.
+    """Attach drives to several hinges at once.
 
-    The result is that of :func:`attach` joint by joint in the order of the model, for
-    the price of one compilation, or two where keyframes state positions.
+    The result equals that of :func:`attach` joint by joint in the order of the model.
+    It costs one compilation, or two if keyframes state positions.
 
     Args:
         spec: Model to edit.
-        fittings: What a joint gets, by its name.
+        fittings: Drive and settings of each joint, by joint name.
         integrator: See :func:`attach`.
         watch: See :func:`attach`.
 
     Returns:
-        What each joint has, in the order of the model.
+        The attached drives by joint name, in the order of the model.
 
     Raises:
-        InputError: If a joint or a value cannot be used, a line for each joint; the
-            spec is then unchanged.
-        ComputationError: If the plugin cannot be loaded or the engine does not take
+        InputError: If a joint or a value cannot be used, with one line for each joint;
+            the spec is then unchanged.
+        ComputationError: If the plugin cannot be loaded or the engine does not accept
             its metric.
     """
     check_spec(spec)
@@ -191,13 +193,13 @@ def attach_all(
     moved = {name: places[name] for name, rotor in rotor_of.items() if rotor.own}
     texts = _configs(drives.values())
 
-    # warnings first: as errors they leave the spec unchanged
+    # warn first: if warnings are raised as errors, the spec is still unchanged
     options.warn()
     _warn_of_sensors(misread_sensors(moved, measured), drives)
     if watch:
         warn_outside(drives.values(), timestep=timestep, integrator=options.integrator)
 
-    # nothing can fail from here on: the spec is edited whole or not at all
+    # nothing fails from here on, so the spec is edited completely or not at all
     if texts:
         spec.activate_plugin(plugin.NAME)
     for name, drive in drives.items():
@@ -232,32 +234,32 @@ def attach_all(
 
 
 def _configs(drives: Iterable[JointDrive]) -> dict[str, dict[str, str]]:
-    """Attributes of the plugin's instances by joint, those of a map written once."""
+    """Attributes of the plugin instances by joint; each map is formatted once."""
     texts: dict[int, dict[str, str]] = {}
-    found = {}
+    configs = {}
     for drive in drives:
         if drive.plugin is None:
             continue
         key = id(drive.drive)
         if key not in texts:
             texts[key] = plugin.config(drive.drive, damping=drive.damping)
-        found[drive.joint] = texts[key] | {
+        configs[drive.joint] = texts[key] | {
             "damping": repr(float(drive.damping)),
             "contact_damping": repr(float(drive.contact_damping)),
         }
-    return found
+    return configs
 
 
 def _add_plugin(
     spec: mujoco.MjSpec, drive: JointDrive, body: mujoco.MjsBody, text: dict[str, str]
 ) -> None:
-    """Instance of the engine plugin with the tendons that carry its metric."""
+    """Add an instance of the engine plugin and the tendons that carry its metric."""
     assert drive.plugin is not None and drive.rotor is not None
     pair = drive.rotor, drive.joint, drive.ratio
     tendon = add_tendon(spec, drive.plugin, *pair, plugin.TENDON_STIFFNESS, 0.0)
     instance = spec.add_plugin(name=drive.plugin, plugin_name=plugin.NAME, active=True)
     instance.config = text
-    # an instance that no body refers to is lost when a spec is copied
+    # copying a spec drops a plugin instance that no body refers to
     body.plugin = instance
     body.plugin.name = drive.plugin
     body.plugin.plugin_name = plugin.NAME
@@ -280,7 +282,7 @@ def _add_plugin(
 def _warn_of_sensors(
     sensors: Mapping[str, str], drives: Mapping[str, JointDrive]
 ) -> None:
-    """List sensors of joint torque that read the motor's side from now on."""
+    """Warn of sensors of joint torque that now read the motor side."""
     if not sensors:
         return
     factors = ", ".join(
@@ -288,7 +290,7 @@ def _warn_of_sensors(
         for sensor, joint in sensors.items()
     )
     warnings.warn(
-        f"sensors of joint torque read the torque at the rotor from now on: {factors};"
-        " the torque on the link itself: JointDrive.observe(model, data).torque",
+        f"sensors of joint torque now read the torque at the rotor: {factors};"
+        " for the torque on the link use JointDrive.observe(model, data).torque",
         stacklevel=depth_of_caller(),
     )

@@ -1,4 +1,4 @@
-"""Whose line a warning names: that of the user, not one of the package's own."""
+"""Stack depth at which warnings name the user's line instead of package code."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 
 def depth_of_caller() -> int:
-    """``stacklevel`` for ``warnings.warn`` in the caller: the first line outside."""
+    """``stacklevel`` for ``warnings.warn`` that names the first line outside."""
     depth, frame = 1, sys._getframe(1)
     package = __name__.partition(".")[0]
     while frame.f_back is not None:

@@ -1,4 +1,4 @@
-"""What attaching a drive to a joint leaves behind, and what can be read from it."""
+"""The drive attached to a joint: names in the model, parameters and signals."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ from swgjoint.maps.hysteresis import Jenkin, Sliders
 from swgjoint.typing import Array
 
 LEAST_DAMPING_RATIO = 0.001
-"""Damping ratio from which a drive needs no help in a contact [-]."""
+"""Damping ratio above which a drive needs no additional damping in contact [-]."""
 CONTACT_DAMPING_RATIO = 0.05
-"""Damping ratio of a drive with less, and without friction, while a contact or a limit
-acts [-].
+"""Damping ratio, while a contact or a limit acts, of a drive without friction whose own
+damping ratio is below :data:`LEAST_DAMPING_RATIO` [-].
 
-The engine pushes a link out of a contact along a prescribed path, whatever torque that
-takes, and so feeds the torsion of a chain that bounces, at any step and also under RK4.
-A bouncing chain touches the floor for a twentieth of the time, so this takes about as
-much as :data:`LEAST_DAMPING_RATIO` does all the time."""
+The engine pushes a link out of a contact along a prescribed path, whatever torque this
+needs. This feeds energy into the torsion of a bouncing chain, at any step and also
+under RK4. A bouncing chain touches the floor about 5 % of the time, so this value
+dissipates about as much as :data:`LEAST_DAMPING_RATIO` applied all the time."""
 ACCELERATIONS = 2
-"""Numbers in the plugin's state before those of the hysteresis."""
+"""Number of plugin states that precede the hysteresis states."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class UnresolvedOrder:
-    """A harmonic that was left out because the step cannot carry it."""
+    """A harmonic that was left out because the step cannot resolve it."""
 
     order: float
     """Cycles per turn of the input, |n_theta + n_psi/i|."""
     error: float
     """Amplitude in the kinematic error [rad]."""
     torque: float
-    """Amplitude in the output torque at rated torque, torsion held [N·m]."""
+    """Amplitude in the output torque at rated torque and constant torsion [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointSignals:
-    """What the drive does, sample by sample; arrays of one shape."""
+    """Signals of the drive, sample by sample, as arrays of equal shape."""
 
     torsion: Array
-    """theta/i + e0 - psi [rad]."""
+    """Torsion theta/i + e0 - psi [rad]."""
     transmission_error: Array
-    """psi - theta/i, output minus ideal output [rad]."""
+    """Output minus ideal output, psi - theta/i [rad]."""
     torque: Array
-    """Torque on the link, elastic and damping [N·m]."""
+    """Torque on the link, including damping, hysteresis and friction [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,48 +59,49 @@ class JointDrive:
     """One drive on one joint of a model."""
 
     joint: str
-    """Link joint."""
+    """Name of the link joint."""
     rotor: str | None
-    """Rotor joint, input side; None for ``rigid`` and ``kinematic``."""
+    """Name of the rotor joint on the input side; None at ``rigid``, ``kinematic``."""
     tendon: str | None
+    """Name of the tendon of the drive; None without a rotor."""
     plugin: str | None
-    """Plugin instance; only ``full`` has one."""
+    """Name of the plugin instance; None at levels other than ``full``."""
     level: str
     ratio: float
     rotor_inertia: float
-    """Rotor and wave generator, input side [kg·m²]."""
+    """Inertia of rotor and wave generator at the input side [kg·m²]."""
     link_inertia: float
-    """Inertia about the joint at qpos0, the other joints held [kg·m²]."""
+    """Link inertia about the joint at qpos0, with the other joints held [kg·m²]."""
     stiffness: float
     """Mean stiffness of the map [N·m/rad]."""
     damping: float
-    """Torque per torsion rate, output side [N·m·s/rad]."""
+    """Damping torque per torsion rate at the output side [N·m·s/rad]."""
     contact_damping: float = 0.0
-    """Least damping while a contact or a limit acts anywhere in the model, by
-    :data:`CONTACT_DAMPING_RATIO` [N·m·s/rad]; 0 for drives with losses of their own and
-    at levels other than ``full``."""
+    """Smallest damping while a contact or a limit acts anywhere in the model, from
+    :data:`CONTACT_DAMPING_RATIO` [N·m·s/rad]; zero for drives with losses and at levels
+    other than ``full``."""
     drive: DriveMap
-    """The map as simulated: without the unresolved harmonics."""
+    """Map as simulated, without the unresolved harmonics."""
     unresolved: tuple[UnresolvedOrder, ...]
     """Harmonics left out, lowest order first."""
     native: NativeSpring | None = None
-    """What ``native`` holds of the map; None at other levels."""
+    """Native springs that represent the map; None at levels other than ``native``."""
     hysteresis: tuple[str, ...] = ()
-    """Tendons of the Jenkin elements of ``native``, in the order of the map's."""
+    """Tendons of the Jenkin elements at ``native``, in the order of the map."""
     corners: tuple[str, ...] = ()
-    """Tendons with a dead band of ``native``, in the order of the spring's corners."""
+    """Dead-band tendons at ``native``, in the order of the spring's corners."""
     compensated: float = 0.0
-    """Of the integrator's damping of the native spring, taken out of the model
-    [N·m·s/rad]; see :mod:`swgjoint.joint.step_damping`."""
+    """Part of the integrator's damping of the native spring that is removed from the
+    model [N·m·s/rad]; see :mod:`swgjoint.joint.step_damping`."""
     compensated_at: float | None = None
-    """Step at which that holds [s]; None where nothing is taken out."""
+    """Step for which the compensation is valid [s]; None without compensation."""
     motors: tuple[str, ...] = ()
-    """Actuators that the model had on the joint; with a rotor they turn that."""
+    """Actuators that the model had on the joint; if there is a rotor, they turn it."""
     variable: bool = False
-    """Whether the model has numbers by which the drive may deviate from its map."""
+    """Whether the model has user data by which the drive may deviate from its map."""
 
     def with_prefix(self, prefix: str) -> JointDrive:
-        """The same drive in a model that ``MjSpec.attach`` took in under a prefix."""
+        """The same drive after ``MjSpec.attach`` added its model under a prefix."""
 
         def renamed(name: str | None) -> str | None:
             return None if name is None else prefix + name
@@ -118,22 +119,22 @@ class JointDrive:
 
     @property
     def elements(self) -> tuple[Jenkin, ...]:
-        """Hysteresis that the level holds; only ``native`` and ``full`` do."""
+        """Hysteresis elements in the model; only ``native`` and ``full`` have them."""
         return self.drive.hysteresis if self.level in ("native", "full") else ()
 
     @property
     def friction(self) -> Friction | None:
-        """Friction against the flexspline; ``native`` has it against the housing."""
+        """Friction law at ``full``; None at ``native``, where the rotor carries it."""
         return self.drive.friction if self.level == "full" else None
 
     @property
     def kept_orders(self) -> tuple[float, ...]:
-        """Orders per input turn that the map as simulated holds, increasing."""
+        """Orders per input turn of the map as simulated, increasing."""
         return tuple(sorted({float(n) for n in input_orders(self.drive)[1:]}))
 
     @property
     def natural_frequency(self) -> float:
-        """Torsion mode of rotor against link, both else free [rad/s]; 0 if rigid."""
+        """Torsion mode of the otherwise free rotor and link [rad/s]; zero if rigid."""
         if self.rotor is None:
             return 0.0
         return float(np.sqrt(self.stiffness * self.mobility))
@@ -155,19 +156,18 @@ class JointDrive:
     ) -> JointSignals:
         """Torsion, transmission error and torque from recorded joint states.
 
-        Taken at the positions and velocities that are passed in, so pass ``qpos`` and
-        ``qvel`` of the same instant, as they stand after a step. The discrete scheme
-        evaluates its force half a step earlier; what is given here is the law itself
-        at the true positions. Hysteresis and friction have a history: their torques
-        are passed in.
+        Pass ``qpos`` and ``qvel`` of the same instant, as they are after a step. The
+        discrete scheme evaluates its force half a step earlier; this method evaluates
+        the law at the positions that are passed in. Hysteresis and friction depend on
+        the history, so their torques are arguments.
 
         Args:
             theta: Rotor positions [rad].
             psi: Link positions [rad].
             theta_rate: Rotor velocities [rad/s].
             psi_rate: Link velocities [rad/s].
-            slipping: Torque of the elements along the torsion [N·m].
-            friction: Torque of the wave generator against the flexspline [N·m].
+            slipping: Torque of the hysteresis elements along the torsion [N·m].
+            friction: Friction of the wave generator against the flexspline [N·m].
 
         Raises:
             InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
@@ -175,8 +175,8 @@ class JointDrive:
         """
         if self.rotor is None:
             raise InputError(
-                f"joint {self.joint!r} is {self.level}: it has no rotor to take "
-                "signals from; use observe(model, data)"
+                f"joint {self.joint!r}: level {self.level} has no rotor, so it has no"
+                " rotor signals; use observe(model, data)"
             )
         theta, psi, theta_rate, psi_rate, slipping, friction = np.broadcast_arrays(
             *(
@@ -216,16 +216,16 @@ class JointDrive:
         return np.asarray(1.0 - self.drive.error_at(self.drive.phases(theta, psi))[2])
 
     def motor_angle(self, psi: ArrayLike) -> Array:
-        """Motor angle of a drive without torsion at link angles [rad].
+        """Motor angle at zero torsion for link angles [rad], same shape.
 
-        For ``kinematic`` the solution of theta/i + e0 = psi, for others i psi.
+        At ``kinematic`` this solves theta/i + e0 = psi; other levels return i psi.
         """
         if self.level == "kinematic":
             return motor_of_link(self.drive, psi)
         return self.ratio * np.asarray(psi, float)
 
     def prescribed_error(self, theta: ArrayLike) -> Array:
-        """e0 that ``kinematic`` prescribes at motor angles [rad]; else 0.
+        """Error e0 that ``kinematic`` prescribes at motor angles [rad]; otherwise zero.
 
         Args:
             theta: Commanded motor angles [rad].
@@ -235,14 +235,15 @@ class JointDrive:
         return np.zeros_like(np.asarray(theta, float))
 
     def observe(self, model: mujoco.MjModel, data: mujoco.MjData) -> JointSignals:
-        """The same from an ``MjData`` after a step; arrays of shape ().
+        """Signals from an ``MjData`` after a step; arrays of shape ().
 
-        Under ``discrete`` at the positions half a step back: those of the engine are
-        that much ahead of its velocities.
+        Under ``discrete`` the signals are evaluated at the positions half a step back,
+        because the engine's positions are half a step ahead of its velocities.
 
-        A drive without rotor has no torsion, and as error that of its map at the
-        motor angle that belongs to the link (``rigid``: none). Its torque on the link
-        is the torque at the joint less what the reflected rotor inertia takes.
+        A drive without a rotor has zero torsion. Its transmission error is that of the
+        map at the motor angle that corresponds to the link angle (``rigid``: zero). Its
+        torque on the link is the joint torque minus the inertia torque of the reflected
+        rotor.
 
         Args:
             model: The compiled model.
@@ -296,7 +297,7 @@ class JointDrive:
 def _slipping(
     model: mujoco.MjModel, data: mujoco.MjData, tendon: str, torsion: float
 ) -> float:
-    """Torque of one Jenkin element from the engine's own history [N·m]."""
+    """Torque of one Jenkin element from the history that the engine stores [N·m]."""
     t = int(model.tendon(tendon).id)
     limit = float(model.tendon_springyield[t])
     rest = float(data.plastic[model.tendon_plasticadr[t]])
@@ -312,7 +313,7 @@ def input_orders(drive: DriveMap) -> Array:
 def prune(
     drive: DriveMap, *, timestep: float, max_input_speed: float, max_phase_step: float
 ) -> tuple[DriveMap, tuple[UnresolvedOrder, ...]]:
-    """Leave out the harmonics whose phase moves too far in one step.
+    """Remove the harmonics whose phase advances too far in one step.
 
     Args:
         drive: Map with all its harmonics.
@@ -321,7 +322,7 @@ def prune(
         max_phase_step: Largest h n |theta rate| that is kept [rad].
 
     Returns:
-        The map without them, and the list of what was left out.
+        The map without these harmonics, and the removed harmonics by increasing order.
     """
     orders = input_orders(drive)
     keep = timestep * orders * abs(max_input_speed) <= max_phase_step

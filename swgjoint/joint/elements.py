@@ -15,28 +15,32 @@ from swgjoint.units import deg
 
 SOLREF = (0.02, 1.0)
 SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
-"""MuJoCo's own for constraints: time constant [s], damping ratio; impedance."""
+"""MuJoCo's constraint defaults: ``SOLREF`` is time constant [s] and damping ratio [-],
+``SOLIMP`` the impedance."""
 
 
 def add_rotor(
     spec: mujoco.MjSpec, place: DrivePlace, name: str, rotor: Rotor
 ) -> tuple[Any, Any]:
-    """Rotor body and hinge at the joint's place, nothing inherited from defaults.
+    """Add the rotor body and its hinge at the joint, without inheriting defaults.
 
-    A body turns with the link that carries it, with all that follows from its spin;
-    lumped, its kinetic energy is that of its own rotation against that link alone.
+    A gyroscopic rotor turns with the link that carries it, gyroscopic torques included.
+    A lumped rotor has only the kinetic energy of its rotation relative to that link.
 
     Args:
         spec: The model, which is changed.
         place: Joint that gets the drive.
-        name: Name of the body; the hinge is named after it.
-        rotor: ``gyroscopic`` or ``lumped``.
+        name: Name of the body and of its hinge.
+        rotor: Inertia of the rotor and whether it is lumped.
+
+    Returns:
+        Body and hinge of the rotor.
     """
     body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
     body.explicitinertial = True
     body.mass = ROTOR_MASS
-    body.ipos = np.zeros(3)  # unset, it is not written to XML
-    # a ball: the spin about the axis is what counts, and no axis needs aligning
+    body.ipos = np.zeros(3)  # an unset value is not written to XML
+    # isotropic: only the spin about the axis matters, so no frame has to be aligned
     body.inertia = np.full(3, rotor.body)
     hinge = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE)
     hinge.pos = np.zeros(3)
@@ -47,7 +51,7 @@ def add_rotor(
     hinge.springyield = 0.0
     hinge.armature = rotor.inertia - rotor.body
     hinge.frictionloss = 0.0
-    # of the friction loss at level native
+    # used by the friction loss at level native
     hinge.solref_friction = np.array(SOLREF)
     hinge.solimp_friction = np.array(SOLIMP)
     hinge.actgravcomp = False
@@ -71,10 +75,20 @@ def add_tendon(
     dead_band: float = 0.0,
     coefficients: tuple[float, float] | None = None,
 ) -> Any:
-    """Fixed tendon of length theta/i - psi, nothing inherited from defaults.
+    """Add a fixed tendon of length theta/i - psi, without inheriting defaults.
 
-    With ``coefficients`` its length is that sum of theta and psi instead. Its spring
-    begins at a length of ``dead_band`` either way [rad].
+    Args:
+        spec: The model, which is changed.
+        name: Name of the tendon.
+        rotor: Name of the rotor joint.
+        link: Name of the link joint.
+        ratio: Signed ratio i of the drive [-].
+        stiffness: Polynomial coefficients of the spring, for powers 0 to 2 of the
+            length [N·m/rad, N·m/rad², N·m/rad³].
+        damping: Torque per rate of the length [N·m·s/rad].
+        springyield: Length at which the spring yields [rad]; zero: never.
+        dead_band: Half width of the band without spring torque [rad].
+        coefficients: Factors of theta and psi in the length; (1/i, -1) if None [-].
     """
     tendon = spec.add_tendon(name=name)
     tendon.stiffness = np.array(stiffness)
@@ -99,12 +113,12 @@ def add_native(
     spring: NativeSpring,
     rotor: Any,
 ) -> None:
-    """Springs, Jenkin tendons and rotor friction; only what there is.
+    """Add the springs, Jenkin tendons and rotor friction that the drive has.
 
     Args:
         spec: The model, which is changed.
         drive: The drive.
-        spring: Tendons that follow its mean curve.
+        spring: Native springs fitted to its map.
         rotor: Hinge of the rotor.
     """
     assert drive.tendon is not None
@@ -135,7 +149,7 @@ def has_positions(spec: mujoco.MjSpec) -> bool:
 
 
 def extend_keys(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
-    """Give every keyframe the new rotors' positions and velocities, without torsion.
+    """Add the rotors to every keyframe, with positions and velocities at zero torsion.
 
     Args:
         spec: The model, which is changed.

@@ -1,4 +1,4 @@
-"""What a joint is to get, checked, and the drive that follows; the spec stays as is."""
+"""Settings of a drive at one joint, their checks, and the resulting joint drive."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ ROTORS = ("gyroscopic", "lumped")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitting:
-    """A drive and how one joint gets it; see :func:`swgjoint.joint.attach.attach`."""
+    """Drive and settings of one joint, see :func:`swgjoint.joint.attach.attach`."""
 
     drive: DriveMap
     rotor_inertia: float
-    """Rotor and wave generator about their axis [kg·m²]."""
+    """Inertia of rotor and wave generator about their axis [kg·m²]."""
     level: str = "full"
     damping_ratio: float | None = None
-    """Share of critical damping; that of the map if None [-]."""
+    """Fraction of critical damping; that of the map if None [-]."""
     friction: bool = True
     rotor: str = "gyroscopic"
     variable: bool = False
@@ -48,10 +48,11 @@ class Fitting:
         return self.level not in ("rigid", "kinematic")
 
     def check(self, joint: str) -> None:
-        """Refuse a value outside its range.
+        """Reject values outside their range.
 
         Raises:
-            InputError: With the value, its unit and what is accepted.
+            InputError: If a value is outside its range; the message has the value, its
+                unit and the accepted values.
         """
         if not isinstance(self.drive, DriveMap):
             raise InputError(
@@ -78,16 +79,16 @@ class Fitting:
 def fit_drive(
     joint: str, fitting: Fitting, place: DrivePlace, *, timestep: float
 ) -> JointDrive:
-    """The drive that a joint will have.
+    """Joint drive that results from the settings of a joint.
 
     Args:
-        joint: Its name.
-        fitting: What it gets.
-        place: Where it stands.
+        joint: Name of the joint.
+        fitting: Drive and settings of the joint.
+        place: Position and inertia of the joint in the model.
         timestep: Step of the model [s].
 
     Raises:
-        InputError: If the level cannot hold the map.
+        InputError: If the level cannot represent the map.
     """
     drive, level = fitting.drive, fitting.level
     if not fitting.friction and drive.friction is not None:
@@ -112,8 +113,8 @@ def fit_drive(
         )
     if level == "kinematic" and not ratio_variation(drive) < 1.0:
         raise InputError(
-            f"map {drive.name!r}: its kinematic error turns the ratio by up to"
-            f" {ratio_variation(drive):.3g} of itself; accepted at level kinematic:"
+            f"map {drive.name!r}: its kinematic error changes the ratio by up to"
+            f" {ratio_variation(drive):.3g} of its value; accepted at level kinematic:"
             " below 1"
         )
     spring: NativeSpring | None = fit_native(drive) if level == "native" else None
@@ -145,10 +146,10 @@ def fit_drive(
 
 
 def check_spec(spec: object) -> None:
-    """Refuse an argument that is not an ``MjSpec``, naming its type.
+    """Reject an argument that is not an ``MjSpec``, naming its type.
 
     Raises:
-        InputError: With what was given and what to give.
+        InputError: If ``spec`` is of another type; the message names it.
     """
     if isinstance(spec, mujoco.MjSpec):
         return

@@ -1,23 +1,24 @@
-r"""Friction in one step of the discrete scheme; the twin of ``plugin/friction.cc``.
+r"""Friction in one step of the discrete scheme; equivalent of ``plugin/friction.cc``.
 
-The bristle goes from the stretch :math:`z_0` over a relative rotation dx. It sticks up
-to its reach R, over the way a, and slips from there. With :math:`f = \sigma R`, motion
-forward, its mean torque over the step is
+The bristle starts at the stretch :math:`z_0` and undergoes a relative rotation dx. It
+sticks over the distance a until it reaches its limit R, and then slips. For forward
+motion and with :math:`f = \sigma R`, its mean torque over the step is
 
 .. math::
     \bar q = \begin{cases} \sigma (z_0 + dx/2) + \sigma_1 dx/h & dx \le a\\
         f - \sigma a^2/(2\,dx) + \sigma_1 a/h & dx > a = R - z_0, \end{cases}
 
-continuous and increasing, and its work :math:`\bar q\,dx` is exact. The predicted
-pair answers to a torque F with :math:`dx = d - \tfrac12 h c F`, so that :math:`F =
-\bar q(dx) + \eta\,dx/h` is a linear or a quadratic equation: no iteration.
+which is continuous and increasing, and its work :math:`\bar q\,dx` is exact. The
+predicted pair responds to a torque F with :math:`dx = d - \tfrac12 h c F`, so that
+:math:`F = \bar q(dx) + \eta\,dx/h` is a linear or quadratic equation, which needs no
+iteration.
 
-What the engine gets is linear in the true dx: offset + rate dx. With rate >= sigma/2
-and offset :math:`\sigma z_0` (it sticks), or \|offset\| at most :math:`\sigma |z_0|`,
-or offset 0, its work is never below :math:`-\sigma z_0^2/2`, whatever the other forces
-do to the step; and the bristle ends with no more than it had plus that work. So the
-friction of a step takes energy or gives back its own, also where the prediction is
-wrong.
+The engine receives a torque that is linear in the true dx: offset + rate dx. With
+rate >= sigma/2 and either offset :math:`\sigma z_0` (sticking), \|offset\| at most
+:math:`\sigma |z_0|`, or offset 0, the work of this torque is never below
+:math:`-\sigma z_0^2/2`, whatever the other forces do in the step. The bristle ends with
+at most its initial energy plus that work. The friction of a step therefore dissipates
+energy or returns only stored energy, even if the prediction is wrong.
 """
 
 from __future__ import annotations
@@ -30,20 +31,20 @@ from swgjoint.maps.friction import Friction
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionStep:
-    """What friction does in one step, linear in the change of the relative speed."""
+    """Friction torque of one step, linear in the change of the relative speed."""
 
     stretch: float
-    """z at the beginning [rad]."""
+    """Bristle stretch z at the beginning of the step [rad]."""
     reach: float
-    """R, the largest stretch in this step [rad]."""
+    """Largest stretch R in this step [rad]."""
     force: float
-    """Torque without a change of the speed [N·m]."""
+    """Torque at unchanged speed [N·m]."""
     metric: float
-    """Torque per change of the speed, over h [N·m/rad]."""
+    """Torque per change of the speed, divided by h [N·m/rad]."""
     offset: float
-    """Torque of the bristle alone, without a rotation [N·m]."""
+    """Torque of the bristle alone at zero rotation [N·m]."""
     rate: float
-    """Torque of the bristle alone, per rotation [N·m/rad]."""
+    """Torque of the bristle alone per rotation [N·m/rad]."""
     predicted: float
     """Torque on the predicted step [N·m]."""
 
@@ -58,16 +59,16 @@ def friction_step(
     response: float,
     timestep: float,
 ) -> FrictionStep:
-    """Solve friction on the predicted step of a pair.
+    """Solve the friction torque of the predicted step of a rotor-link pair.
 
     Args:
-        friction: The parameters.
-        stretch: z before the step, cut to the reach of the step [rad].
-        yield_torque: f in this step [N·m].
-        speed: nu at its beginning [rad/s].
-        free: Change of nu without friction [rad/s].
-        response: Change of nu that a torque takes off [rad/s per N·m], > 0.
-        timestep: h [s].
+        friction: Parameters of the friction law.
+        stretch: Bristle stretch z before the step; limited to the reach [rad].
+        yield_torque: Yield torque f in this step [N·m].
+        speed: Relative speed nu at the beginning of the step [rad/s].
+        free: Change of nu in the step without friction [rad/s].
+        response: Reduction of nu per friction torque, > 0 [rad/s per N·m].
+        timestep: Step h [s].
     """
     h, sigma = timestep, friction.stiffness
     reach = yield_torque / sigma
@@ -103,7 +104,7 @@ def friction_step(
 
 
 def stretch_after(friction: Friction, step: FrictionStep, rotation: float) -> float:
-    """Z after the rotation that the step came to [rad].
+    """Bristle stretch z after the actual rotation of the step [rad].
 
     Args:
         friction: Friction of the drive.

@@ -1,4 +1,4 @@
-"""Actuators of a model's file, moved from a joint to the rotor of its drive."""
+"""Move the actuators of a model from a joint to the rotor of its drive."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from swgjoint.joint.place import DrivePlace
 
 
 def clear_armature(place: DrivePlace) -> None:
-    """Let the rotor of the drive be the only one; actuators may bring theirs."""
+    """Remove the armature of a joint's actuators, which the rotor replaces."""
     for actuator in place.actuators.values():
         actuator.armature = 0.0
 
@@ -26,27 +26,27 @@ def move_to_rotor(
     free: tuple[float, float] | None,
     measured: set[str],
 ) -> None:
-    r"""Let the actuators of a joint turn its rotor, in the units of the joint.
+    r"""Make the actuators of a joint turn its rotor, in the units of the joint.
 
-    The gear g of an actuator becomes g/i, so that its length is
-    :math:`g\,\theta/i`, what an encoder of the motor tells of the link, and its force
-    f turns the rotor with g f/i: a drive without losses gives the link g f. Control
-    inputs, ranges and gains keep their meaning and their units. The limit of the
-    joint's actuator torque goes along.
+    The gear g of an actuator becomes g/i. Its length is then :math:`g\,\theta/i`, the
+    link angle as measured by the motor's encoder, and its force f turns the rotor with
+    g f/i, which a lossless drive turns into g f at the link. Control inputs, ranges and
+    gains keep their meaning and units. The limit of the joint's actuator torque moves
+    to the rotor as well.
 
-    What the compiler would take from the joint is written out: the range of
-    ``inheritrange``, and the damping of ``dampratio`` for the inertia of rotor and
-    link on a rigid drive. Sensors of the joint's actuator torque follow, see
+    Values that the compiler would derive from the joint are written explicitly: the
+    range of ``inheritrange``, and the damping of ``dampratio`` for the inertia of rotor
+    and link on a rigid drive. Sensors of the joint's actuator torque move as well, see
     :func:`torque_is_actuators`.
 
     Args:
-        place: Of the joint.
+        place: Position, actuators and sensors of the joint.
         rotor: Hinge of the rotor.
-        ratio: Of the drive, signed.
+        ratio: Signed ratio of the drive [-].
         reflected: Inertia of the rotor at the joint, i²J [kg·m²].
-        free: See :func:`swgjoint.joint.place.free_inertias`; None without a damping
-            ratio.
-        measured: Actuators whose force a sensor of the file reads.
+        free: Inertias from :func:`swgjoint.joint.place.free_inertias` [kg·m²]; None
+            without a damping ratio.
+        measured: Names of the actuators whose force a sensor of the file reads.
     """
     joint, model = place.joint, place.model
     exact = torque_is_actuators(place, measured)
@@ -56,10 +56,10 @@ def move_to_rotor(
             actuator.ctrlrange = model.actuator_ctrlrange[model.actuator_ctrladr[k]]
             actuator.actrange = model.actuator_actrange[k]
         damping = float(model.actuator_biasprm[k, 2])
-        if actuator.biasprm[2] > 0.0 > damping:  # a damping ratio to the compiler
+        if actuator.biasprm[2] > 0.0 > damping:  # the compiler reads a damping ratio
             assert free is not None
             actuator.biasprm[2] = damping * np.sqrt((free[1] + reflected) / free[0])
-        # the engine reflects all three by the square of the gear
+        # the engine multiplies all three coefficients by the square of the gear
         actuator.damping = actuator.damping / np.abs(ratio) ** np.arange(3.0)
         actuator.gear[0] /= ratio
         actuator.target = rotor.name
@@ -87,9 +87,13 @@ def move_to_rotor(
 def torque_is_actuators(place: DrivePlace, measured: set[str]) -> bool:
     """Whether sensors of the joint's actuator torque can read an actuator instead.
 
-    That is so for a single actuator of gear 1, whose force is the torque; a limit of
-    the joint's actuator torque then becomes one of that force, unless another sensor
-    reads what the force was without it.
+    This is possible for a single actuator of gear 1, whose force equals the torque. A
+    limit of the joint's actuator torque then becomes a limit of that force, unless
+    another sensor reads the force without that limit.
+
+    Args:
+        place: Position, actuators and sensors of the joint.
+        measured: Names of the actuators whose force a sensor of the file reads.
     """
     if not place.sensors or len(place.actuators) != 1:
         return False
@@ -104,7 +108,7 @@ def torque_is_actuators(place: DrivePlace, measured: set[str]) -> bool:
 
 
 def _common_range(place: DrivePlace, k: int) -> Any:
-    """Range of an actuator's force within that of the joint's [N·m]."""
+    """Intersection of the force ranges of an actuator and its joint [N·m]."""
     model = place.model
     joint = model.jnt_actfrcrange[place.index]
     if not model.actuator_forcelimited[k]:
@@ -116,7 +120,15 @@ def _common_range(place: DrivePlace, k: int) -> Any:
 def misread_sensors(
     places: Mapping[str, DrivePlace], measured: set[str]
 ) -> dict[str, str]:
-    """Sensors of joint torque that will read the motor's side, with their joint."""
+    """Sensors of joint torque that will read the motor side.
+
+    Args:
+        places: Joints by name.
+        measured: Names of the actuators whose force a sensor of the file reads.
+
+    Returns:
+        Joint name by sensor name.
+    """
     return {
         sensor.name or f"of joint {name}": name
         for name, place in places.items()

@@ -1,21 +1,22 @@
-r"""Level ``native``: what MuJoCo's own elements can hold of a drive, no plugin.
+r"""Level ``native``: a drive represented by MuJoCo's own elements, without the plugin.
 
-The mean curve becomes one tendon with a polynomial stiffness or, where that is not
-close enough, up to :data:`MAX_CORNERS` parallel tendons with dead bands. With
+The mean torsion curve becomes one tendon with polynomial stiffness or, if that is not
+accurate enough, up to :data:`MAX_CORNERS` parallel tendons with dead bands. With
 x = theta/i - psi,
 
 .. math:: T(x) = a x + c x^3 \quad\text{or}\quad
     T(x) = a x + \sum_j k_j \operatorname{sign}(x) \max(|x| - d_j, 0),
 
-so the three lines of a catalogue are three tendons: K1 everywhere, K2 - K1 beyond the
-torsion at T1, K3 - K2 beyond that at T2. Hysteresis becomes parallel tendons with
-``springyield`` (Jenkin elements), friction ``frictionloss`` and ``damping`` of the
-rotor: Coulomb, bending and viscous part, against the housing. That is an approximation:
-friction that grows with the load or falls with the speed has no constant, and the
-engine's friction loss is a soft constraint, which creeps.
+so the three lines of a catalogue become three tendons: K1 everywhere, K2 - K1 beyond
+the torsion at T1, K3 - K2 beyond the torsion at T2. Hysteresis becomes parallel tendons
+with ``springyield`` (Jenkin elements). Friction becomes ``frictionloss`` and
+``damping`` of the rotor (Coulomb, bending and viscous parts) and acts against the
+housing. This is an approximation: constants cannot represent friction that grows with
+load or decreases with speed, and the engine's friction loss is a soft constraint, which
+creeps.
 
-The last two exist only where the map has them. Kinematic error and the angle harmonics
-of the torque have no native form.
+Hysteresis and friction are added only if the map has them. Kinematic error and the
+angle harmonics of the torque have no native equivalent.
 """
 
 from __future__ import annotations
@@ -30,22 +31,23 @@ from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.typing import Array
 
 MAX_CORNERS = 4
-"""Most tendons with a dead band: each costs the engine a few percent of a step."""
+"""Largest number of tendons with a dead band; each adds a few percent to the time of a
+step."""
 CLOSE = 0.01
-"""Largest error of the torque, as part of the rated torque, at which no further tendon
-is added."""
+"""Torque error, as a fraction of rated torque, below which no further tendon is added
+[-]."""
 LEAST = 1e-3
-"""Smallest slope over the mean stiffness: a clearance keeps that much."""
+"""Smallest slope as a fraction of the mean stiffness, kept even in a clearance [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Corner:
-    """Stiffness that begins at a torsion, either way: a tendon with a dead band."""
+    """Stiffness that acts beyond a torsion in both directions: a dead-band tendon."""
 
     torsion: float
-    """Half width of the dead band [rad], > 0."""
+    """Half width of the dead band, > 0 [rad]."""
     stiffness: float
-    """Change of the slope there [N·m/rad]; < 0 where the curve softens."""
+    """Change of the slope at that torsion, < 0 if the curve softens [N·m/rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,27 +55,28 @@ class NativeSpring:
     """Elastic and dissipative parts of a drive in native elements."""
 
     linear: float
-    """a [N·m/rad], > 0."""
+    """Linear coefficient a, > 0 [N·m/rad]."""
     cubic: float = 0.0
-    """c [N·m/rad³], >= 0: a softening cubic would end in a negative stiffness."""
+    """Cubic coefficient c, >= 0 because a softening cubic would reach negative
+    stiffness [N·m/rad³]."""
     corners: tuple[Corner, ...] = ()
-    """By increasing torsion; the slope stays > 0 beyond every one."""
+    """Dead-band springs by increasing torsion; the slope stays > 0 beyond each one."""
     residual: float
-    """Root mean square of what the fit leaves of the mean curve [N·m]."""
+    """Root mean square deviation of the fit from the mean curve [N·m]."""
     fitted_to: float
     """Torque up to which the fit was made [N·m]."""
     note: str = ""
-    """What the fit could not follow."""
+    """Features of the mean curve that the fit does not reproduce."""
     hysteresis: tuple[Jenkin, ...] = ()
     friction: float = 0.0
     """Constant friction torque at the input [N·m]."""
     viscous: float = 0.0
-    """Friction per speed of the input [N·m·s/rad]."""
+    """Viscous friction coefficient at the input [N·m·s/rad]."""
     friction_note: str = ""
-    """What of the friction has no constant."""
+    """Parts of the friction law that constants cannot represent."""
 
     def torque(self, torsion: Array) -> Array:
-        """Elastic torque, without hysteresis [N·m]."""
+        """Elastic torque without hysteresis at torsions [rad], same shape [N·m]."""
         x = np.asarray(torsion, float)
         total = x * (self.linear + self.cubic * x**2)
         for corner in self.corners:
@@ -82,7 +85,7 @@ class NativeSpring:
         return np.asarray(total)
 
     def torsion(self, torque: float) -> float:
-        """Torsion at an elastic torque [rad]; the torque grows with the torsion."""
+        """Torsion [rad] at an elastic torque [N·m], by bisection."""
         high = abs(torque) / self.linear
         while float(self.torque(np.array(high))) < abs(torque):
             high *= 2.0
@@ -96,13 +99,13 @@ class NativeSpring:
         return float(np.copysign(high, torque))
 
     def slope(self, torsion: float) -> float:
-        """Tangent stiffness, without hysteresis [N·m/rad]."""
+        """Tangent stiffness without hysteresis at a torsion [rad], in [N·m/rad]."""
         x = abs(torsion)
         beyond = sum(c.stiffness for c in self.corners if x > c.torsion)
         return self.linear + 3.0 * self.cubic * x**2 + beyond
 
     def implicit(self, torsion: float) -> float:
-        """What the integrator takes implicitly: the tangents that are > 0 [N·m/rad]."""
+        """Stiffness that the integrator treats implicitly, tangents > 0 [N·m/rad]."""
         x = abs(torsion)
         beyond = sum(max(c.stiffness, 0.0) for c in self.corners if x > c.torsion)
         return self.linear + 3.0 * self.cubic * x**2 + beyond
@@ -114,15 +117,18 @@ class NativeSpring:
 
 
 def fit_native(drive: DriveMap) -> NativeSpring:
-    """The fewest native springs that follow the mean curve of a map.
+    """Fit the fewest native springs that follow the mean curve of a map.
 
-    Up to the repeated peak torque, at least 1.5 T2, as far as the map reaches. In this
-    order, until the torque is off by :data:`CLOSE` of the rated torque at most: a x +
-    c x³; dead bands at the torsions of T1 and T2; one to :data:`MAX_CORNERS` dead
-    bands, denser where the curve bends more. Else the closest of them.
+    The fit extends to the repeated peak torque or 1.5 T2, whichever is larger, within
+    the range of the map. The candidates are a x + c x³, dead bands at the torsions of
+    T1 and T2, and one to :data:`MAX_CORNERS` dead bands that are denser where the curve
+    bends more; springs with dead bands are tried in order of their number. The first
+    whose torque error is at most :data:`CLOSE` of rated torque is used, otherwise the
+    closest.
 
-    Slopes are the least squares for which every slope is at least :data:`LEAST` of the
-    mean stiffness; ``note`` says where that or the number of tendons limits the fit.
+    The slopes are a least-squares fit in which every slope is at least :data:`LEAST` of
+    the mean stiffness. ``note`` reports where this bound or the number of tendons
+    limits the fit.
     """
     x, torque, peak = _mean_curve(drive)
     close = CLOSE * drive.ratings.rated_torque
@@ -138,10 +144,12 @@ def fit_native(drive: DriveMap) -> NativeSpring:
     notes = []
     floor = LEAST * drive.mean_stiffness
     if best.linear <= 1.001 * floor:
-        notes.append("the mean curve has no stiffness about zero")
+        notes.append("the mean curve has no stiffness near zero torsion")
     if least > 5.0 * close:
         share = 100.0 * least / drive.ratings.rated_torque
-        notes.append(f"off the mean curve by up to {share:.2g} % of the rated torque")
+        notes.append(
+            f"deviates from the mean curve by up to {share:.2g} % of rated torque"
+        )
     law = drive.friction
     changes = law is not None and (law.load > 0.0 or law.static > law.coulomb)
     return replace(
@@ -152,16 +160,20 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         hysteresis=drive.hysteresis,
         friction=law.coulomb + law.bending if law else 0.0,
         viscous=law.viscous if law else 0.0,
-        friction_note="its change with load and speed" if changes else "",
+        friction_note="its dependence on load and speed" if changes else "",
     )
 
 
 def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
-    """The law between motor and link of this level as a map.
+    """Law of this level between motor and link, as a map.
 
-    The elastic part, hysteresis, and where the map has friction that of the elements:
-    constant and viscous. It acts against the housing, here as everywhere in maps
-    against the flexspline, which differs by the ratio.
+    The map contains the elastic part, the hysteresis and, if the drive has friction,
+    its constant and viscous parts. The native friction acts against the housing, but in
+    a map friction acts against the flexspline; the two differ by the ratio.
+
+    Args:
+        drive: Map of the drive.
+        spring: Native springs fitted to it, see :func:`fit_native`.
     """
     end = 4.0 * max(
         abs(drive.mean_torsion(sign * drive.ratings.momentary_peak)) for sign in (-1, 1)
@@ -179,7 +191,7 @@ def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
                 law = law + c.stiffness * np.polynomial.Polynomial([-start, 1.0])
         shifted = law(np.polynomial.Polynomial([left, 1.0])).integ().coef
         potential[0, 0, j, : shifted.size] = shifted
-        # the energy at the knot, zero without torsion
+        # energy at the knot; it is zero at zero torsion
         potential[0, 0, j, 0] = _energy(spring, left)
     stiffness = spring.slope(end)
     friction = drive.friction
@@ -206,7 +218,7 @@ def _energy(spring: NativeSpring, torsion: float) -> float:
 
 
 def _mean_curve(drive: DriveMap) -> tuple[Array, Array, float]:
-    """Torsion > 0, mean torque of both directions there, and the largest torque."""
+    """Torsions > 0 [rad], mean torque of both directions and largest torque [N·m]."""
     low, high = drive.torque_range
     r = drive.ratings
     peak = min(max(r.repeated_peak, 1.5 * r.T2), -low, high)
@@ -219,7 +231,7 @@ def _mean_curve(drive: DriveMap) -> tuple[Array, Array, float]:
 
 
 def _candidates(drive: DriveMap, x: Array, torque: Array) -> list[NativeSpring]:
-    """Springs with more and more tendons."""
+    """Candidate springs by increasing number of tendons."""
     r = drive.ratings
     corners = [drive.mean_torsion(t) for t in (r.T1, r.T2)]
     ways = [np.array([d for d in corners if 0.0 < d < 0.99 * x[-1]])]
@@ -230,14 +242,14 @@ def _candidates(drive: DriveMap, x: Array, torque: Array) -> list[NativeSpring]:
 
 
 def _cubic(x: Array, torque: Array, least: float) -> NativeSpring:
-    """Least squares of a x + c x³ with a >= least and c >= 0."""
+    """Least-squares fit of a x + c x³ with a >= least and c >= 0."""
     from scipy.optimize import nnls
 
-    unit = float(x[-1])  # keeps the two columns of one size
+    unit = float(x[-1])  # scales both columns to similar magnitude
     u = x / unit
     floor = least * unit
     (a, c), _ = nnls(np.column_stack([u, u**3]), torque - floor * u)
-    # below round-off of the fit a linear curve stays linear
+    # a cubic part below the round-off of the fit is dropped
     if c < 1e-9 * a:
         c = 0.0
         a = float(u @ torque) / float(u @ u) - floor
@@ -250,11 +262,11 @@ def _cubic(x: Array, torque: Array, least: float) -> NativeSpring:
 
 
 def _lines(x: Array, torque: Array, corners: Array, least: float) -> NativeSpring:
-    """Least squares of straight lines that meet at the corners, slopes >= least."""
+    """Least-squares fit of lines that meet at the corners, with slopes >= least."""
     from scipy.optimize import nnls
 
     ends = np.array([0.0, *corners, x[-1]])
-    # the way that x goes on every line
+    # length of x on each line
     ways = np.clip(x[:, None] - ends[:-1], 0.0, np.diff(ends))
     unit = float(x[-1])
     over, _ = nnls(ways / unit, torque - least * x)
@@ -272,7 +284,7 @@ def _lines(x: Array, torque: Array, corners: Array, least: float) -> NativeSprin
 
 
 def _denser_at_bends(x: Array, torque: Array, count: int) -> Array:
-    """Corners of broken lines: equal parts of the square root of the bend.
+    """Corners of a broken line at equal parts of the integrated root curvature.
 
     Source:
         de Boor (2001), "A Practical Guide to Splines", chapter XII: equal parts of

@@ -1,4 +1,4 @@
-"""What stands in the way of a drive: the joint itself, and what else holds it."""
+"""Checks whether a joint can take a drive, and what prevents it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 class Surroundings:
-    """What a spec has at its joints, read once for any number of drives."""
+    """Model elements that act on the joints of a spec, read once for all drives."""
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self.joints: dict[str, Any] = {j.name: j for j in spec.joints if j.name}
@@ -26,11 +26,11 @@ class Surroundings:
         self.plugins: set[str] = {instance.name for instance in spec.plugins}
         self.tendons: dict[str, Any] = {}
         self.wrapped: dict[str, list[str]] = {}
-        """Joints of the fixed tendons, by tendon."""
+        """Joint names of the fixed tendons, by tendon."""
         for tendon in spec.tendons:
             self.tendons[tendon.name] = tendon
             path = tendon.path
-            # by index: iterating ends in an exception of 0.1 ms inside the engine
+            # by index: iteration ends in an engine exception that costs 0.1 ms
             wraps = (path[k] for k in range(len(path)))
             self.wrapped[tendon.name] = [
                 wrap.target.name
@@ -38,15 +38,15 @@ class Surroundings:
                 if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT
             ]
         self.actuators: dict[str, dict[int, Any]] = defaultdict(dict)
-        """Actuators that act on a joint, by their place in the model, by joint."""
+        """Actuators that act on a joint, by joint and then by index in the model."""
         self.pulled: dict[str, tuple[Any, str]] = {}
         """Actuator and tendon that move a joint, by joint."""
         self.held: dict[str, str] = {}
-        """Why an equality leaves a joint no freedom, by joint."""
+        """Reason why an equality constrains a joint, by joint."""
         self.sensors: dict[str, list[Any]] = defaultdict(list)
-        """Sensors of the torque of actuators, by joint."""
+        """Sensors of the actuator torque at a joint, by joint."""
         self.measured: set[str] = set()
-        """Actuators whose force a sensor reads."""
+        """Names of the actuators whose force a sensor reads."""
         for k, actuator in enumerate(spec.actuators):
             if actuator.trntype in ON_JOINT:
                 self.actuators[actuator.target][k] = actuator
@@ -84,7 +84,12 @@ class Surroundings:
                     self.held.setdefault(name, why)
 
     def nearest_names(self, name: str, joints: Iterable[str] | None = None) -> str:
-        """The joints that there are, or of many the nearest names."""
+        """Text that lists the joints of the model, or the nearest names of many.
+
+        Args:
+            name: Name that was not found.
+            joints: Names to list; all joints of the model if None.
+        """
         names = list(self.joints if joints is None else joints)
         if len(names) > 20:
             near = get_close_matches(name, names, n=5, cutoff=0.3)
@@ -93,7 +98,7 @@ class Surroundings:
         return f"its joints: {', '.join(names) or 'none'}"
 
     def has_drive(self, joint: str) -> bool:
-        """Whether a tendon of :func:`attach` ties the joint to its rotor."""
+        """Whether a tendon of :func:`attach` couples the joint to its rotor."""
         return {f"{joint}_rotor", joint} == set(self.wrapped.get(f"{joint}_drive", ()))
 
     def is_rotor(self, joint: str) -> bool:
@@ -102,28 +107,29 @@ class Surroundings:
         return link != joint and self.has_drive(link)
 
     def driven_joint(self, name: str) -> Any:
-        """The hinge of that name, free to take a drive.
+        """The hinge with this name, if it can take a drive.
 
         Raises:
-            InputError: If there is none, or it is held or driven by something else.
+            InputError: If there is no such hinge, or another element of the model
+                constrains or drives it.
         """
-        found = self.joints.get(name)
-        if found is None:
+        hinge = self.joints.get(name)
+        if hinge is None:
             raise InputError(
                 f"joint {name!r} is not in the model; {self.nearest_names(name)}"
             )
-        if found.type != mujoco.mjtJoint.mjJNT_HINGE:
-            kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
+        if hinge.type != mujoco.mjtJoint.mjJNT_HINGE:
+            kind = mujoco.mjtJoint(hinge.type).name.removeprefix("mjJNT_").lower()
             raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")
         self._check_driven(name)
         self._check_names(name)
-        body = found.parent
+        body = hinge.parent
         if body.joints[0].name != name:
             raise InputError(
                 f"joint {name!r} is not the first joint of body {body.name!r}; give it"
                 " a body of its own"
             )
-        if found.actgravcomp and self.gravcomp:
+        if hinge.actgravcomp and self.gravcomp:
             raise InputError(
                 f"joint {name!r} has actuatorgravcomp, a torque on the link past the"
                 " drive; accepted: false"
@@ -131,7 +137,7 @@ class Surroundings:
         if name in self.held:
             raise InputError(self.held[name])
         self._check_actuators(name)
-        return found
+        return hinge
 
     def _check_driven(self, name: str) -> None:
         if self.has_drive(name):

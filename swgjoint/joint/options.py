@@ -1,11 +1,12 @@
-"""Options of a model under which drives hold: integrator and linear solver.
+"""Model options that drives need: integrator and linear solver.
 
-Under ``discrete`` the engine solves (M + h² P)(v+ - v) = h f by conjugate gradients, at
-most ``iterations`` of them, to the relative residual ``tolerance``. Files for
-reinforcement learning state 1 to 5, which leaves the drives' stiffness half solved: the
-engine says so on the console alone. On nine robots of 6 to 32 joints, catalogue drives
-took at most 15 iterations (steps up to 5 ms), drives of 1e7 N·m/rad with rotors of 1e-6
-kg·m² at most 70. A tolerance of 1e-6 changes torques by 3e-5, one of 1e-4 by 1e-3.
+Under ``discrete`` the engine solves (M + h² P)(v+ - v) = h f by conjugate gradients, in
+at most ``iterations`` iterations, to the relative residual ``tolerance``. Models for
+reinforcement learning often allow 1 to 5 iterations. The drive stiffness is then not
+solved to convergence, which the engine reports only on the console. On nine robots with
+6 to 32 joints, catalogue drives needed at most 15 iterations (steps up to 5 ms), and
+drives of 1e7 N·m/rad with rotors of 1e-6 kg·m² at most 70. A tolerance of 1e-6 changes
+torques by 3e-5, a tolerance of 1e-4 by 1e-3.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ from swgjoint.joint.callers import depth_of_caller
 
 INTEGRATORS = ("discrete", "keep")
 ITERATIONS, LS_ITERATIONS = 100, 50
-"""MuJoCo's default limits of its solvers; fewer are raised to them."""
+"""MuJoCo's default iteration limits of its solvers; smaller limits are raised to them.
+"""
 TOLERANCE = 1e-8
-"""MuJoCo's default, for a tolerance above :data:`LARGEST_TOLERANCE`."""
+"""MuJoCo's default, which replaces tolerances above :data:`LARGEST_TOLERANCE` [-]."""
 LARGEST_TOLERANCE = 1e-6
+"""Largest tolerance of the solver that is kept [-]."""
 _DIVERGES = (
     mujoco.mjtIntegrator.mjINT_EULER,
     mujoco.mjtIntegrator.mjINT_IMPLICIT,
@@ -33,22 +36,22 @@ _DIVERGES = (
 
 @dataclass(frozen=True, kw_only=True)
 class EngineOptions:
-    """What a model with drives will have."""
+    """Options of a model with drives."""
 
     integrator: mujoco.mjtIntegrator
     iterations: int
     ls_iterations: int
     tolerance: float
     said: tuple[str, ...]
-    """Warnings, each one line."""
+    """Warnings of one line each."""
 
     def warn(self) -> None:
-        """Say what changes and what may not hold."""
+        """Warn of options that change and of options that may be unsuitable."""
         for line in self.said:
             warnings.warn(line, stacklevel=depth_of_caller())
 
     def apply(self, spec: mujoco.MjSpec) -> None:
-        """Set them."""
+        """Write the options into a spec."""
         spec.option.integrator = self.integrator
         spec.option.iterations = self.iterations
         spec.option.ls_iterations = self.ls_iterations
@@ -56,15 +59,15 @@ class EngineOptions:
 
 
 def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOptions:
-    """Options under which drives hold in a model.
+    """Options of a model that integrate its drives correctly.
 
     Args:
         spec: Model; unchanged.
-        wanted: ``discrete`` replaces what does not hold, ``keep`` nothing.
+        wanted: ``discrete`` replaces unsuitable options, ``keep`` replaces none.
         rotors: Whether a drive has a rotor; without one all options are kept.
 
     Raises:
-        InputError: For a solver that leaves the drive's stiffness out.
+        InputError: If ``wanted`` is unknown or the solver omits the drive stiffness.
     """
     if wanted not in INTEGRATORS:
         raise InputError(f"integrator {wanted!r}; accepted: {', '.join(INTEGRATORS)}")
@@ -74,17 +77,17 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
     solver = int(option.iterations), int(option.ls_iterations), float(option.tolerance)
     if rotors and wanted == "discrete" and old in _DIVERGES:
         integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-        if old != mujoco.mjtIntegrator.mjINT_EULER:  # MuJoCo's default goes silently
+        if old != mujoco.mjtIntegrator.mjINT_EULER:  # MuJoCo's default: no warning
             name = old.name.removeprefix("mjINT_").lower()
             said.append(
-                f"integrator {name} replaced by discrete: {name} takes a drive as an"
+                f"integrator {name} replaced by discrete: {name} treats a drive as an"
                 " explicit force and diverges; integrator='keep' keeps it, RK4 is kept"
                 " as the reference"
             )
     if rotors and integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
         if option.solver == mujoco.mjtSolver.mjSOL_PGS:
             raise InputError(
-                "solver PGS leaves tendons out of the discrete integrator's metric and "
+                "solver PGS omits tendons from the discrete integrator's metric and "
                 "would integrate the drive explicitly; accepted: Newton, CG"
             )
         if option.noslip_iterations > 0:
@@ -96,8 +99,8 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
         if solver != enough:
             does = "set to" if wanted == "discrete" else "use"
             said.append(
-                f"solver {_text(solver)} leave the drives' stiffness half solved under"
-                f" integrator discrete; {does} {_text(enough)}"
+                f"solver {_text(solver)}: does not solve the drive stiffness to"
+                f" convergence under integrator discrete; {does} {_text(enough)}"
             )
             if wanted == "discrete":
                 solver = enough
@@ -111,7 +114,7 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
 
 
 def _converging(spec: mujoco.MjSpec) -> tuple[int, int, float]:
-    """Iterations, iterations of the line search and tolerance that do."""
+    """Sufficient iterations, line-search iterations and tolerance."""
     option = spec.option
     coarse = option.tolerance > LARGEST_TOLERANCE
     return (

@@ -1,4 +1,4 @@
-"""Which hinges of a model a table of names and patterns means."""
+"""Select hinges of a model by names and patterns."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from swgjoint.joint.obstacles import Surroundings
 
 
 def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
-    """The key of every hinge that takes a drive: the first that matches it.
+    """First matching key of every hinge that takes a drive.
 
     A key is the name of a joint or a pattern with ``*``, ``?`` and ``[...]`` as in file
-    names. A pattern means hinges; those that cannot take a drive are left out with one
-    warning that lists them. Rotors of drives are never meant.
+    names. A pattern selects hinges; matching hinges that cannot take a drive are left
+    out with one warning that lists them. Rotors of drives are never selected.
 
     Args:
         spec: Model.
-        keys: Names and patterns, in order.
+        keys: Names and patterns; earlier keys have priority.
 
     Returns:
         Key by joint, in the order of the model.
 
     Raises:
-        InputError: For a name that cannot take a drive, a pattern that matches no hinge
-            that can, and a key whose joints are all taken by keys before it; a line for
-            each.
+        InputError: If a name cannot take a drive, if a pattern matches no hinge that
+            can, or if earlier keys already select all joints of a key; with one line
+            for each problem.
     """
     around = Surroundings(spec)
     keys = list(keys)
@@ -81,8 +81,8 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
             if key not in taken:
                 others = ", ".join(sorted(map(repr, before)))
                 wrong.append(
-                    f"{key!r} is never reached: {others} before it matches the same"
-                    " joints; put the narrower one first"
+                    f"{key!r} selects no joint: {others} before it matches the same"
+                    " joints; put the more specific key first"
                 )
     if wrong:
         raise InputError("\n".join(wrong))
@@ -100,7 +100,7 @@ def _is_pattern(key: str, around: Surroundings) -> bool:
 
 
 def _no_hinge(name: str, around: Surroundings) -> str:
-    """Why a name is that of no hinge."""
+    """Reason why a name selects no hinge."""
     try:
         around.driven_joint(name)
     except InputError as error:
@@ -109,7 +109,7 @@ def _no_hinge(name: str, around: Surroundings) -> str:
 
 
 def _obstacle(joint: Any, around: Surroundings) -> str:
-    """Why a hinge cannot take a drive; empty if it can."""
+    """Reason why a hinge cannot take a drive; empty if it can."""
     if not joint.name:
         return f"a hinge of body {joint.parent.name!r} has no name"
     try:

@@ -1,4 +1,4 @@
-"""Where drives go: the checks before a spec is edited, from one compiled copy of it."""
+"""Joints that get drives, checked and measured in one compiled copy of the spec."""
 
 from __future__ import annotations
 
@@ -15,43 +15,47 @@ from swgjoint.joint.obstacles import Surroundings
 from swgjoint.typing import Array
 
 ROTOR_MASS = 1e-9
-"""Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
+"""Mass of the rotor body [kg]; the arm model already includes the mass of the motor."""
 LUMPED_INERTIA = 1e-12
-"""Of the body of a lumped rotor [kg·m²]: the engine wants some."""
+"""Inertia of the body of a lumped rotor, since the engine requires one [kg·m²]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrivePlace:
-    """Where a joint stands in the compiled model."""
+    """A joint in the compiled model: its frame, inertia, actuators and sensors."""
 
     joint: Any
     parent: Any
     model: mujoco.MjModel
-    """The model before any drive."""
+    """Compiled model without drives."""
     index: int
-    """Index of the joint in it."""
+    """Index of the joint in the model."""
     actuators: dict[int, Any]
-    """Those that act on the joint, by their place in the model."""
+    """Actuators that act on the joint, by index in the model."""
     sensors: tuple[Any, ...]
-    """Those of the torque of actuators at the joint."""
+    """Sensors of the actuator torque at the joint."""
     pos: Array
+    """Position of the joint in the frame of the parent body, shape (3,) [m]."""
     quat: Array
+    """Orientation of the joint's body in the parent frame, shape (4,) [-]."""
     axis: Array
+    """Unit vector of the joint axis in the frame of its body, shape (3,) [-]."""
     ref: float
+    """Joint angle at qpos0 [rad]."""
     armature: float
     """Armature of the joint and of the actuators on it [kg·m²]."""
     inertia: float
-    """At qpos0, the other joints held, without armature [kg·m²]."""
+    """Inertia at qpos0 without armature, with the other joints held [kg·m²]."""
     has_damping_ratio: bool
     """Whether an actuator on the joint states its damping as a ratio."""
 
 
 class Compiled:
-    """A compiled copy of a spec at qpos0, from which places are read."""
+    """A compiled copy of a spec at qpos0, from which the joints are read."""
 
     def __init__(self, spec: mujoco.MjSpec, around: Surroundings) -> None:
         copy = spec.copy()
-        copy.compiler.fusestatic = False  # keeps every body where the spec has it
+        copy.compiler.fusestatic = False  # keeps every body of the spec
         try:
             self.model = copy.compile()
         except ValueError as error:
@@ -63,13 +67,13 @@ class Compiled:
 
     @cached_property
     def mass(self) -> Array:
-        """Mass matrix with armature. Shape (nv, nv)."""
+        """Mass matrix with armature [kg·m²]. Shape (nv, nv)."""
         mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, mass)
         return mass
 
     def place(self, joint: Any) -> DrivePlace:
-        """Where a hinge that can take a drive stands."""
+        """Frame, inertia, actuators and sensors of a hinge that can take a drive."""
         model, name = self.model, joint.name
         j = int(model.joint(name).id)
         b, dof = int(model.jnt_bodyid[j]), int(model.jnt_dofadr[j])
@@ -117,39 +121,42 @@ class Rotor:
 
     @property
     def reflected(self) -> float:
-        """At the link, i²J [kg·m²]."""
+        """Rotor inertia reflected to the link, i²J [kg·m²]."""
         return self.ratio**2 * self.inertia
 
 
 def free_inertias(
     compiled: Compiled, places: Mapping[str, DrivePlace], rotors: Mapping[str, Rotor]
 ) -> dict[str, tuple[float, float]]:
-    """Inertia about joints with the others free, before any drive and with the rest.
+    """Inertias about joints with the other joints free, without and with other drives.
 
-    The second has the drives of the joints before it in the model and neither drive
-    nor armature of its own. Only joints whose actuators state a damping ratio are
-    listed.
+    The second inertia includes the drives of all joints that precede the joint in the
+    model, but neither a drive nor armature of the joint itself. Only joints whose
+    actuators state a damping ratio are listed.
 
     Args:
         compiled: Model without drives.
-        places: By joint, in the order of the model.
-        rotors: The same joints.
+        places: Joints that get a drive, by name and in the order of the model.
+        rotors: Rotors of the same joints, by name.
+
+    Returns:
+        Both inertias by joint name [kg·m²].
     """
     if not any(place.has_damping_ratio for place in places.values()):
         return {}
     model, data = compiled.model, compiled.data
-    mass, found = compiled.mass.copy(), {}
+    mass, inertias = compiled.mass.copy(), {}
     before = np.linalg.inv(mass).diagonal()
     for name, place in places.items():
         dof, rotor = int(model.jnt_dofadr[place.index]), rotors[name]
         if place.has_damping_ratio:
             now = 1.0 / float(np.linalg.inv(mass)[dof, dof]) - place.armature
-            found[name] = 1.0 / float(before[dof]), now
+            inertias[name] = 1.0 / float(before[dof]), now
         mass[dof, dof] -= place.armature
         if not rotor.own:
             mass[dof, dof] += rotor.reflected
             continue
-        # the body of the rotor turns with its parent, less what its own hinge yields
+        # the rotor body turns with its parent; eliminate the free rotor hinge
         linear, angular = np.zeros((2, 3, model.nv))
         parent = int(model.body_parentid[model.jnt_bodyid[place.index]])
         anchor = data.xanchor[place.index]
@@ -157,38 +164,43 @@ def free_inertias(
         spin = data.xaxis[place.index] @ angular
         mass += ROTOR_MASS * linear.T @ linear + rotor.body * angular.T @ angular
         mass -= rotor.body**2 / rotor.inertia * np.outer(spin, spin)
-    return found
+    return inertias
 
 
 def find_places(
     spec: mujoco.MjSpec, rotors: Mapping[str, float]
 ) -> tuple[Compiled, dict[str, DrivePlace]]:
-    """Find hinges that can take a drive, in the order of the model.
+    """Find the hinges that get a drive, in the order of the model.
 
     Args:
         spec: Model; unchanged.
-        rotors: Inertia of the rotor by joint [kg·m²].
+        rotors: Rotor inertia by joint name [kg·m²].
+
+    Returns:
+        The compiled model without drives, and the joints by name.
 
     Raises:
-        InputError: If a joint is unknown or cannot take a drive, a line for each.
+        InputError: If a joint is unknown or cannot take a drive, with one line for
+            each, if the model does not compile, or if compiler settings would change
+            the rotor inertia.
     """
     around = Surroundings(spec)
-    found, wrong = {}, []
+    hinges, wrong = {}, []
     for name in rotors:
         try:
-            found[name] = around.driven_joint(name)
+            hinges[name] = around.driven_joint(name)
         except InputError as error:
             wrong.append(str(error))
     if wrong:
         raise InputError("\n".join(wrong))
     _check_compiler(spec, min(rotors.values()))
     compiled = Compiled(spec, around)
-    ordered = sorted(found, key=lambda name: int(compiled.model.joint(name).id))
-    return compiled, {name: compiled.place(found[name]) for name in ordered}
+    ordered = sorted(hinges, key=lambda name: int(compiled.model.joint(name).id))
+    return compiled, {name: compiled.place(hinges[name]) for name in ordered}
 
 
 def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:
-    """Refuse compiler settings that would change the rotor's inertia."""
+    """Reject compiler settings that would change the rotor inertia."""
     compiler = spec.compiler
     if compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         raise InputError(

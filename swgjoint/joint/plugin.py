@@ -1,6 +1,7 @@
-"""The engine plugin ``swgjoint.drive``: its library, its text attributes, a self-test.
+"""The engine plugin ``swgjoint.drive``: its library, attributes and self-test.
 
-Development: one line builds the library in place, see ``swgjoint/plugin/README.md``.
+For development, one command builds the library in place, see
+``swgjoint/plugin/README.md``.
 """
 
 from __future__ import annotations
@@ -20,27 +21,29 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 
 NUMERICAL_DAMPING = 0.1
-"""Share of a backward step mixed in for torsion modes that the step cannot resolve.
+"""Fraction of a backward step mixed in for torsion modes that the step cannot resolve
+[-].
 
-Zero below h w = 0.5, 0.03 of critical at h w = 2; must be positive for the scheme to
-hold on stiff joints.
+It adds no damping below h w = 0.5 and 0.03 of critical at h w = 2; it must be positive
+for the scheme to be stable on stiff joints.
 """
 PASSES = 2
-"""Evaluations of the map in a step: one prediction of the pair, then the force."""
+"""Evaluations of the map per step: one predicts the pair, the next gives the force."""
 TENDON_STIFFNESS = (1e-9, 0.0, 1.0)
-"""Polynomial of the carrier tendon; its cubic turns a length into a tangent."""
+"""Polynomial of the carrier tendon; the cubic part sets its tangent by its length."""
 FRICTION_STIFFNESS = (1e-9, 0.0, 1e-19)
-"""The same for the tendon of the friction, whose length is a rotation of many turns:
-with so small a cubic its own spring pulls with nothing. The plugin recognises it by
-that, so it is a number that MuJoCo's XML keeps."""
+"""Polynomial of the friction tendon, whose length is a rotation of many turns: with
+such a small cubic part its own spring force is negligible. The plugin identifies the
+tendon by this value, which MuJoCo's XML therefore has to preserve."""
 
 
 @cache
 def load() -> None:
-    """Register the plugin with MuJoCo; does nothing when called again.
+    """Register the plugin with MuJoCo; further calls do nothing.
 
     Raises:
-        ComputationError: If MuJoCo has another version or the library is not built.
+        ComputationError: If MuJoCo has another version, or the library is not built or
+            cannot be loaded.
     """
     if mujoco.__version__ != MUJOCO_VERSION:
         raise ComputationError(
@@ -65,8 +68,9 @@ def load() -> None:
 def load_plugin() -> Path:
     """Register the drive plugin with MuJoCo, so that saved models with drives load.
 
-    Importing swgjoint does this by itself; call it to be told what is missing, or for
-    the path that ``mj_loadPluginLibrary`` takes in C and C++.
+    Importing swgjoint registers the plugin. Call this function for an error message
+    that names what is missing, or for the path that ``mj_loadPluginLibrary`` needs in C
+    and C++.
 
     Returns:
         Path of the library.
@@ -79,7 +83,7 @@ def load_plugin() -> Path:
 
 
 def _text(values: np.ndarray) -> str:
-    # repr gives the shortest text that reads back to the same bits
+    # repr gives the shortest text that converts back to the same bits
     return " ".join(repr(float(v)) for v in np.ravel(values))
 
 
@@ -91,15 +95,18 @@ def config(
     numerical_damping: float = NUMERICAL_DAMPING,
     passes: int = PASSES,
 ) -> dict[str, str]:
-    """Text attributes of an instance; the model then needs no file.
+    """Text attributes of a plugin instance, which replace a map file.
 
     Args:
         drive: Map to evaluate.
-        damping: Torque per torsion rate [N·m·s/rad].
-        contact_damping: Its least value while a contact or a limit acts
+        damping: Damping torque per torsion rate [N·m·s/rad].
+        contact_damping: Smallest damping while a contact or a limit acts
             [N·m·s/rad].
         numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
         passes: See :data:`PASSES`.
+
+    Returns:
+        Attribute texts by key.
     """
     return (
         {
@@ -128,7 +135,7 @@ def config(
 
 
 def friction_numbers(drive: DriveMap) -> np.ndarray:
-    """Attribute ``friction``: direction, then the law with the bending in it. (9,)."""
+    """Attribute ``friction``: direction, then the law including bending. Shape (9,)."""
     f = drive.friction
     assert f is not None
     return np.array(
@@ -166,11 +173,11 @@ _SELF_TEST = """
 
 
 def metric_error() -> float:
-    """Difference of one step from (M + h² (p g g' + p_b b b'))⁻¹ h f, of the step.
+    """Relative deviation of one step from (M + h² (p g g' + p_b b b'))⁻¹ h f [-].
 
-    The scheme hands direction g and stiffness p, and the stiffness p_b of friction, to
-    the engine through ``ten_J`` and ``ten_length``, which no document promises; this
-    asks the installed engine.
+    The scheme passes the direction g, the stiffness p and the stiffness p_b of friction
+    to the engine through ``ten_J`` and ``ten_length``. This is undocumented behaviour,
+    so the function tests it on the installed engine.
     """
     from swgjoint.joint.reference import TwinMotion, metric_of, scheme_force
 
@@ -215,16 +222,16 @@ def metric_error() -> float:
 
 @cache
 def require_metric() -> None:
-    """Refuse the discrete integrator if the engine does not take the metric.
+    """Reject the discrete integrator if the engine does not accept the metric.
 
     Raises:
-        ComputationError: With the way out.
+        ComputationError: If a test step deviates; the message names the alternative.
     """
     error = metric_error()
     if not error < 1e-9:
         raise ComputationError(
-            f"MuJoCo {mujoco.__version__} does not take the drive's stiffness into "
-            f"its discrete integrator (step wrong by {error:.1e} of itself): set "
-            "integrator RK4 and a step below 0.3 over the fastest torsion frequency "
-            "[rad/s]"
+            f"MuJoCo {mujoco.__version__} does not include the drive stiffness in its "
+            f"discrete integrator (relative error of a step {error:.1e}): set "
+            "integrator RK4 and a step below 0.3 divided by the fastest torsion "
+            "frequency [rad/s]"
         )

@@ -1,18 +1,20 @@
-r"""Level ``kinematic``: a rigid drive whose output is off by the kinematic error.
+r"""Level ``kinematic``: a rigid drive whose output deviates by the kinematic error.
 
 The gear is the constraint :math:`\psi = \theta/i + e_0(\theta, \psi)`; psi is the
-coordinate, theta follows. To first order in e0 the link then obeys
+coordinate and determines theta. To first order in e0 the equation of the link is
 
 .. math:: (M + i^2 J)\,\ddot\psi = i\tau + f + i^2 J\,\ddot e_0,
 
-M and f inertia and force of the arm, tau the motor torque: the rotor sees
-:math:`\ddot\theta = i(\ddot\psi - \ddot e_0)`. So the model is the rigid one, and e0 of
-the commanded motor motion enters through the inputs: a motor loop on theta is a loop on
-:math:`i(\psi - e_0)`, and :math:`i J\,\ddot e_0` adds to the motor torque.
+where M and f are inertia and force of the arm and tau is the motor torque. The rotor
+accelerates by :math:`\ddot\theta = i(\ddot\psi - \ddot e_0)`. The model is therefore
+the rigid one, and e0 of the commanded motor motion enters through the inputs: a motor
+loop on theta becomes a loop on :math:`i(\psi - e_0)`, and :math:`i J\,\ddot e_0` is
+added to the motor torque.
 
-Neglected: the change of the ratio in the torque, :math:`i\,|\partial_\theta e_0|` of it
-(:func:`ratio_variation`, about 1 % at tooth order), and e0 at the actual instead of the
-commanded motor angle, :math:`n |\theta - \theta_r|` in phase at order n.
+Two effects are neglected. The first is the variation of the ratio in the torque, whose
+relative size is :math:`i\,|\partial_\theta e_0|` (:func:`ratio_variation`, about 1 % at
+tooth order). The second is the difference between e0 at the actual and at the commanded
+motor angle, which is a phase of :math:`n |\theta - \theta_r|` at order n.
 """
 
 from __future__ import annotations
@@ -26,19 +28,19 @@ from swgjoint.typing import Array
 
 
 def kinematic_part(drive: DriveMap) -> DriveMap:
-    """The map without the harmonics that carry no kinematic error."""
+    """The map reduced to the harmonics that have a kinematic error."""
     return drive.with_harmonics(np.hypot(*drive.kinematic_error.T) > 0.0)
 
 
 def ratio_variation(drive: DriveMap) -> float:
-    """Bound of the relative change of the ratio by e0 [-]."""
+    """Upper bound of the relative variation of the ratio due to e0 [-]."""
     n_theta, n_psi = np.abs(drive.angle_orders.T)
     e = np.hypot(*drive.kinematic_error.T)
     return float(np.sum((abs(drive.ratio) * n_theta + n_psi) * e))
 
 
 def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
-    """e0 at motor angles, the output where it then is [rad]. Shape of theta.
+    """Error e0 at motor angles, with psi = theta/i + e0 [rad]. Shape of theta.
 
     Args:
         drive: The map.
@@ -46,7 +48,7 @@ def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
     """
     theta = np.asarray(theta, float)
     e0, psi = np.zeros_like(theta), theta / drive.ratio
-    # e0 moves psi by an arc minute, so each round shrinks the error by n_psi e0
+    # e0 moves psi by about an arc minute, so an iteration reduces the error by n_psi e0
     for _ in range(60):
         last = e0
         e0 = drive.error_at(drive.phases(theta, psi + e0))[0]
@@ -56,14 +58,14 @@ def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
 
 
 def motor_of_link(drive: DriveMap, psi: ArrayLike) -> Array:
-    """Motor angle at which the output stands at psi [rad]. Shape of psi.
+    """Motor angle at which the output angle is psi [rad]. Shape of psi.
 
     Args:
         drive: The map.
         psi: Link angles of any shape [rad].
 
     Raises:
-        ComputationError: If the error is so steep that several motor angles fit.
+        ComputationError: If e0 is so steep that several motor angles fit one psi.
     """
     psi = np.asarray(psi, float)
     theta = drive.ratio * psi
@@ -75,6 +77,6 @@ def motor_of_link(drive: DriveMap, psi: ArrayLike) -> Array:
         if (np.abs(step) <= 1e-13 * (1.0 + np.abs(theta))).all():
             return np.asarray(theta)
     raise ComputationError(
-        f"map {drive.name!r}: no single motor angle belongs to a link angle; the ratio"
-        f" varies by up to {100.0 * ratio_variation(drive):.3g} %, needed: below 100 %"
+        f"map {drive.name!r}: a link angle has no unique motor angle; the ratio varies"
+        f" by up to {100.0 * ratio_variation(drive):.3g} %, accepted: below 100 %"
     )

@@ -71,7 +71,7 @@ def test_curve_with_clearance_keeps_a_little_stiffness(synthetic_map):
     loose = with_mean(synthetic_map, [0, -500.0, 0, 120.0 / x0**3])
     spring = fit_native(loose)
     assert spring.linear == pytest.approx(1e-3 * loose.mean_stiffness)
-    assert "no stiffness about zero" in spring.note
+    assert "no stiffness near zero" in spring.note
 
 
 @pytest.mark.parametrize("name", [n for n in catalogue_names() if "-25-" in n])
