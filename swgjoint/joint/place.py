@@ -105,18 +105,19 @@ class Compiled:
 
 @dataclass(frozen=True, kw_only=True)
 class Rotor:
-    """The rotor that a joint will have."""
+    """Rotor of a drive."""
 
     inertia: float
-    """About its axis [kg·m²]."""
+    """Rotor inertia about its axis [kg·m²]."""
     ratio: float
     lumped: bool
     own: bool
-    """Whether it has a joint of its own; else it is armature of the link's."""
+    """Whether the rotor has its own joint; otherwise it is armature of the link joint.
+    """
 
     @property
     def body(self) -> float:
-        """Inertia that turns with the body that carries it, about any axis [kg·m²]."""
+        """Isotropic inertia of the rotor body, which its parent carries [kg·m²]."""
         return min(LUMPED_INERTIA, 1e-3 * self.inertia) if self.lumped else self.inertia
 
     @property

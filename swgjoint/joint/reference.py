@@ -1,9 +1,9 @@
-r"""The law of the engine plugin in numpy: its independent twin for the tests.
+r"""The law of the engine plugin in numpy, an independent implementation for the tests.
 
-Both modes act on the pair (theta, psi) of rotor and link with
+The law has two modes. Both act on the pair (theta, psi) of rotor and link with
 :math:`g = (\partial_\theta\Delta, \partial_\psi\Delta)`.
 
-*Gradient* (any integrator but ``discrete``): :math:`-\nabla V - C\,(g\cdot v)\,g`.
+*Gradient* (all integrators except ``discrete``): :math:`-\nabla V - C\,(g\cdot v)\,g`.
 
 *Scheme* (``discrete``, step h): with :math:`\tilde x = q - h v/2` the engine's step is
 a midpoint rule in :math:`(\tilde x, v)`. The force is the discrete gradient of V from
@@ -13,29 +13,30 @@ a midpoint rule in :math:`(\tilde x, v)`. The force is the discrete gradient of 
     V^+ - V = L\,(\Delta^+ - \Delta) + e\cdot(\tilde x^+ - \tilde x),
 
 split symmetrically: L is the secant of V by the torsion with every harmonic at the mean
-of its two end values, e the secant by the angles with every coefficient at the mean of
-its two ends, g the secant of the torsion. The step of the pair is predicted and the
-remainder, linear in the velocity step, goes to the engine as the metric
-:math:`M + h^2 p\,g g^T`.
+of its two end values, e is the secant by the angles with every coefficient at the mean
+of its two end values, and g is the secant of the torsion. The scheme predicts the step
+of the pair. The remainder, linear in the velocity step, is passed to the engine as the
+metric :math:`M + h^2 p\,g g^T`.
 
-Hysteresis, elements k, f relaxed at r, adds its mean torque over the step to L and the
-slope of that mean to the remainder. The stretch goes from :math:`u_0` to
-:math:`u_1 = \mathrm{clip}(u_0 + \Delta^+ - \Delta, \pm f/k)`; with s the part of the
-way that it sticks,
+Hysteresis consists of elements with stiffness k and yield torque f, relaxed at r. It
+adds its mean torque over the step to L and the slope of that mean to the remainder. The
+stretch changes from :math:`u_0` to
+:math:`u_1 = \mathrm{clip}(u_0 + \Delta^+ - \Delta, \pm f/k)`; with s the fraction of
+the torsion step in which it sticks,
 
 .. math::
     \bar q = k\,[\tfrac12 (u_0 + u_1)\,s + u_1 (1 - s)], \qquad
     \partial\bar q/\partial\Delta^+ = \tfrac12 k s^2.
 
-Its work is the change of :math:`k u^2/2` plus what slipping takes, which is >= 0.
+Its work is the change of :math:`k u^2/2` plus the slip dissipation, which is >= 0.
 
 Friction acts along beta, the rotation of the wave generator relative to the flexspline,
-with a metric of its own, :math:`h^2 p_b\,b b^T`; see
+with its own metric :math:`h^2 p_b\,b b^T`; see
 :mod:`swgjoint.joint.friction_step`.
 
 Source:
     Gonzalez (1996), "Time integration and discrete Hamiltonian systems", J. Nonlinear
-    Sci. 6, for discrete gradients; the prediction and the metric are our own.
+    Sci. 6, for discrete gradients; prediction and metric were derived for this scheme.
 """
 
 from __future__ import annotations
@@ -59,21 +60,23 @@ class TwinMotion:
     theta_rate: float
     psi_rate: float
     rotor_weight: float = 0.0
-    """Weight of the rotor's dof in the inverse mass matrix, see :mod:`.response`
-    [1/(kg·m²)]."""
+    """Diagonal element of the rotor dof in the inverse mass matrix, see
+    :mod:`.response` [1/(kg·m²)]."""
     link_weight: float = 0.0
     rotor_acceleration: float = 0.0
-    """What all other forces caused in the last step, plugin state [rad/s²]."""
+    """Rotor acceleration by all other forces in the last step, a plugin state [rad/s²].
+    """
     link_acceleration: float = 0.0
     rest: tuple[float, ...] = ()
-    """Torsion at which each element of the hysteresis is relaxed [rad]."""
+    """Torsion at which each hysteresis element is relaxed [rad]."""
     relaxed: float | None = None
-    """beta at which the bristle of the friction is relaxed [rad]; None: here."""
+    """Angle beta at which the friction bristle is relaxed [rad]; None: at the current
+    state."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeForce:
-    """What the scheme hands to the engine for one step."""
+    """Force and metric that the scheme passes to the engine for one step."""
 
     theta: float
     """Force on the rotor before the metric acts [N·m]."""
@@ -81,15 +84,15 @@ class SchemeForce:
     g_theta: float
     g_psi: float
     along: float
-    """Force along g, lam [N·m]."""
+    """Force lam along g [N·m]."""
     metric: float
-    """Stiffness of the rank-one metric, p [N·m/rad]."""
+    """Stiffness p of the rank-one metric [N·m/rad]."""
     e_theta: float
     """Secant of V by theta at fixed torsion [N·m]."""
     e_psi: float
     friction: FrictionStep | None = None
-    """Along beta; its force is in ``theta`` and ``psi``, its metric is not in
-    ``metric``."""
+    """Friction along beta; ``theta`` and ``psi`` include its force, ``metric`` excludes
+    its metric."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,13 +146,13 @@ def scheme_force(
     """Force and metric of one discrete step.
 
     Args:
-        drive: Map.
-        motion: Pair at the beginning of the step.
+        drive: The map.
+        motion: State of the pair at the beginning of the step.
         timestep: Step h [s].
-        damping: Torque per torsion rate, C [N·m·s/rad]; while a contact or a limit
-            acts, not below ``contact_damping`` of the drive.
-        numerical_damping: nu1 of the scheme [-].
-        passes: Evaluations of the map.
+        damping: Damping C, torque per torsion rate [N·m·s/rad]; while a contact or a
+            limit acts, at least ``contact_damping`` of the drive.
+        numerical_damping: Coefficient nu1 of the scheme [-].
+        passes: Number of evaluations of the map.
     """
     h = timestep
     v = np.array([motion.theta_rate, motion.psi_rate])
@@ -217,12 +220,15 @@ def scheme_force(
 
 
 def metric_of(drive: DriveMap, force: SchemeForce, *, timestep: float) -> Array:
-    """What the step adds to the inertia of the pair, h² (p g g' + p_b b b'). (2, 2).
+    """Inertia that the step adds to the pair, h² (p g g' + p_b b b') [kg·m²].
 
     Args:
         drive: The map.
         force: Linearised force of the step.
         timestep: Step h [s].
+
+    Returns:
+        Shape (2, 2).
     """
     g = np.array([force.g_theta, force.g_psi])
     metric = force.metric * np.outer(g, g)
@@ -241,7 +247,19 @@ def other_acceleration(
     theta_rate: float,
     psi_rate: float,
 ) -> tuple[float, float]:
-    """Plugin state after a step that ended at the given velocities [rad/s²]."""
+    """Plugin state after a step: acceleration by all other forces [rad/s²].
+
+    Args:
+        drive: The map.
+        motion: State of the pair at the beginning of the step.
+        force: Linearised force of the step.
+        timestep: Step h [s].
+        theta_rate: Rotor speed at the end of the step [rad/s].
+        psi_rate: Link speed at the end of the step [rad/s].
+
+    Returns:
+        Accelerations of rotor and link [rad/s²].
+    """
     dm, dl = theta_rate - motion.theta_rate, psi_rate - motion.psi_rate
     along = force.along + timestep * force.metric * (
         force.g_theta * dm + force.g_psi * dl
@@ -262,9 +280,9 @@ def other_acceleration(
 def rest_after(
     drive: DriveMap, motion: TwinMotion, *, timestep: float
 ) -> tuple[float, ...]:
-    """Plugin state after a step of the scheme: where each element is relaxed [rad].
+    """Plugin state after a step: torsion at which each element is relaxed [rad].
 
-    The end of a step is the beginning of the next; it counts there.
+    The plugin updates this state at the beginning of the next step.
 
     Args:
         drive: The map.
@@ -291,7 +309,16 @@ def relax_state(
     theta_rate: float,
     psi_rate: float,
 ) -> float:
-    """Plugin state after a step of the scheme: beta where the bristle is relaxed."""
+    """Plugin state after a step: beta at which the bristle is relaxed [rad].
+
+    Args:
+        drive: The map.
+        motion: State of the pair at the beginning of the step.
+        force: Linearised force of the step.
+        timestep: Step h [s].
+        theta_rate: Rotor speed at the end of the step [rad/s].
+        psi_rate: Link speed at the end of the step [rad/s].
+    """
     assert drive.friction is not None and force.friction is not None
     b = np.array(drive.friction_direction, float)
     v = np.array([motion.theta_rate, motion.psi_rate])
@@ -304,7 +331,7 @@ def relax_state(
 def _slip(
     drive: DriveMap, rest: tuple[float, ...], torsion: float, change: float
 ) -> tuple[float, float, float]:
-    """Mean torque of the elements over a change, its slope, stiffness that sticks."""
+    """Mean torque of the elements over a step, its slope, and sticking stiffness."""
     torque = slope = sticking = 0.0
     for element, r in zip(drive.hysteresis, rest, strict=True):
         k, d = element.stiffness, element.yield_torsion
@@ -343,7 +370,7 @@ def _secant(drive: DriveMap, x: Array, dx: Array) -> _Secant:
     if s0 == s1:
         torque, slope = 0.5 * (t0 + t1), 0.5 * k1
     else:
-        # the torque is cubic between knots, so Simpson's rule is exact there
+        # the torque is cubic between knots, so Simpson's rule is exact on each piece
         inner = [t for t in drive.torsion_knots if min(s0, s1) < t < max(s0, s1)]
         points = np.array([s0, *(inner if s1 > s0 else inner[::-1]), s1])
         work = sum(

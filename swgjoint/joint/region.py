@@ -1,53 +1,56 @@
-"""Where a drive's integration holds, and into how many parts a step is cut elsewhere.
+"""Region of stable integration of a drive, and sub-steps for steps outside it.
 
-Bounds of the discrete scheme, with n the orders per input turn, e and V the amplitudes
-of kinematic error and of cogging energy, T the repeated peak torque, K the stiffness, J
-the rotor, C = T sum n²e + sum n²V the curvature that the metric does not hold, w the
-torsion frequency of rotor against link:
+Bounds of the discrete scheme. Here n are the orders per input turn, e and V the
+amplitudes of kinematic error and cogging energy, T the repeated peak torque, K the
+stiffness, J the rotor inertia, C = T sum n²e + sum n²V the curvature that the metric
+does not include, and w the torsion frequency of rotor against link:
 
-- h <= 5 ms, tested no further;
-- h n |theta rate| <= 0.5: a shorter wave is not carried by the step;
-- h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond, the rotor snaps
-  between several positions of equilibrium within a step and gains energy;
-- i sum n e <= 0.56 and K_max <= 30 K: tested no further. K_max has the hysteresis that
-  sticks;
-- T/(i J), T/J_link <= 1e10 rad/s²: the engine itself takes more for a divergence;
-- where contacts or joint limits may act, h sqrt(K/J_link) <= 2.5: the engine pushes a
+- h <= 5 ms: longer steps are untested;
+- h n |theta rate| <= 0.5: the step does not resolve shorter waves;
+- h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond these bounds, the rotor
+  snaps between several equilibrium positions within a step and gains energy;
+- i sum n e <= 0.56 and K_max <= 30 K: larger values are untested. K_max includes the
+  stiffness of sticking hysteresis elements;
+- T/(i J), T/J_link <= 1e10 rad/s²: the engine treats larger accelerations as a
+  divergence;
+- if contacts or joint limits may act, h sqrt(K/J_link) <= 2.5: the engine pushes a
   link out of a contact along a prescribed path, and a light link that vibrates faster
   than the steps drags its rotor along;
-- without any loss, h w <= 0.25 where an order can meet the torsion: there nothing but
-  the steps takes energy from the resonance. Of what a damping ratio of 0.02 takes they
-  take less than a hundredth even at h w = 0.5.
+- for drives without losses, h w <= 0.25 if an order can excite the torsion: there only
+  the steps take energy from the resonance. Even at h w = 0.5 they take less than a
+  hundredth of the energy that a damping ratio of 0.02 dissipates.
 
-Contacts of the engine feed the torsion of chains that bounce on them, at any step and
-also under RK4. So a drive that has neither friction nor a damping ratio of 0.001 gets a
-damping ratio of 0.05 while contacts or limits act, see
+Contacts of the engine feed energy into the torsion of chains that bounce on them, at
+any step and also under RK4. A drive without friction and with a damping ratio below
+0.001 therefore gets a damping ratio of 0.05 while contacts or limits act, see
 :data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO`; in free motion it has no losses.
 
-A step outside is cut into equal parts that lie inside with a :data:`MARGIN`. RK4 and
-the others are bounded by the fastest frequency, that of a friction bristle that sticks
-and its decay included.
+A step outside the region is divided into equal parts that are inside by a
+:data:`MARGIN`. Under RK4 and the other integrators the bound is on the fastest
+frequency, including that of a sticking friction bristle, and on the decay rate of the
+bristle.
 
-Tested on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 kg·m²,
+Tests on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 kg·m²,
 i 30..160, low orders and tooth order with side bands, ripple 2-5 %, hardening to 26 K,
-steps 0.5-5 ms, no physical damping, 2 s): of 2302 runs inside none diverged and one
-gained more than 5 % of its energy. With one to three elements of hysteresis, 0.1 to
-20 K stiff: of 2254 runs inside (1 s) none diverged and two gained more than 5 %, the
-springs of the elements counted. Cut right to the edge, 2 of about 600 gained, with the
-margin none of 228.
+steps 0.5-5 ms, no physical damping, 2 s): of 2302 runs inside the region none diverged
+and one gained more than 5 % of its energy. With one to three hysteresis elements of
+0.1 to 20 K stiffness, of 2254 runs inside (1 s) none diverged and two gained more than
+5 %, including the energy of the elements. When steps were divided exactly to the edge
+of the region, 2 of about 600 runs gained energy; with the margin none of 228.
 
-Dropped on a floor, 9 of 5480 gained 5 % more than the floor of the engine gives by
-itself, none of the 582 with h sqrt(K/J_link) from 2 to 2.5; without that bound 12 of
-3090 did, up to three times their energy. Turning freely for 10 s near resonance at
-1 ms, 804 catalogue drives lost 1.5 % at most; without the last bound 83 of 1217 lost
-more than 5 %. ``swgjoint stability --full`` runs a grid of all this: of 6300 runs none
-gains energy, 155 are refused. Of 792 chains of two links that lie on a floor or press
-against limits with damping ratios of 0, 0.001 and 0.02, none gains and none is refused.
-Of the 264 without losses, 12 would gain more than the contacts of a finer run without
-the contact damping, up to 2.3 times the energy of their fall; 13 with a ratio of 0.001,
-2 with 0.02, none with 0.05, and of the 132 on floors none with 0.025. Under RK4 at
-25 µs three of these chains gain up to 9 times that energy.
-Not a proof: the step is one linearised solve with two evaluations.
+Of 5480 joints dropped on a floor, 9 gained 5 % more energy than the engine's floor
+itself supplies, and none of the 582 with h sqrt(K/J_link) from 2 to 2.5; without that
+bound 12 of 3090 did, by up to three times their energy. In free rotation for 10 s near
+resonance at 1 ms, 804 catalogue drives lost at most 1.5 %; without the last bound 83 of
+1217 lost more than 5 %. ``swgjoint stability --full`` runs a grid of these cases: of
+6300 runs none gains energy and 155 are rejected. Of 792 chains of two links that lie on
+a floor or press against limits with damping ratios of 0, 0.001 and 0.02, none gains
+energy and none is rejected. Without the contact damping, 12 of the 264 chains without
+losses would gain more than the contacts of a finer run supply, up to 2.3 times the
+energy of their fall; 13 with a ratio of 0.001, 2 with 0.02, none with 0.05, and of the
+132 on floors none with 0.025. Under RK4 at 25 µs three of these chains gain up to 9
+times that energy.
+These tests are no proof: the step is one linearised solve with two evaluations.
 `tests/joint/test_random_joints.py` runs a sample.
 """
 
@@ -62,33 +65,34 @@ from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
 
 MAX_SUB_STEPS = 64
-"""Parts of a step beyond which a run is refused instead of sub-stepped: an arm at 1 ms
-still runs in real time with that many, and who needs more should choose the step."""
+"""Largest number of sub-steps; runs that need more are rejected. An arm at 1 ms still
+runs in real time with this number; beyond it the user should choose a smaller step."""
 MAX_PHASE_STEP = 0.5
-"""Of the highest order in one step, h n |theta rate| [rad]."""
+"""Largest phase step of the highest order, h n |theta rate| [rad]."""
 MARGIN = 1.4
-"""Longest step inside over one that is cut: cut steps would all lie at the edge."""
+"""Longest step inside the region divided by the sub-step [-]; without a margin all
+sub-steps would be at the edge of the region."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RegionBound:
-    """One inequality, value <= limit."""
+    """One bound of the region: value <= limit."""
 
     what: str
     value: float
     limit: float
     timestep: float | None
-    """Largest step that meets it [s]; None if no step does."""
+    """Largest step that meets the bound [s]; None if no step does."""
 
     @property
     def ok(self) -> bool:
-        """Whether it is met."""
+        """Whether the bound is met."""
         return self.value <= self.limit * (1.0 + 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Whether one joint is inside the region at a step."""
+    """Bounds of one joint at a step."""
 
     joint: str
     timestep: float
@@ -101,7 +105,7 @@ class Region:
 
     @property
     def suggested_timestep(self) -> float | None:
-        """Largest step to two digits that meets every bound [s]; None if none does."""
+        """Largest step that meets every bound, to two digits [s]; None if none does."""
         steps = [bound.timestep for bound in self.bounds if not bound.ok]
         if None in steps:
             return None
@@ -113,9 +117,10 @@ class Region:
 
     @property
     def sub_steps(self) -> int | None:
-        """Equal parts of the step that lie well inside, 1 if it is inside itself.
+        """Number of equal sub-steps inside the region with the margin.
 
-        None if no step does. In a loop of one's own, with the largest of all joints::
+        It is 1 if the step itself is inside, and None if no step is. In a user's own
+        simulation loop, use the largest number of all joints::
 
             n = check_region(drive, timestep=h, max_input_speed=speed).sub_steps
             model.opt.timestep = h / n  # attach keeps the harmonics that h carries
@@ -131,14 +136,14 @@ class Region:
 
     @property
     def exceeded(self) -> str:
-        """What is exceeded, with value and limit; empty inside."""
+        """Exceeded bounds with value and limit; empty inside the region."""
         return "; ".join(
             f"{b.what} = {b.value:.3g} > {b.limit:.3g}" for b in self.bounds if not b.ok
         )
 
     @property
     def message(self) -> str:
-        """One line: ``ok``, or what is exceeded and the step that would do."""
+        """One line: ``ok``, or the exceeded bounds and a step that meets them."""
         what = self.exceeded
         if not what:
             return "ok"
@@ -154,13 +159,13 @@ class Region:
         )
 
     def require(self, max_sub_steps: int = 1) -> int:
-        """Sub-steps with which the integration holds, 1 inside the region.
+        """Number of sub-steps for a stable integration, 1 inside the region.
 
         Args:
-            max_sub_steps: Largest number that is accepted; 1 refuses what is outside.
+            max_sub_steps: Largest accepted number; 1 rejects steps outside the region.
 
         Raises:
-            ComputationError: With :attr:`message` if it takes more.
+            ComputationError: If more sub-steps are needed, with :attr:`message`.
         """
         parts = self.sub_steps
         if parts is not None and parts <= max_sub_steps:
@@ -180,17 +185,17 @@ def check_region(
     contacts: bool = False,
     integrator: str = "discrete",
 ) -> Region:
-    """Whether a joint's integration holds at a step; see the module for the bounds.
+    """Check whether a step integrates a joint stably; see the module for the bounds.
 
     Args:
-        drive: What :func:`swgjoint.joint.attach.attach` returned.
+        drive: Drive that :func:`swgjoint.joint.attach.attach` returned.
         timestep: Step h [s].
         max_input_speed: Largest speed of the rotor [rad/s].
-        max_torque: Largest torque at the output [N·m]; the repeated peak torque if None
-            or smaller.
+        max_torque: Largest output torque [N·m]; at least the repeated peak torque is
+            used.
         contacts: Whether contacts or limits may act on the link.
-        integrator: ``discrete``; for ``RK4`` and the others, which take the drive as an
-            explicit force, the bound is on h times the fastest torsion frequency.
+        integrator: ``discrete``; ``RK4`` and the other integrators treat the drive as
+            an explicit force, so h times the fastest frequency is bounded.
     """
     native = drive.level in ("linear", "native")
     if drive.rotor is None or (native and integrator == "discrete"):
@@ -222,7 +227,7 @@ def _discrete_bounds(
     order = float(n.max(initial=0.0))
     inertia = rotor + drive.link_inertia / i**2
     held = drive.stiffness / i**2
-    surplus = 2.0 * curvature - held  # what J/h² has to carry
+    surplus = 2.0 * curvature - held  # part that J/h² has to balance
     return (
         RegionBound(what="step h [s]", value=h, limit=5e-3, timestep=5e-3),
         RegionBound(
@@ -263,7 +268,7 @@ def _acceleration_bound(drive: JointDrive, torque: float) -> RegionBound:
     return RegionBound(
         what="acceleration of rotor or link by the largest torque [rad/s²]",
         value=torque / min(rotor, drive.link_inertia),
-        limit=1e10,  # mjMAXVAL: the engine takes more for a divergence
+        limit=1e10,  # mjMAXVAL: the engine treats larger values as a divergence
         timestep=None,
     )
 
@@ -281,7 +286,7 @@ def _contact_bound(drive: JointDrive, h: float) -> RegionBound:
 def _lossless_bound(drive: JointDrive, h: float, speed: float) -> RegionBound:
     frequency = drive.natural_frequency
     order = float(input_orders(drive.drive).max(initial=0.0))
-    # a kept order meets the torsion, or comes near, at or below this speed
+    # whether a kept order excites the torsion mode at or below this speed
     resonant = order * speed >= 0.5 * frequency
     return RegionBound(
         what="h times the torsion frequency, without losses at resonance",
@@ -304,13 +309,13 @@ def _explicit_bounds(
         stiffness += sum(element.stiffness for element in drive.native.hysteresis)
     rotor = drive.ratio**2 * drive.rotor_inertia
     frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))
-    # stability ends at 2.8 for RK4 and 2 for a semi-implicit step, in free oscillation
+    # stability limits of a free oscillation: 2.8 for RK4, 2 for a semi-implicit step
     rk4 = integrator.upper() == "RK4"
     limit, what = 2.0 if rk4 else 1.0, "the fastest torsion frequency"
     damped: tuple[RegionBound, ...] = ()
     law = drive.friction
     if law is not None:
-        # a bristle that sticks: beyond it creeps below its yield torque, or diverges
+        # sticking bristle: beyond the limit it creeps below yield, or diverges
         mobility = 1.0 / drive.rotor_inertia
         mobility += abs(drive.drive.friction_direction[1]) / drive.link_inertia
         frequency = sqrt(frequency**2 + law.stiffness * mobility)

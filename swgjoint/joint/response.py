@@ -1,14 +1,14 @@
-r"""How a joint answers to its own torque with all others free, as the plugin takes it.
+r"""Response of a joint to its own torque with all other joints free, as in the plugin.
 
-The plugin predicts the step of a drive from what its torque does to rotor and link.
-With the others free that is the diagonal of the inverse mass matrix. From the engine's
-factor M = L'DL,
+The plugin predicts the step of a drive from the response of rotor and link to its
+torque. With the other joints free, the response is the diagonal of the inverse mass
+matrix. From the engine's factorisation M = L'DL,
 
 .. math:: (M^{-1})_{ii} = \sum_j (L^{-T} e_i)_j^2 / D_j
 
-over the dofs j that carry i. What a prediction leaves out comes back a step late as an
-acceleration by other forces: too small a response feeds the torsion modes of a chain,
-too large a one damps them.
+over the dofs j that carry i. The part that the prediction omits returns one step late
+as an acceleration by other forces: if the response is too small, it feeds energy into
+the torsion modes of a chain, if it is too large, it damps them.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ def responses(
     """Diagonal elements of the inverse mass matrix [1/(kg·m²)].
 
     Args:
-        model: Compiled.
+        model: Compiled model.
         factor: ``qLD`` of one or many simulations. Shape (..., nC).
-        inverse_diagonal: ``qLDiagInv`` of them. Shape (..., nv).
-        dofs: Of the joints.
+        inverse_diagonal: ``qLDiagInv`` of the same simulations. Shape (..., nv).
+        dofs: Indices of the dofs of the joints.
 
     Returns:
         Shape (..., number of dofs).
     """
-    found = []
+    diagonal = []
     for dof in dofs:
         row, count = int(model.M_rowadr[dof]), int(model.M_rownnz[dof])
         carriers = model.M_colind[row : row + count]
@@ -49,5 +49,5 @@ def responses(
         for a in range(count - 1, 0, -1):
             at = int(model.M_rowadr[carriers[a]])
             x[..., :a] -= factor[..., at : at + a] * x[..., a, None]
-        found.append((x**2 * inverse_diagonal[..., carriers]).sum(-1))
-    return np.stack(found, -1)
+        diagonal.append((x**2 * inverse_diagonal[..., carriers]).sum(-1))
+    return np.stack(diagonal, -1)

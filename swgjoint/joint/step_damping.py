@@ -1,24 +1,24 @@
-r"""What steps do to a torsional vibration, and native springs damped as asked.
+r"""Numerical damping of torsional vibrations, and its compensation for native springs.
 
-Under ``discrete`` a native spring of tangent k gets a force -k h v beside its own and
-the metric h² k: that is the backward rule, which damps by about h w/2 of critical. A
-damper of -h k takes the force out again. With x~ = q - h v/2, 1/w the inertia of the
-pair along the torsion and c the drive's own damping,
+Under ``discrete`` a native spring of tangent k gets an additional force -k h v and the
+metric h² k. This is the backward rule, which damps by about h w/2 of critical. A damper
+of -h k cancels the force. With x~ = q - h v/2, 1/w the inertia of the pair along the
+torsion and c the drive's own damping, the remaining equation is
 
 .. math:: (1/w + \tfrac34 h^2 k - \tfrac12 h c)(v^+ - v)
-    = -h\,[k\,(\tilde x + \tilde x^+)/2 + c\,(v + v^+)/2]
+    = -h\,[k\,(\tilde x + \tilde x^+)/2 + c\,(v + v^+)/2],
 
-is left, the midpoint rule of a pair with more inertia. Its energy, that inertia
-included, falls by the work of c alone at any step, as 0 <= c <= h k. The frequency is
-lower than that of the pair, by 3 (h Omega)²/8 and a bit for a short step. Where the
-step does not resolve the vibration, a share nu of the integrator's damping stays, the
-one that level ``full`` has, too.
+the midpoint rule of a pair with more inertia. Its energy, including that inertia,
+decreases by the work of c alone at any step with 0 <= c <= h k. The frequency is lower
+than that of the pair, by slightly more than 3 (h Omega)²/8 for a short step. If the
+step does not resolve the vibration, a fraction nu of the integrator's damping remains,
+as at level ``full``.
 
-Only what is constant can be taken out: of tendons with dead bands, whose tangent is 0
-inside, the integrator's damping stays. The negative damper belongs to one step, one
-integrator and a solver that has the metric: at a shorter step it would give energy. So
-:func:`~swgjoint.joint.attach.attach` leaves it out, and :func:`damp_as_asked` is called
-last, when step and integrator are final. Scenes do that.
+Only a constant stiffness can be compensated: tendons with dead bands, whose tangent is
+zero inside, keep the integrator's damping. The negative damper is valid for one step,
+one integrator and a solver that includes the metric; at a shorter step it would feed
+energy into the vibration. Therefore :func:`~swgjoint.joint.attach.attach` omits it, and
+:func:`damp_as_asked` is called last, when step and integrator are final, as scenes do.
 """
 
 from __future__ import annotations
@@ -33,61 +33,62 @@ from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
 
 NUMERICAL_DAMPING = 0.1
-"""nu1 of the scheme of level ``full``, see :mod:`swgjoint.joint.reference` [-]."""
+"""Coefficient nu1 of the scheme of level ``full``, see
+:mod:`swgjoint.joint.reference` [-]."""
 OFF_ZERO = 1e-18
-"""Rest length of a compensated spring [rad]: a length of exactly 0 would leave the
-engine's metric, and no torque that a number could show comes of it."""
+"""Rest length of a compensated spring [rad]. The engine would omit a spring of length
+exactly zero from its metric; the torque of this length is below round-off."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepMode:
-    """Small torsional vibration of rotor against link, both else free."""
+    """Small torsional vibration of an otherwise free rotor and link."""
 
     damping_ratio: float
-    """That results at the step [-]; 1 and more: no vibration."""
+    """Damping ratio at the step [-]; no vibration at 1 and above."""
     frequency: float
-    """That results at the step [rad/s]."""
+    """Frequency at the step [rad/s]."""
     own_damping_ratio: float
-    """Own damping ratio of the drive itself, without steps [-]."""
+    """Damping ratio of the drive in continuous time [-]."""
     own_frequency: float
-    """Own frequency of the drive itself [rad/s]."""
+    """Frequency of the drive in continuous time [rad/s]."""
 
 
 def left_share(stiffness_step: float) -> float:
-    """Share nu of the integrator's damping that is kept, by (h w)² [-]."""
+    """Fraction nu of the integrator's damping that remains, as a function of (h w)² [-]."""
     return NUMERICAL_DAMPING * stiffness_step**2 / (16.0 + stiffness_step**2)
 
 
 def damp_as_asked(
     spec: mujoco.MjSpec, drives: Mapping[str, JointDrive]
 ) -> dict[str, JointDrive]:
-    """Take the integrator's own damping out of native springs, see the module.
+    """Compensate the integrator's damping of native springs, see the module.
 
-    Call it last: change neither step nor integrator nor solver of the model after it.
-    Other levels are returned as they are.
+    Call this function last, and do not change step, integrator or solver of the model
+    afterwards. Drives of other levels are returned unchanged.
 
     Args:
-        spec: Model with the drives, its step and its integrator final.
-        drives: What :func:`~swgjoint.joint.attach.attach_all` returned.
+        spec: Model with the drives; its step and integrator are final.
+        drives: Drives that :func:`~swgjoint.joint.attach.attach_all` returned.
 
     Returns:
-        The drives, with :attr:`~swgjoint.joint.drive.JointDrive.compensated`.
+        The drives, with :attr:`~swgjoint.joint.drive.JointDrive.compensated` set.
 
     Raises:
         InputError: If the integrator is not ``discrete`` or the solver is PGS; the spec
             is then unchanged.
     """
-    found = dict(drives)
-    native = {n: d for n, d in found.items() if d.level in ("linear", "native")}
+    damped = dict(drives)
+    native = {n: d for n, d in damped.items() if d.level in ("linear", "native")}
     if not native:
-        return found
+        return damped
     if not is_implicit(spec):
         integrator = mujoco.mjtIntegrator(spec.option.integrator).name
         solver = mujoco.mjtSolver(spec.option.solver).name
         raise InputError(
             f"integrator {integrator.removeprefix('mjINT_').lower()}, solver"
-            f" {solver.removeprefix('mjSOL_')}: its steps do not damp native springs;"
-            " accepted: discrete with Newton or CG"
+            f" {solver.removeprefix('mjSOL_')}: no numerical damping of native springs"
+            " to compensate; accepted: discrete with Newton or CG"
         )
     h = float(spec.option.timestep)
     for name, drive in native.items():
@@ -97,8 +98,8 @@ def damp_as_asked(
         damping[0] = drive.damping - taken
         tendon.damping = damping
         tendon.springlength = np.full(2, OFF_ZERO)
-        found[name] = replace(drive, compensated=taken, compensated_at=h)
-    return found
+        damped[name] = replace(drive, compensated=taken, compensated_at=h)
+    return damped
 
 
 def restore_damping(model: mujoco.MjModel, drives: Iterable[JointDrive]) -> None:
@@ -106,7 +107,7 @@ def restore_damping(model: mujoco.MjModel, drives: Iterable[JointDrive]) -> None
 
     Args:
         model: The compiled model, which is changed.
-        drives: Its drives.
+        drives: Drives of the model.
     """
     for drive in drives:
         if drive.compensated:
@@ -114,7 +115,7 @@ def restore_damping(model: mujoco.MjModel, drives: Iterable[JointDrive]) -> None
 
 
 def is_implicit(spec: mujoco.MjSpec) -> bool:
-    """Whether the engine's metric has the springs of tendons."""
+    """Whether the engine's metric includes the springs of tendons."""
     return (
         spec.option.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE
         and spec.option.solver != mujoco.mjtSolver.mjSOL_PGS
@@ -124,7 +125,7 @@ def is_implicit(spec: mujoco.MjSpec) -> bool:
 
 
 def compensation(drive: JointDrive, timestep: float) -> float:
-    """Damping that is taken out of the base spring at a step [N·m·s/rad].
+    """Damping to be removed from the base spring at a step [N·m·s/rad].
 
     Args:
         drive: A drive at level ``linear`` or ``native``.
@@ -141,12 +142,12 @@ def step_mode(
     """Damping ratio and frequency of the torsion at a step under ``discrete``.
 
     Args:
-        drive: With the inertia of its link at qpos0, the other joints held.
+        drive: Drive, with its link inertia at qpos0 and the other joints held.
         timestep: Step h [s].
-        torque: About which the joint vibrates [N·m]; hysteresis sticks.
+        torque: Mean torque about which the joint vibrates [N·m]; hysteresis sticks.
 
     Returns:
-        None without a rotor.
+        The vibration; None if the drive has no rotor, or no stiffness at that torque.
     """
     if drive.rotor is None:
         return None
@@ -172,7 +173,7 @@ def step_mode(
     )
     s = -np.log(np.linalg.eigvals(matrix).astype(complex)) / h
     size = float(np.sqrt(np.abs(s[0] * s[1])))
-    if not 0.0 < size < np.inf:  # too soft to vibrate in numbers
+    if not 0.0 < size < np.inf:  # the stiffness is below round-off
         return None
     return StepMode(
         damping_ratio=float(np.real(s[0] + s[1])) / (2.0 * size),
@@ -183,7 +184,7 @@ def step_mode(
 
 
 def _native_slopes(drive: JointDrive, torque: float) -> tuple[float, float]:
-    """Tangent of the spring at a torque, and the part of it that is implicit."""
+    """Tangent stiffness at a torque, and its implicitly integrated part [N·m/rad]."""
     spring = drive.native
     if spring is None:
         return drive.stiffness, drive.stiffness

@@ -1,29 +1,30 @@
-r"""Error that the step leaves in a line of the output torque, in closed form.
+r"""Error of the step in a spectral line of the output torque, in closed form.
 
 For small vibrations about a mean torque T0 the scheme is the equation of rotor and link
-with the rate of change taken at another frequency: a line of frequency Omega moves as
-if it had
+with time derivatives at a shifted frequency: a line of frequency Omega responds as if
+its frequency were
 
 .. math:: \Omega_h = \frac{2}{h} \tan\beta, \quad \beta = \frac{h\,\Omega}{2}
 
-and its angle orders in the forces on rotor and link were larger by Omega_h/Omega. What
-the step changes is how close a line is to the torsion's resonance: it moves towards it
-from below. With A, T = dA/dDelta and e the complex amplitudes of potential, torque and
-kinematic error of one harmonic (n, m), and those of rotor and link unknown,
+and its angle orders in the forces on rotor and link are larger by Omega_h/Omega. The
+step thus shifts a line towards the torsional resonance from below. With A,
+T = dA/dDelta and e the complex amplitudes of potential, torque and kinematic error of
+one harmonic (n, m), and the amplitudes of rotor and link as unknowns,
 
 .. math:: \Delta = \theta/i - \psi + e, \quad F = T + (K + j \Omega_h C)\,\Delta
 
     (-J\,\Omega_h^2 + S)\,\theta = -F/i - j n \frac{\Omega_h}{\Omega} (T_0 e + A),
     \quad -J_l\,\Omega_h^2\,\psi = F - j m \frac{\Omega_h}{\Omega} (T_0 e + A).
 
-S is the loop of the motor, a stiffness k and a damping d. The engine takes its own
-actuators at the end of the step, which makes the rotor heavier by about h d/2; a
-sampled controller acts late by a step. With t = tan beta,
+S is the motor loop with stiffness k and damping d. The engine evaluates its own
+actuators at the end of the step, which increases the effective rotor inertia by about
+h d/2; a sampled controller acts one step late. With t = tan beta,
 
 .. math:: S = (1 \pm j t)\,[j \Omega_h d + k (1 + j t)].
 
-The torque on the link is F - j m (T_0 e + A). The error is its magnitude over that of
-the limit of short steps, less 1. Other joints of an arm, which move along, change it.
+The torque on the link is F - j m (T_0 e + A). The error is its magnitude divided by
+that in the limit of short steps, minus 1. Motion of the other joints of an arm, which
+is neglected here, changes the error.
 """
 
 from __future__ import annotations
@@ -37,19 +38,20 @@ from swgjoint.joint.drive import JointDrive, input_orders
 from swgjoint.joint.step_damping import left_share
 
 SAME = 1e-6
-"""Orders that differ by less, relatively, are one line."""
+"""Relative difference below which two orders belong to the same line [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinearMotorLoop:
-    """Gains of a motor's loop on angle and speed of the rotor."""
+    """Gains of a motor control loop on angle and speed of the rotor."""
 
     stiffness: float = 0.0
-    """[N·m/rad]."""
+    """Position gain [N·m/rad]."""
     damping: float = 0.0
-    """[N·m·s/rad]."""
+    """Speed gain [N·m·s/rad]."""
     sampled: bool = False
-    """Whether it acts on the state before the step; else the engine's actuator."""
+    """Whether a sampled controller uses the state before the step; otherwise the loop
+    is an actuator of the engine."""
 
 
 def step_error(
@@ -62,24 +64,25 @@ def step_error(
     link_inertia: float | None = None,
     loop: LinearMotorLoop | None = None,
 ) -> float | None:
-    """Relative error of the amplitude of a line of the output torque.
+    """Relative amplitude error of a spectral line of the output torque [-].
 
-    For positions that are read half a step back, where the scheme has them.
+    The error applies to positions read half a step back, where the scheme evaluates
+    them.
 
     Args:
-        drive: At level ``full``.
-        order: Of the drive, per turn of the input, one of its
+        drive: Drive at level ``full``.
+        order: Order per input turn [-], one of the drive's
             :attr:`~swgjoint.joint.drive.JointDrive.kept_orders`.
-        speed: Of the input [rad/s].
-        torque: Mean at the output [N·m].
-        timestep: Step h of the engine [s], under ``discrete``.
-        link_inertia: About the joint [kg·m²]; that at qpos0 if None.
-        loop: Of the motor; a free rotor if None.
+        speed: Input speed [rad/s].
+        torque: Mean output torque [N·m].
+        timestep: Step h of the engine under ``discrete`` [s].
+        link_inertia: Inertia about the joint [kg·m²]; that at qpos0 if None.
+        loop: Control loop of the motor; a free rotor if None.
 
     Returns:
-        0.01: the line is 1 % too large. None where the level has no harmonics, the
-        order is none of the drive, the input rests, or a step turns the line by half a
-        turn and more.
+        Relative error, e.g. 0.01 if the line is 1 % too large. None if the level has no
+        harmonics, if the drive does not have this order, if the input is at rest, or if
+        the phase of the line advances by half a turn or more in one step.
     """
     if drive.level != "full" or not speed:
         return None
@@ -130,7 +133,7 @@ def _line(
         seen = omega if h == 0.0 else 2.0 / h * tangent
         by_angle = torque * error + energy
         push = 1j * seen / omega * by_angle
-        # the share nu is taken a quarter of a step late, of the speeds alone
+        # the damping fraction nu acts a quarter of a step late, on the speeds alone
         z_error = k + 1j * seen * (drive.damping + nu * k * h)
         z = z_error - 0.5 * seen * nu * k * h * tangent
         at = 1.0 - 1j * tangent if loop.sampled else 1.0 + 1j * tangent
@@ -145,10 +148,10 @@ def _line(
         theta, psi = np.linalg.solve(
             matrix, [-known / ratio - n * push, known - m * push]
         )
-        # as it is read: without the share of damping that steps add
+        # the torque as recorded, without the damping that the steps add
         twist = theta / ratio - psi
-        found = force + k * (twist + error) - 1j * m * by_angle
-        found += 1j * drive.damping * (seen * twist + omega * error)
-        # both signs of a frequency are one line
-        total += found.conjugate() if omega < 0.0 else found
+        line = force + k * (twist + error) - 1j * m * by_angle
+        line += 1j * drive.damping * (seen * twist + omega * error)
+        # positive and negative frequencies form one line
+        total += line.conjugate() if omega < 0.0 else line
     return complex(total)

@@ -1,8 +1,8 @@
-r"""How one specimen of a drive deviates from its map, changed without compiling again.
+r"""Deviations of one specimen of a drive from its map, without recompiling the model.
 
-The engine plugin reads the deviations of a drive from the user data of its tendon in
-every step, five numbers, all 0 for the map itself. They can be written into a compiled
-model, or, simulation by simulation, into the ``tendon_user`` of a
+In every step the engine plugin reads the deviations of a drive from the user data of
+its tendon. These are five numbers, which are all zero for the map itself. They can be
+written into a compiled model, or for each simulation into the ``tendon_user`` of a
 ``mujoco.batch.Batch``::
 
     got = attach(spec, joint="elbow", drive=drive, rotor_inertia=4e-5, variable=True)
@@ -25,7 +25,7 @@ from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.typing import Array
 
 SIZE = 5
-"""Numbers that the plugin reads."""
+"""Number of values that the plugin reads."""
 _TORQUES = (
     *("stiffness", "damping", "coulomb", "static"),
     *("viscous", "load", "bending"),
@@ -35,7 +35,7 @@ _SHARES = ("stiffness", "kinematic_error", "losses")
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    r"""Deviations from a map; shares are parts of the map's own value.
+    r"""Deviations from a map; dimensionless ones are fractions of the map's value.
 
     .. math::
         V' = (1 + s)\,V(\Delta, \theta + a, \psi + b), \quad
@@ -43,15 +43,16 @@ class Variation:
     """
 
     stiffness: float = 0.0
-    """s, of the potential: stiffness and the ripple that goes with the torque [-]."""
+    """Relative change s of the potential, i.e. of stiffness and torque ripple [-]."""
     kinematic_error: float = 0.0
-    """r, of the amplitude of e0 [-]."""
+    """Relative change r of the amplitude of e0 [-]."""
     theta: float = 0.0
-    """a, how much further the wave generator stands at the same motor angle [rad]."""
+    """Phase offset a of the wave generator at the same motor angle [rad]."""
     psi: float = 0.0
-    """b, the same of the output [rad]."""
+    """Phase offset b of the output at the same link angle [rad]."""
     losses: float = 0.0
-    """Share of every torque of hysteresis and friction [-]; where they slip stays."""
+    """Relative change of all torques of hysteresis and friction [-]; their yield
+    torsions are unchanged."""
 
     def __post_init__(self) -> None:
         for key, value in zip(self.__dataclass_fields__, self.numbers, strict=True):
@@ -62,19 +63,19 @@ class Variation:
 
     @property
     def numbers(self) -> Array:
-        """In the order of the plugin. Shape (5,)."""
+        """Deviations in the order of the plugin. Shape (5,)."""
         return np.array(
             [self.stiffness, self.kinematic_error, self.theta, self.psi, self.losses],
             float,
         )
 
     def apply_to(self, drive: DriveMap) -> DriveMap:
-        """The map of the specimen, what the plugin then computes."""
+        """Map of the specimen, as the plugin evaluates it."""
         shift = drive.angle_orders @ np.array([self.theta, self.psi])
         size, losses = 1.0 + self.stiffness, 1.0 + self.losses
 
         def shifted(pair: Array) -> Array:
-            """Amplitudes of cos and sin, axis 1, where every phase is further on."""
+            """Amplitudes of cos and sin (axis 1) with every phase shifted forward."""
             a, b = np.moveaxis(pair, 1, 0)
             one = (len(shift), *[1] * (a.ndim - 1))
             c, s = np.cos(shift).reshape(one), np.sin(shift).reshape(one)

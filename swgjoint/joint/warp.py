@@ -1,8 +1,8 @@
 r"""Level ``full`` in MuJoCo Warp: the law of the engine plugin as a passive callback.
 
-MuJoCo Warp takes no engine plugins. Its ``discrete`` integrator builds the metric after
-the passive stage from ``ten_J`` and ``ten_length``, as the engine does, so a callback
-can hand over direction and stiffness of the same step, see
+MuJoCo Warp does not support engine plugins. Like the engine, its ``discrete``
+integrator builds the metric from ``ten_J`` and ``ten_length`` after the passive stage.
+A callback can therefore provide direction and stiffness for the same step, see
 :mod:`swgjoint.joint.reference`, for many worlds at once::
 
     drive = swgjoint.attach(spec, joint="j", drive=drive_map, rotor_inertia=4e-5)
@@ -11,14 +11,16 @@ can hand over direction and stiffness of the same step, see
     install(m, d, model, [drive])
     mjw.step(m, d)  # also inside a captured graph
 
-The whole law is held: potential with all harmonics, kinematic error, hysteresis,
-friction, damping. Every integrator but ``discrete`` is refused, and so are drives that
-were attached as ``variable``: all worlds have the same map.
+The callback implements the complete law: potential with all harmonics, kinematic error,
+hysteresis, friction and damping. All integrators except ``discrete`` are rejected.
+Drives that were attached as ``variable`` are rejected because all worlds have the same
+map.
 
-The law is evaluated in double precision, the engine's state is in single: a position
-is rounded by 6e-8 of itself, which is noise of about 1e-7 K in the torque at an output
-angle of 1 rad. A world's time must move on with every step, for it tells a step from a
-repeated ``forward`` and from a reset; single precision holds that for 1e7 steps.
+The law is evaluated in double precision, but the engine's state has single precision:
+the relative rounding error of a position is 6e-8, which causes torque noise of about
+1e-7 K at an output angle of 1 rad. The time of a world must increase in every step,
+because it distinguishes a step from a repeated ``forward`` and from a reset; single
+precision allows 1e7 steps.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ except ImportError as error:
 
 
 def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a spec without the drive plugin; rotors and tendons stay."""
+    """Compile a spec without the drive plugin; rotors and tendons remain."""
     plain = spec.copy()
     for body in plain.bodies:
         if body.plugin.plugin_name == plugin.NAME:
@@ -58,7 +60,7 @@ def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 class WarpDrives:
-    """The callback: drives on a model of MuJoCo Warp, in a fixed number of worlds."""
+    """Callback that adds drives to a MuJoCo Warp model with a fixed world count."""
 
     def __init__(
         self,
@@ -93,7 +95,7 @@ class WarpDrives:
             elements = sum(len(part) for part in parts["element"])
             self.rest = wp.zeros((worlds, max(elements, 1)), dtype=real)
             unknown = WarpStep()
-            unknown.time = float("inf")  # taken as a reset
+            unknown.time = float("inf")  # treated as a reset
             self.steps = wp.full((worlds, len(rows)), unknown, dtype=WarpStep)
             self.factor = wp.zeros((worlds, model.nC), dtype=float)
             self.column = wp.zeros((worlds, model.nv), dtype=float)
@@ -101,7 +103,7 @@ class WarpDrives:
 
     def __call__(self, m: Any, d: Any) -> None:
         """Add the drives to the passive forces and the metric of every world."""
-        # without springs the engine leaves the tendon out of its metric, too
+        # if springs are disabled, the engine omits the tendon from its metric as well
         if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SPRING:
             return
         damped = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_DAMPER
@@ -140,31 +142,32 @@ class WarpDrives:
 
 
 def install(m: Any, d: Any, model: mujoco.MjModel, drives: Sequence[JointDrive]) -> Any:
-    """Let drives of level ``full`` act on a model of MuJoCo Warp.
+    """Install drives of level ``full`` in a MuJoCo Warp model.
 
     Args:
-        m: What ``mujoco_warp.put_model`` made of ``model``; gets the callback.
-        d: Its data; as many worlds are served, on the same device.
-        model: What :func:`without_plugin` made of the spec.
-        drives: What ``attach`` returned; other levels are native and need nothing.
+        m: Result of ``mujoco_warp.put_model`` for ``model``; gets the callback.
+        d: Data of ``m``, which set the number of worlds and the device.
+        model: Result of :func:`without_plugin` for the spec.
+        drives: Drives that ``attach`` returned; other levels need no callback.
 
     Returns:
         The callback, :class:`WarpDrives`.
 
     Raises:
-        InputError: For what is not held here.
+        InputError: If the integrator is not ``discrete``, the model has a passive
+            callback, or a drive is missing from the model or variable.
     """
     integrator = mujoco.mjtIntegrator(int(m.opt.integrator))
     if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
         name = integrator.name.removeprefix("mjINT_").lower()
         raise InputError(
-            f"integrator {name}: drives in MuJoCo Warp hold under discrete; accepted:"
+            f"integrator {name}: not supported for drives in MuJoCo Warp; accepted:"
             " discrete"
         )
     if m.callback.passive is not None:
         raise InputError(
-            "the model of MuJoCo Warp has a passive callback already; accepted: none,"
-            " call both from one of your own"
+            "the MuJoCo Warp model already has a passive callback; accepted: none"
+            " (call both from a callback of your own)"
         )
     full = [drive for drive in drives if drive.level == "full"]
     call = WarpDrives(model, full, worlds=d.nworld, device=d.qpos.device)
@@ -208,7 +211,7 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
 
 
 def _arrays(drive: DriveMap) -> dict[str, np.ndarray]:
-    """Rows of one map, as :class:`Maps` holds them."""
+    """Rows of one map in the layout of :class:`Maps`."""
     knots, n = drive.torsion_knots, len(drive.orders)
     inside = np.moveaxis(drive.potential, 2, 0)  # (segments, harmonics, 2, 5)
     ends = np.zeros((2, n, 2, 5))  # parabolas about the end knots

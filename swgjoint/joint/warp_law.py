@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Kernels of :mod:`swgjoint.joint.warp`, in the language of Warp and with its types.
+"""Kernels of :mod:`swgjoint.joint.warp`, written in Warp with its types.
 
-The law as ``drive.cc``, ``drive_map.cc`` and ``friction.cc`` compute it; one thread for
-one drive in one world.
+They evaluate the same law as ``drive.cc``, ``drive_map.cc`` and ``friction.cc``, with
+one thread per drive and world.
 """
 
 import warp as wp
@@ -41,7 +41,7 @@ class Rub:
 
 @wp.struct
 class WarpStep:
-    """What the last evaluation left to the next, in one world."""
+    """State that one evaluation passes to the next, for one drive in one world."""
 
     time: float
     v_rotor: real
@@ -56,20 +56,27 @@ class WarpStep:
     metric: real
     torsion: real
     a_rotor: real
-    """Acceleration that all other forces caused [rad/s²]."""
+    """Rotor acceleration by all other forces [rad/s²]."""
     a_link: real
     rub: Rub
     rotation: real
-    """beta at the beginning [rad]."""
+    """Angle beta at the beginning of the step [rad]."""
     relaxed: real
-    """beta at which the bristle is relaxed [rad]."""
+    """Angle beta at which the bristle is relaxed [rad]."""
     known: int
-    """Whether that is known."""
+    """Whether ``relaxed`` is known."""
 
 
 @wp.func
 def slip(s: Secant, stiffness: real, reach: real, rest: real):
-    """Add the mean torque of one element of the hysteresis over the step."""
+    """Add the mean torque of one hysteresis element over the step.
+
+    Args:
+        s: Secant to which the element is added.
+        stiffness: Stiffness of the element [N·m/rad].
+        reach: Yield torsion of the element [rad].
+        rest: Torsion at which the element is relaxed [rad].
+    """
     begin = wp.clamp(s.begin - rest, -reach, reach)
     free = begin + s.change
     end = wp.clamp(free, -reach, reach)
@@ -93,7 +100,17 @@ def rub_over(
     response: real,
     h: real,
 ):
-    """Solve friction on the predicted step of a pair."""
+    """Solve friction on the predicted step of a rotor-link pair.
+
+    Args:
+        drive: Drive with the parameters of friction.
+        stretch: Bristle stretch before the step [rad].
+        yield_torque: Yield torque in this step [N·m].
+        speed: Relative speed at the beginning of the step [rad/s].
+        free: Change of that speed without friction [rad/s].
+        response: Reduction of that speed per friction torque [rad/s per N·m].
+        h: Step [s].
+    """
     out = Rub()
     sigma = drive.bristle
     out.reach = yield_torque / sigma
@@ -106,7 +123,7 @@ def rub_over(
     out.rate = HALF * sigma + drive.creep / h
     dx = (d - k * out.offset) / (m + k * out.rate)
     if wp.abs(z + dx) > out.reach:
-        # sticks over the way a, then slips: the mean torque times dx is exact work
+        # sticks over the distance a, then slips; mean torque times dx is the exact work
         sign = wp.where(dx > ZERO, ONE, -ONE)
         a = out.reach - sign * z
         creep = drive.creep * a / h
@@ -116,7 +133,7 @@ def rub_over(
         way = wp.where(b > ZERO, HALF * (b + root) / m, c / (root - b))
         mean = sign * (yield_torque - HALF * sigma * a * a / way + creep)
         dx = sign * way
-        # linear in the true dx, and never able to give back more than is stored
+        # linear in the true dx, and cannot return more energy than is stored
         out.rate = HALF * sigma
         out.offset = mean - out.rate * dx
         if wp.abs(out.offset) > sigma * wp.abs(z):
@@ -131,7 +148,13 @@ def rub_over(
 
 @wp.func
 def stretch_after(drive: WarpDrive, rub: Rub, dx: real):
-    """Stretch of the bristle after the rotation that the step came to."""
+    """Bristle stretch after the actual rotation of the step [rad].
+
+    Args:
+        drive: Drive with the parameters of friction.
+        rub: Friction of the step.
+        dx: Rotation in the step [rad].
+    """
     end = wp.clamp(rub.stretch + dx, -rub.reach, rub.reach)
     work = (rub.offset + rub.rate * dx) * dx
     stored = rub.stretch * rub.stretch + real(2.0) * work / drive.bristle
@@ -148,9 +171,17 @@ def factor_mass_matrix(
     nv: int,
     out: wp.array2d(dtype=float),
 ):
-    """M with the dofs eliminated from the leaves: D, and the rows of L times D.
+    """Factor M by eliminating dofs from the leaves: D, and the rows of L times D.
 
-    MuJoCo Warp has no factor of M before the passive stage, and other ones than this.
+    MuJoCo Warp has no factor of M before the passive stage, and a different one later.
+
+    Args:
+        M_rownnz: Number of entries in each row of M. Shape (nv,).
+        M_rowadr: Address of each row of M. Shape (nv,).
+        M_colind: Columns of the entries of M. Shape (nC,).
+        M: Mass matrices [kg·m²]. Shape (worlds, nC).
+        nv: Number of dofs.
+        out: Factors. Shape (worlds, nC).
     """
     world = wp.tid()
     for j in range(out.shape[1]):
@@ -176,7 +207,13 @@ def respond(
 ):
     """Diagonal of the inverse of M, as in ``response.py``.
 
-    ``column`` is room for one column of L^-T.
+    Args:
+        M_rownnz: Number of entries in each row of M. Shape (nv,).
+        M_rowadr: Address of each row of M. Shape (nv,).
+        M_colind: Columns of the entries of M. Shape (nC,).
+        factor: Result of :func:`factor_mass_matrix`. Shape (worlds, nC).
+        column: Work space for one column of L^-T. Shape (worlds, nv).
+        weight: Diagonal elements [1/(kg·m²)]. Shape (worlds, nv).
     """
     world = wp.tid()
     for dof in range(weight.shape[1]):
@@ -215,13 +252,33 @@ def law(
     ten_length: wp.array2d(dtype=float),
     qfrc_passive: wp.array2d(dtype=float),
 ):
-    """Force, direction and stiffness of one drive in one world, as in ``drive.cc``."""
+    """Force, direction and stiffness of one drive in one world, as in ``drive.cc``.
+
+    Args:
+        timestep: Step h of one or all worlds [s].
+        damped: 1 if the engine's dampers act, otherwise 0.
+        drives: Drives of the model.
+        maps: Maps of all drives.
+        weight: Result of :func:`respond` [1/(kg·m²)]. Shape (worlds, nv).
+        time: Time of each world [s].
+        rows: Number of constraint rows of each world.
+        equalities: Number of these rows that are equalities.
+        losses: Number of these rows that are friction losses.
+        qpos: Positions. Shape (worlds, nq).
+        qvel: Velocities. Shape (worlds, nv).
+        ten_velocity: Tendon velocities. Shape (worlds, ntendon).
+        steps: State that the evaluations pass on. Shape (worlds, drives).
+        rest: Torsions at which the hysteresis elements are relaxed [rad].
+        ten_J: Tendon Jacobians; gets the direction.
+        ten_length: Tendon lengths; get the stiffness.
+        qfrc_passive: Passive forces; get the force. Shape (worlds, nv).
+    """
     world, index = wp.tid()
     drive = drives[index]
     h = real(timestep[world % timestep.shape[0]])
     vm, vl = real(qvel[world, drive.v_rotor]), real(qvel[world, drive.v_link])
 
-    # what was learned since the last evaluation: a step, a reset or nothing
+    # since the last evaluation there was a step, a reset or no change
     last = steps[world, index]
     if time[world] > last.time:
         rm, rl = vm - last.v_rotor, vl - last.v_link

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The potential of a map in the language of Warp: sums over harmonics and secants."""
+"""The potential of a map in Warp: sums over harmonics, and secants."""
 
 import warp as wp
 
@@ -20,7 +20,7 @@ ONE = wp.constant(real(1.0))
 
 @wp.struct
 class WarpDrive:
-    """One drive: where it is in the model, and its rows in the arrays of the maps."""
+    """One drive: its addresses in the model, and its rows in the arrays of the maps."""
 
     tendon: int
     q_rotor: int
@@ -31,25 +31,26 @@ class WarpDrive:
     """Entry of the rotor in the tendon's row of ``ten_J``."""
     entry_link: int
     harmonic: int
-    """First one, then how many."""
+    """Index of the first harmonic; ``harmonics`` is the number of harmonics."""
     harmonics: int
     segment: int
-    """Below the knots, between them, and above."""
+    """Index of the first segment; segments are below, between and above the knots."""
     segments: int
     row: int
-    """First row of the polynomials: segments, harmonics, A and B."""
+    """First row of the polynomials, ordered by segment, harmonic, then A and B."""
     element: int
     elements: int
     ratio: real
     damping: real
     contact_damping: real
     friction: int
-    """Its tendon, -1 without."""
+    """Index of the friction tendon; -1 without friction."""
     b_theta: real
     b_psi: real
     bristle: real
-    """Stiffness [N·m/rad], then its damping [N·m·s/rad]."""
+    """Stiffness of the bristle [N·m/rad]."""
     creep: real
+    """Damping of the bristle [N·m·s/rad]."""
     coulomb: real
     stiction: real
     stribeck: real
@@ -70,11 +71,12 @@ class Sums:
 
 @wp.struct
 class Secant:
-    """Discrete gradient of V over a step, hysteresis added."""
+    """Discrete gradient of V over a step, including hysteresis."""
 
     begin: real
-    """Torsion at the beginning, and its change."""
+    """Torsion at the beginning of the step [rad]."""
     change: real
+    """Change of the torsion in the step [rad]."""
     g_theta: real
     g_psi: real
     torque: real
@@ -87,38 +89,59 @@ class Secant:
 
 @wp.struct
 class Maps:
-    """All maps, one after the other."""
+    """All maps, concatenated."""
 
     harmonic: wp.array2d(dtype=real)
-    """n_theta, n_psi, cosine and sine of e0."""
+    """Orders n_theta and n_psi [-], cosine and sine amplitude of e0 [rad]."""
     segment: wp.array2d(dtype=real)
-    """Begin, end and the torsion about which it expands [rad]."""
+    """Begin, end and base of the polynomial of each segment, as torsions [rad]."""
     row: wp.array(dtype=vec5)
     element: wp.array2d(dtype=real)
-    """Stiffness [N·m/rad] and reach [rad]."""
+    """Stiffness [N·m/rad] and yield torsion [rad] of each hysteresis element."""
 
 
 @wp.func
 def value(w: vec5, d: real):
-    """Polynomial of the torsion about the base of its segment."""
+    """Value of a polynomial of the torsion.
+
+    Args:
+        w: Coefficients for powers 0 to 4.
+        d: Torsion from the base of the segment [rad].
+    """
     return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])))
 
 
 @wp.func
 def slope(w: vec5, d: real):
-    """Its first derivative."""
+    """First derivative of a polynomial of the torsion.
+
+    Args:
+        w: Coefficients for powers 0 to 4.
+        d: Torsion from the base of the segment [rad].
+    """
     return w[1] + d * (real(2.0) * w[2] + d * (real(3.0) * w[3] + d * real(4.0) * w[4]))
 
 
 @wp.func
 def curvature(w: vec5, d: real):
-    """Its second derivative."""
+    """Second derivative of a polynomial of the torsion.
+
+    Args:
+        w: Coefficients for powers 0 to 4.
+        d: Torsion from the base of the segment [rad].
+    """
     return real(2.0) * w[2] + d * (real(6.0) * w[3] + d * real(12.0) * w[4])
 
 
 @wp.func
 def divided_difference(w: vec5, a: real, b: real):
-    """(w(b) - w(a))/(b - a) without a difference."""
+    """Divided difference (w(b) - w(a))/(b - a), without cancellation.
+
+    Args:
+        w: Coefficients for powers 0 to 4.
+        a: First torsion from the base of the segment [rad].
+        b: Second torsion [rad].
+    """
     both = a + b
     squares = a * a + b * b
     return w[1] + w[2] * both + w[3] * (squares + a * b) + w[4] * both * squares
@@ -126,7 +149,13 @@ def divided_difference(w: vec5, a: real, b: real):
 
 @wp.func
 def divided_slope(w: vec5, a: real, b: real):
-    """Derivative of that by b."""
+    """Derivative of the divided difference with respect to b.
+
+    Args:
+        w: Coefficients for powers 0 to 4.
+        a: First torsion from the base of the segment [rad].
+        b: Second torsion [rad].
+    """
     return (
         w[2]
         + w[3] * (a + real(2.0) * b)
@@ -136,7 +165,13 @@ def divided_slope(w: vec5, a: real, b: real):
 
 @wp.func
 def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
-    """Segment of a drive in which a torsion lies."""
+    """Index of the segment that contains a torsion.
+
+    Args:
+        drive: The drive.
+        maps: Maps of all drives.
+        torsion: Torsion [rad].
+    """
     found = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
     for j in range(1, drive.segments):
         if torsion >= maps.segment[drive.segment + j, 0]:
@@ -146,7 +181,14 @@ def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
 
 @wp.func
 def torsion_at(drive: WarpDrive, maps: Maps, theta: real, psi: real):
-    """theta/i + e0 - psi."""
+    """Torsion theta/i + e0 - psi [rad].
+
+    Args:
+        drive: The drive.
+        maps: Maps of all drives.
+        theta: Rotor angle [rad].
+        psi: Link angle [rad].
+    """
     x = theta / drive.ratio - psi
     for k in range(drive.harmonic, drive.harmonic + drive.harmonics):
         phase = maps.harmonic[k, 0] * theta + maps.harmonic[k, 1] * psi
@@ -164,7 +206,17 @@ def weigh(
     dtheta: real,
     dpsi: real,
 ):
-    """Mean of the harmonics at both ends of a step, and their secants by the angles."""
+    """Mean of the harmonics at both ends of a step, and their secants by the angles.
+
+    Args:
+        drive: The drive.
+        maps: Maps of all drives.
+        segment: Segment whose coefficients are used.
+        theta: Rotor angle at the beginning of the step [rad].
+        psi: Link angle at the beginning of the step [rad].
+        dtheta: Change of the rotor angle [rad].
+        dpsi: Change of the link angle [rad].
+    """
     out = Sums()
     out.g_theta = ONE / drive.ratio
     out.g_psi = -ONE
@@ -172,7 +224,7 @@ def weigh(
         n_theta = maps.harmonic[drive.harmonic + k, 0]
         n_psi = maps.harmonic[drive.harmonic + k, 1]
         eta = HALF * (n_theta * dtheta + n_psi * dpsi)
-        phase = n_theta * theta + n_psi * psi + eta  # half way
+        phase = n_theta * theta + n_psi * psi + eta  # middle of the step
         sinc = ONE - eta * eta / real(6.0)
         if wp.abs(eta) > real(1e-4):
             sinc = wp.sin(eta) / eta
@@ -196,7 +248,16 @@ def weigh(
 def secant_over(
     drive: WarpDrive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
 ):
-    """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``."""
+    """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``.
+
+    Args:
+        drive: The drive.
+        maps: Maps of all drives.
+        theta: Rotor angle at the beginning of the step [rad].
+        psi: Link angle at the beginning of the step [rad].
+        dtheta: Change of the rotor angle [rad].
+        dpsi: Change of the link angle [rad].
+    """
     out = Secant()
     out.begin = torsion_at(drive, maps, theta, psi)
     j0 = segment_at(drive, maps, out.begin)
@@ -213,7 +274,7 @@ def secant_over(
         out.torque = divided_difference(sums.mean, d0, d1)
         out.slope = divided_slope(sums.mean, d0, d1)
     else:
-        # piece by piece across the knots, no difference of two large energies
+        # piece by piece across the knots, to avoid differences of large energies
         work = real(0.0)
         begin = real(out.begin)
         j = int(j0)

@@ -1,11 +1,11 @@
-"""A model in a loop of its user's own: says where it leaves the integrator's region.
+"""Warn if a model in a user's own loop leaves the region of stable integration.
 
-Attaching warns of a step that is outside at rest. The step, the integrator and the
-speed may change later; so the model carries a custom numeric :data:`NUMERIC` with the
-bounds, which the engine plugin compares in every step. It calls ``mju_warning`` once
-for a model and a step: on the console and in ``MUJOCO_LOG.TXT``, or in the handler that
-``mujoco.set_mju_user_warning`` names. A run of a scene checks its region itself and has
-no such numeric.
+Attaching a drive warns of a step that is outside the region at rest. Step, integrator
+and speed may change later. Therefore the model carries the bounds in a custom numeric
+:data:`NUMERIC`, and the engine plugin checks them in every step. The plugin calls
+``mju_warning`` once per model and step size; the warning appears on the console and in
+``MUJOCO_LOG.TXT``, or goes to the handler set by ``mujoco.set_mju_user_warning``. A
+scene checks its region itself and has no such numeric.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ NUMERIC = "swgjoint_region"
 other integrators [s], largest phase step [rad]."""
 SCHEMES = ("discrete", "RK4", "implicitfast")
 UNBOUNDED = 1e6
-"""A step that no bound limits [s]."""
+"""Step that stands for no limit [s]."""
 
 
 def limits(drives: Iterable[JointDrive]) -> NDArray[np.float64]:
-    """Largest steps at rest by :data:`SCHEMES` [s], and the phase step [rad]. (4,)."""
+    """Largest steps at rest by :data:`SCHEMES` [s] and phase step [rad]. Shape (4,)."""
     steps = np.full(len(SCHEMES), UNBOUNDED)
     for drive in drives:
         for k, scheme in enumerate(SCHEMES):
@@ -43,11 +43,11 @@ def limits(drives: Iterable[JointDrive]) -> NDArray[np.float64]:
 
 
 def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
-    """Let the plugin compare the steps of a model with the bounds of its drives.
+    """Make the plugin check the steps of a model against the bounds of its drives.
 
     Args:
         spec: The model, which is changed.
-        drives: Its drives.
+        drives: Drives of the model.
     """
     bounds = limits(drive for drive in drives if drive.plugin is not None)
     if (bounds[:-1] == UNBOUNDED).all():
@@ -62,7 +62,7 @@ def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
 def warn_outside(
     drives: Iterable[JointDrive], *, timestep: float, integrator: mujoco.mjtIntegrator
 ) -> None:
-    """Warn, once for all joints, of a step that is outside the region at rest.
+    """Warn once for all joints of a step that is outside the region at rest.
 
     Args:
         drives: Drives of the model.
@@ -79,6 +79,6 @@ def warn_outside(
     worst = outside[int(np.argmin([-1.0 if s is None else s for s in steps]))]
     warnings.warn(
         worst.message
-        + (f" ({len(outside)} joints are outside)" if len(outside) > 1 else ""),
+        + (f" ({len(outside)} joints outside)" if len(outside) > 1 else ""),
         stacklevel=depth_of_caller(),
     )
