@@ -1,4 +1,4 @@
-"""The two interfaces of gymnasium in front of the episodes."""
+"""Gymnasium interfaces of the episodes: single and vectorised."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from swgjoint.typing import Array
 
 
 def _check_began(began: bool) -> None:
-    """Refuse what needs an episode."""
+    """Reject a call that needs an episode before the first reset."""
     if not began:
         raise InputError("no episode has begun; accepted: after reset()")
 
 
 def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
-    """Refuse options of ``reset`` that are not known."""
+    """Reject unknown options of ``reset``."""
     if unknown := [key for key in options if key not in known]:
         raise InputError(
             f"option {format_value(unknown[0])} of reset; accepted:"
@@ -50,11 +50,19 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     }
 
     core_of: ClassVar[type[Any]]
-    """Made from a number of episodes, threads of the engine and settings."""
+    """Class of the episodes, called with their number, engine threads and settings."""
     settings_type: ClassVar[type[Any]]
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
-        """Arguments are those of the class's docstring."""
+        """Make one environment; the class docstring lists the arguments.
+
+        Args:
+            render_mode: None or ``rgb_array``.
+            **arguments: Arguments of the environment.
+
+        Raises:
+            InputError: If an argument is unknown or outside its range.
+        """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
                 f"render_mode {render_mode!r}; accepted: None, 'rgb_array'; for the"
@@ -71,7 +79,15 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode; ``options`` has no keys."""
+        """Begin an episode.
+
+        Args:
+            seed: Seed of the episode; None continues the random generator.
+            options: None or empty; no keys are accepted.
+
+        Returns:
+            Observation and info.
+        """
         _check_options(options or {}, ())
         super().reset(seed=seed)
         self._began = True
@@ -79,7 +95,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         return self.core.observation()[0], self._info(0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action over one control period."""
+        """Apply a constant action over one control period."""
         _check_began(self._began)
         core = self.core
         core.step(np.asarray(action)[None], None)
@@ -93,7 +109,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         )
 
     def render(self) -> Any:
-        """A picture where ``render_mode`` is ``rgb_array``; (480, 640, 3) of uint8."""
+        """Picture if ``render_mode`` is ``rgb_array``. Shape (480, 640, 3), uint8."""
         if self.render_mode is None:
             return None
         plant = self.core.plant
@@ -102,21 +118,21 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         return self._picture.draw(plant.batch.get_data(0))
 
     def close(self) -> None:
-        """Give back what pictures need."""
+        """Release the graphics context."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None
 
     def _info(self, broken: int) -> dict[str, Any]:
-        got = {
+        values = {
             key: float(value[0]) if value.ndim == 1 else value[0]
             for key, value in self.core.info().items()
         }
-        return got | {"broken_limit": broken}
+        return values | {"broken_limit": broken}
 
     @property
     def task(self) -> Task:
-        """The commanded motion of the episode, known since its reset."""
+        """The commanded motion of the episode, known after its reset."""
         task = self.core.task
         return Task(
             period=task.period,
@@ -129,18 +145,18 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         )
 
     def read_measurements(self, observation: Array) -> Measured:
-        """What a controller reads from an observation; shapes (n_joints,)."""
+        """Measured values in an observation, for controllers. Shapes (n_joints,)."""
         return self.core.read_measurements(observation)
 
 
 class BatchEnv(VectorEnv[Array, Array, Array]):
     """Many episodes on the threads of the engine.
 
-    An episode that has ended begins anew in the next step, whose action it ignores
-    (``autoreset_mode`` ``NextStep``), at once, its last observation in
-    ``info["final_obs"]`` (``SameStep``), or when ``reset`` is called with a
-    ``reset_mask`` (``Disabled``): as in gymnasium's own vector environments, with which
-    this one agrees to the last bit.
+    ``autoreset_mode`` sets when an ended episode restarts. With ``NextStep`` it
+    restarts in the next step, whose action is ignored. With ``SameStep`` it restarts
+    immediately, and ``info["final_obs"]`` has its last observation. With ``Disabled``
+    it restarts when ``reset`` is called with a ``reset_mask``. The results are
+    bit-identical to those of gymnasium's own vector environments.
     """
 
     single: ClassVar[type[SingleEnv]]
@@ -152,7 +168,17 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **arguments: Any,
     ) -> None:
-        """Threads of the engine, 0 for one per core; the rest as the single one's."""
+        """Make the environments.
+
+        Args:
+            num_envs: Number of episodes.
+            threads: Number of engine threads; 0: one per core.
+            autoreset_mode: ``NextStep``, ``SameStep`` or ``Disabled``.
+            **arguments: Arguments of the single environment.
+
+        Raises:
+            InputError: If an argument is unknown or outside its range.
+        """
         modes = tuple(AutoresetMode)
         if autoreset_mode not in (*modes, *(mode.value for mode in modes)):
             raise InputError(
@@ -181,12 +207,16 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all episodes, or those of a mask, number k with ``seed + k``.
+        """Begin all episodes, or those of a mask.
 
         Args:
-            seed: The first, or one each; None goes on with the generators.
-            options: ``reset_mask``, an array of bools, one per episode: those
-                begin anew, the others go on. ``info`` then is that of the former.
+            seed: Seed of the first episode, where episode k gets ``seed + k``, or one
+                seed per episode; None continues the random generators.
+            options: ``reset_mask``, an array with one bool per episode: marked episodes
+                restart, the others continue. ``info`` then covers the marked episodes.
+
+        Returns:
+            Observations and info.
 
         Raises:
             InputError: If a seed is missing or an option is not accepted.
@@ -210,7 +240,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         return self.core.observation(), _of(chosen, info)
 
     def _chosen(self, mask: Any) -> NDArray[np.bool_]:
-        """Episodes that a reset begins."""
+        """Episodes that a reset restarts."""
         if mask is None:
             return self._all
         n = self.num_envs
@@ -227,7 +257,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         return np.array(mask)
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Hold actions over one control period. Shapes (n, ...)."""
+        """Apply constant actions over one control period. Shapes (n, ...)."""
         _check_began(bool(self._rngs))
         core, ended = self.core, self._ended
         some = bool(ended.any())
@@ -255,7 +285,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         return core.observation(), reward, terminated, over, info
 
     def _final(self, done: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:
-        """Last observations and infos of episodes that end, as gymnasium has them."""
+        """Last observations and infos of ended episodes, in gymnasium's format."""
         last = self.core.observation()
         final = np.full(self.num_envs, None, dtype=object)
         for k in np.flatnonzero(done):
@@ -272,21 +302,21 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         self.core.restart(rows.tolist(), [self._rngs[k] for k in rows])
 
     def _info(self, broken: NDArray[np.int64]) -> dict[str, Any]:
-        got: dict[str, Any] = self.core.info() | {"broken_limit": broken}
-        return got | {f"_{key}": self._all for key in got}
+        values: dict[str, Any] = self.core.info() | {"broken_limit": broken}
+        return values | {f"_{key}": self._all for key in values}
 
     @property
     def task(self) -> Task:
-        """The commanded motions, the episodes in front of the joints."""
+        """The commanded motions; the axis of episodes precedes that of joints."""
         return self.core.task
 
     def read_measurements(self, observation: Array) -> Measured:
-        """What a controller reads from observations; shapes (n, n_joints)."""
+        """Measured values in observations, for controllers. Shapes (n, n_joints)."""
         return self.core.read_measurements(observation)
 
 
 def _of(rows: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:
-    """The info of some episodes, as gymnasium has it: zeros and False for the rest."""
+    """Info of some episodes in gymnasium's format, zero and False for the others."""
     if rows.all():
         return info
     among = {

@@ -1,4 +1,4 @@
-"""Checks of what environments are made with; one line each: what, value, accepted."""
+"""Checks of the arguments of environments, with one-line error messages."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from swgjoint.errors import InputError
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a finite number; a bool is none."""
+    """Whether a value is a finite number and not a bool."""
     plain = isinstance(value, int | float | np.integer | np.floating)
-    # compared, not converted: an integer may be beyond the range of floats
+    # compare without conversion: an integer may exceed the range of floats
     return plain and not isinstance(value, bool) and bool(-1e300 < value < 1e300)
 
 
 def is_whole(value: Any) -> bool:
-    """Whether a value is an integer, of whatever numeric type."""
+    """Whether a value is an integer of any numeric type."""
     return is_number(value) and int(value) == value
 
 
@@ -27,21 +27,40 @@ def is_flag(value: Any) -> bool:
 
 
 def format_value(value: Any) -> str:
-    """A value in a message: numbers plain, the rest as Python writes it, cut short."""
+    """Value as text in a message: plain numbers, otherwise a shortened repr."""
     plain = isinstance(value, np.generic)
     text = str(value) if plain else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:
-    """Refuse what is no positive number; ``zero`` is accepted where it says so."""
+    """Reject a value that is not a positive number.
+
+    Args:
+        key: Name of the argument.
+        value: Value to check.
+        unit: Unit in the message; empty if dimensionless.
+        zero: Whether zero is accepted.
+
+    Raises:
+        InputError: If the value is not accepted.
+    """
     if not (is_number(value) and (value > 0 or (zero and value == 0))):
-        got = f"{key} {format_value(value)} {unit}".rstrip()
-        raise InputError(f"{got}; accepted: a number {'>=' if zero else '>'} 0")
+        text = f"{key} {format_value(value)} {unit}".rstrip()
+        raise InputError(f"{text}; accepted: a number {'>=' if zero else '>'} 0")
 
 
 def check_count(key: str, value: Any, least: int) -> None:
-    """Refuse what is no integer of at least ``least``."""
+    """Reject a value that is not an integer >= ``least``.
+
+    Args:
+        key: Name of the argument.
+        value: Value to check.
+        least: Smallest accepted integer.
+
+    Raises:
+        InputError: If the value is not accepted.
+    """
     integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (integer and value >= least):
         raise InputError(
@@ -50,6 +69,14 @@ def check_count(key: str, value: Any, least: int) -> None:
 
 
 def check_flag(key: str, value: Any) -> None:
-    """Refuse a value that is not a bool."""
+    """Reject a value that is not a bool.
+
+    Args:
+        key: Name of the argument.
+        value: Value to check.
+
+    Raises:
+        InputError: If the value is not accepted.
+    """
     if not is_flag(value):
         raise InputError(f"{key} {format_value(value)}; accepted: True, False")

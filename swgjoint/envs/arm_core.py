@@ -36,11 +36,11 @@ ACTIONS = ("torque", "setpoint")
 
 
 ANGLE_MARGIN = 0.3
-"""Beyond the range of the path, where an episode ends [rad]."""
+"""Margin beyond the range of the path at which an episode ends [rad]."""
 
 
 SPEED_MARGIN = 20.0
-"""Beyond twice the fastest motor speed of the path, likewise [rad/s]."""
+"""Margin beyond twice the fastest motor speed at which an episode ends [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,13 @@ class ArmCore(Core):
     """Episodes of ``ArmTracking-v0``."""
 
     def __init__(self, count: int, threads: int, settings: ArmSettings) -> None:
-        """Assemble the scene once, then ``count`` simulations of it."""
+        """Assemble the scene once, then ``count`` simulations of it.
+
+        Args:
+            count: Number of episodes.
+            threads: Number of engine threads; 0: one per core.
+            settings: Arguments of the environment.
+        """
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise, s.level)
         variable = tolerances is not None and s.level == "full"
@@ -218,14 +224,19 @@ class ArmCore(Core):
         ), (each(what, "1", 1.0),)
 
     def vary_load(self, index: int, shares: Array) -> None:
-        """Nothing: the payload is the scene's."""
+        """Do nothing, because the scene sets the payload.
+
+        Args:
+            index: Index of the simulation.
+            shares: Relative changes of the load inertia [-]. Shape (n_joints,).
+        """
 
     def draw(self, rng: np.random.Generator) -> Array:
         """The path of the scene."""
         return self._path
 
     def command(self, action: Array) -> Array:
-        """What the scene's loops get, with what the action adds."""
+        """Input of the scene's motor loops including the action [N·m]."""
         s, plan = self.settings, self.next_plan()
         here = np.minimum(self.instant + 1, self.steps)
         if s.action == "torque":
@@ -237,7 +248,7 @@ class ArmCore(Core):
         return np.asarray(own + self._feedforward[here])
 
     def start(self, plan: Array) -> tuple[Array, Array]:
-        """Motor angles and torques of the drives where the scene starts."""
+        """Motor angles [rad] and drive torques [N·m] at the start of the scene."""
         return self._start
 
     def columns(self) -> list[Array]:
@@ -256,10 +267,10 @@ class ArmCore(Core):
         ]
 
     def judge(self) -> None:
-        """Errors of links and tool."""
+        """Set the errors of links [rad] and tool [m]."""
         super().judge()
         slopes = self._by_joint[self._here]  # (n, 3, n_joints)
-        # sums joint by joint: their order must not depend on the number of episodes
+        # sum joint by joint: the order must not depend on the number of episodes
         offset = [np.zeros(len(slopes)) for _ in range(3)]
         for axis in range(3):
             for j in range(slopes.shape[2]):
@@ -277,12 +288,12 @@ class ArmCore(Core):
         return np.asarray(1.0 / (1.0 + error * error) - s.effort_weight * mean)
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """With the error of the tool."""
+        """True values, including the error of the tool [mm]."""
         return super().info() | {"tool_error_mm": 1e3 * self.tool_error}
 
 
 def _scene(settings: ArmSettings) -> Scene:
-    """The scene with the level, friction and kinematic error that are asked for."""
+    """The scene with level, friction and kinematic error of the settings."""
     name = str(settings.scene)
     scene = scene_of_arm(name) if is_arm(name) else Scene.load_file(name)
     scene = scene.with_level(settings.level)  # type: ignore[arg-type]
@@ -291,9 +302,9 @@ def _scene(settings: ArmSettings) -> Scene:
 
 
 def _drives(scene: Scene) -> dict[str, DriveMap]:
-    """Maps that take finite elements or a file, once for all environments.
+    """Maps that need finite elements or a file, loaded once for all environments.
 
-    A scene that episodes cannot have is refused before any is built.
+    Unsuitable scenes are rejected before any map is built.
     """
     sections = [scene.defaults, *scene.joints.values()]
     names = {s.drive for s in sections if s.drive is not None and s.model is None}
@@ -311,18 +322,21 @@ def _drives(scene: Scene) -> dict[str, DriveMap]:
 
 
 def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
-    """Refuse disturbances, an arm without tool, a first velocity [rad/s]."""
+    """Reject disturbances, an arm without a tool, and a motion that starts moving."""
     where = f"scene {scene.name!r}"
     if scene.disturbance:
-        raise InputError(f"{where} has disturbances; accepted: a scene without")
+        raise InputError(f"{where} has disturbances; accepted: none")
     if arm.tool < 0:
-        raise InputError(f"{where}: the arm has no tool site; needed: one to judge by")
+        raise InputError(
+            f"{where}: the arm has no tool site; accepted: an arm with a tool site,"
+            " which the reward needs"
+        )
     if np.abs(first).max() > 0.0:
         raise InputError(f"{where} starts moving; accepted: a path that starts at rest")
 
 
 def _check(scene: Scene, assembly: Assembly) -> None:
-    """Refuse what episodes do not have."""
+    """Reject scenes with features that episodes do not support."""
     _check_motion(scene, assembly.arm, assembly.trajectory.velocity[0])
     where, loops = f"scene {scene.name!r}", assembly.loops
     if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
@@ -337,7 +351,7 @@ def _check(scene: Scene, assembly: Assembly) -> None:
 
 
 def _start(assembly: Assembly) -> tuple[Array, Array]:
-    """Motor angles [rad] and drive torques [N·m] where the scene starts."""
+    """Motor angles [rad] and drive torques [N·m] at the start of the scene."""
     qpos, _ = start_state(assembly)
     theta, psi = qpos[assembly.motor_position], qpos[assembly.link_position]
     torque = [
@@ -349,7 +363,7 @@ def _start(assembly: Assembly) -> tuple[Array, Array]:
 
 
 def _tool_slopes(assembly: Assembly, path: Array) -> Array:
-    """Displacement of the tool per link angle along the path [m]. (n, 3, n_joints)."""
+    """Tool displacement per link angle along the path [m/rad]. (n, 3, n_joints)."""
     arm, out = assembly.arm, np.empty((len(path), 3, path.shape[1]))
     data = mujoco.MjData(arm.model)
     for row, q in zip(out, path, strict=True):

@@ -1,4 +1,4 @@
-"""An arm follows the path of a scene; torques or set-points are added to its loops."""
+"""An arm tracks the path of a scene; actions add torques or set-points to its loops."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from swgjoint.envs.arm_core import ArmCore, ArmSettings
 
 
 class ArmTrackingEnv(SingleEnv):
-    """An arm with a drive in every joint follows the path of a scene.
+    """An arm with a drive in every joint tracks the path of a scene.
 
-    The scene is assembled as ``swgjoint run`` does: arm, drives, payload, path (joint
-    or Cartesian), step, and its controller, PD on every motor's angle in the engine's
-    step with its feed-forward, to which the action is added. Catalogue drives get the
-    kinematic error that their catalogue states.
+    The scene is assembled as by ``swgjoint run``: arm, drives, payload, path (joint or
+    Cartesian), step and controller. The controller is PD with feed-forward on every
+    motor angle within the engine's step, and the action is added to it. Catalogue
+    drives get the kinematic error that their catalogue states.
 
-    Action, held over one control period; torque up to ``authority_of_rated`` times
-    rated torque over ratio, or, with ``action="setpoint"``, a shift of the links'
-    set-points of up to ``shift_arcmin``:
+    The action is constant over one control period. It is a torque of up to
+    ``authority_of_rated`` times rated torque over ratio or, with ``action="setpoint"``,
+    a shift of the link set-points of up to ``shift_arcmin``:
 
     =====  ====================================================  ====  =======
     index  meaning                                               unit  range
@@ -24,7 +24,7 @@ class ArmTrackingEnv(SingleEnv):
     0-5    added motor torque, of its authority, of every joint  1     -1 to 1
     =====  ====================================================  ====  =======
 
-    Observation, for scene ``ur5e-circle``; the last two entries only with
+    Observation for scene ``ur5e-circle``; the last two entries exist only with
     ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
     =====  =====================================================  =====  =============
@@ -41,41 +41,41 @@ class ArmTrackingEnv(SingleEnv):
     48-53  output torque, read, of every joint                    N·m    -410 to 410
     =====  =====================================================  =====  =============
 
-    Ranges of the tracking errors as in
+    The ranges of the tracking errors are defined as in
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
     Reward of a step, with the distance d of the tool from its reference (linearised
-    about it) and the mean square of the actions a:
+    about the reference) and the actions a:
 
         1/(1 + (d/error_scale)^2) - effort_weight mean(a^2)
 
-    Start: at rest as the scene starts, the drives carrying weight and load.
-    ``truncated`` after ``episode_s`` or the scene's duration. ``terminated`` when a
-    limit is broken (``info["broken_limit"]``, see
+    An episode starts at rest at the start of the scene, with the drives carrying weight
+    and load. It is ``truncated`` after ``episode_s`` or the scene's duration, and
+    ``terminated`` when a limit is exceeded (``info["broken_limit"]``, see
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`): a link 0.3 rad beyond the
-    range of the path, a motor 20 rad/s beyond twice the fastest speed of the path, a
-    drive beyond its momentary peak torque or where it ratchets. ``info`` as there,
-    with arrays over the joints, and ``tool_error_mm``.
+    range of the path, a motor 20 rad/s beyond twice the fastest speed of the path, or a
+    drive above its momentary peak or ratcheting torque. ``info`` is the same as there,
+    with arrays over the joints and with ``tool_error_mm`` in addition.
 
     Args (all by keyword):
         scene: Name or path of a scene that starts at rest, or of an arm, which then
             sweeps its joints; ``ur5e-circle``.
-        level: ``full`` or ``linear``.
-        friction: Whether drives have the friction of their maps, whatever the scene
-            says; True.
-        kinematic_error_arcmin: As in ``JointTracking-v0``, whatever the scene says; the
-            joints' phases differ.
-        action: ``torque`` or ``setpoint``.
-        authority_of_rated: 0.2.
-        shift_arcmin: 10.
-        episode_s: 2.
+        level: ``full`` or ``linear``; ``full``.
+        friction: Whether drives have the friction of their maps; overrides the scene;
+            True.
+        kinematic_error_arcmin: As in ``JointTracking-v0``; overrides the scene; the
+            phases of the joints differ.
+        action: ``torque`` or ``setpoint``; ``torque``.
+        authority_of_rated: Largest added motor torque, see above [-]; 0.2.
+        shift_arcmin: Largest shift of the set-points [arcmin]; 10.
+        episode_s: Duration of an episode [s]; 2.
         sensors: As in ``JointTracking-v0``.
-        randomise: Likewise, but ``load_inertia`` has no effect, the payload is the
-            scene's; so at ``linear`` True draws nothing.
-        error_scale_mm: Of the reward; 1.
-        effort_weight: Of the reward; 0.1.
+        randomise: As in ``JointTracking-v0``, but ``load_inertia`` has no effect
+            because the scene sets the payload; at ``linear``, True draws nothing.
+        error_scale_mm: Error scale of the reward [mm]; 1.
+        effort_weight: Effort weight of the reward [-]; 0.1.
 
-    Versions: v0, the first.
+    Version: v0.
     """
 
     core_of = ArmCore

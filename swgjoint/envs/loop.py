@@ -1,4 +1,4 @@
-"""The loop of a servo drive, to which an action is added."""
+"""Motor control loop of a servo drive, to which an action is added."""
 
 from __future__ import annotations
 
@@ -18,32 +18,33 @@ class MotorLoop:
     .. math:: u = c - k_p \theta - k_d \dot\theta, \quad
         c = k_p\,i\,q_d + k_d\,i\,\dot q_d + u_\mathrm{ff}
 
-    It stands for the loop that a servo drive runs itself, many times per control
-    period on its own encoder: without the sensors' resolution, noise and delay. Arrays
-    of shape (n_joints,).
+    It represents the internal loop of a servo drive, which runs many times per control
+    period on the motor encoder, without the resolution, noise and delay of the sensors.
+    Arrays have shape (n_joints,).
     """
 
     stiffness: Array
-    """k_p [N·m/rad]."""
+    """Position gain k_p [N·m/rad]."""
     damping: Array
-    """k_d [N·m·s/rad]."""
+    """Speed gain k_d [N·m·s/rad]."""
     ratio: Array
+    """Signed ratio i [-]."""
 
     @classmethod
     def none(cls, ratio: Array) -> Self:
-        """Motors that only take torques."""
+        """No control loop: the motors apply the commanded torques."""
         return cls(stiffness=0.0 * ratio, damping=0.0 * ratio, ratio=ratio)
 
     @classmethod
     def from_frequency(
         cls, joints: KnownJoints, *, frequency: float, damping_ratio: float
     ) -> Self:
-        """Gains for motor and link together on a rigid drive.
+        """Gains for the total inertia of motor and link on a rigid drive.
 
         Args:
-            joints: Nominal data.
-            frequency: Natural frequency [Hz].
-            damping_ratio: Of the loop [-].
+            joints: Nominal data of the joints.
+            frequency: Natural frequency of the loop [Hz].
+            damping_ratio: Damping ratio of the loop [-].
         """
         ratio, rotor = joints.ratio, joints.rotor_inertia
         inertia, omega = rotor + joints.link_inertia / ratio**2, 2.0 * np.pi * frequency
@@ -54,12 +55,23 @@ class MotorLoop:
         )
 
     def command(self, position: Array, velocity: Array) -> Array:
-        """C without feed-forward [N·m], of the reference of the links."""
+        """Command c without feed-forward, for a reference of the links [N·m].
+
+        Args:
+            position: Reference angle q_d of the links [rad].
+            velocity: Reference speed of the links [rad/s].
+        """
         i = self.ratio
         return np.asarray(
             self.stiffness * (i * position) + self.damping * (i * velocity)
         )
 
     def torque(self, command: Array, angle: Array, speed: Array) -> Array:
-        """Torque of the motors over the step that led to a state [N·m]."""
+        """Motor torque over the step that ended in a state [N·m].
+
+        Args:
+            command: Command c [N·m].
+            angle: Motor angle at the end of the step [rad].
+            speed: Motor speed at the end of the step [rad/s].
+        """
         return np.asarray(command - self.stiffness * angle - self.damping * speed)

@@ -1,4 +1,4 @@
-"""Pictures of a simulation, drawn off screen."""
+"""Off-screen pictures of a simulation."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 
 SIZE = (480, 640)
-"""Height and width; what a model allows by default."""
+"""Height and width [px], the default maximum of a model."""
 
 
 class Picture:
-    """Draws one model with MuJoCo's free camera.
+    """Renderer of one model with MuJoCo's free camera.
 
-    ``MUJOCO_GL`` chooses the kind of context as elsewhere in MuJoCo; where it says
-    nothing, EGL on Linux, which needs no display.
+    ``MUJOCO_GL`` selects the OpenGL context as elsewhere in MuJoCo. If it is not set,
+    Linux uses EGL, which needs no display.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """Open a context.
 
         Raises:
-            ComputationError: If there is none.
+            ComputationError: If no OpenGL context is available.
         """
         height, width = SIZE
         self._model = model
@@ -63,7 +63,7 @@ class Picture:
         return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Give the context back."""
+        """Release the context."""
         self._context.make_current()
         self._drawing.free()
         self._context.free()

@@ -55,7 +55,7 @@ class StepMode:
 
 
 def left_share(stiffness_step: float) -> float:
-    """Fraction nu of the integrator's damping that remains, as a function of (h w)² [-]."""
+    """Fraction nu of the integrator's damping that remains, for (h w)² [-]."""
     return NUMERICAL_DAMPING * stiffness_step**2 / (16.0 + stiffness_step**2)
 
 

@@ -17,6 +17,7 @@ from swgjoint.joint.warp_potential import (
     WarpDrive,
     real,
     secant_over,
+    slip,
 )
 
 _SPRING, _, _CUBIC = plugin.TENDON_STIFFNESS
@@ -65,29 +66,6 @@ class WarpStep:
     """Angle beta at which the bristle is relaxed [rad]."""
     known: int
     """Whether ``relaxed`` is known."""
-
-
-@wp.func
-def slip(s: Secant, stiffness: real, reach: real, rest: real):
-    """Add the mean torque of one hysteresis element over the step.
-
-    Args:
-        s: Secant to which the element is added.
-        stiffness: Stiffness of the element [N·m/rad].
-        reach: Yield torsion of the element [rad].
-        rest: Torsion at which the element is relaxed [rad].
-    """
-    begin = wp.clamp(s.begin - rest, -reach, reach)
-    free = begin + s.change
-    end = wp.clamp(free, -reach, reach)
-    sticks = real(1.0)
-    if end != free:
-        sticks = (end - begin) / s.change
-    s.torque += stiffness * (HALF * (begin + end) * sticks + end * (ONE - sticks))
-    s.slope += HALF * stiffness * sticks * sticks
-    s.k0 += stiffness * sticks
-    s.k1 += stiffness * sticks
-    return s
 
 
 @wp.func

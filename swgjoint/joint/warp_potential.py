@@ -300,3 +300,26 @@ def secant_over(
     out.e_theta = HALF * (value(sums.by_theta, d0) + value(last.by_theta, d1))
     out.e_psi = HALF * (value(sums.by_psi, d0) + value(last.by_psi, d1))
     return out
+
+
+@wp.func
+def slip(s: Secant, stiffness: real, reach: real, rest: real):
+    """Add the mean torque of one hysteresis element over the step.
+
+    Args:
+        s: Secant to which the element is added.
+        stiffness: Stiffness of the element [N·m/rad].
+        reach: Yield torsion of the element [rad].
+        rest: Torsion at which the element is relaxed [rad].
+    """
+    begin = wp.clamp(s.begin - rest, -reach, reach)
+    free = begin + s.change
+    end = wp.clamp(free, -reach, reach)
+    sticks = real(1.0)
+    if end != free:
+        sticks = (end - begin) / s.change
+    s.torque += stiffness * (HALF * (begin + end) * sticks + end * (ONE - sticks))
+    s.slope += HALF * stiffness * sticks * sticks
+    s.k0 += stiffness * sticks
+    s.k1 += stiffness * sticks
+    return s
