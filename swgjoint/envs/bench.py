@@ -1,4 +1,4 @@
-"""The joint test bench as many simulations: one drive, its motor, a load."""
+"""Joint test bench for many simulations: one drive with its motor and a load."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from swgjoint.typing import Array
 LEVELS = ("full", "linear")
 MAX_SUB_STEPS = 16
 MAX_PERIOD = 0.05
-"""Of the control, above which references fall between its instants [s]."""
+"""Largest control period; longer periods do not resolve the references [s]."""
 JOINT, BODY = "joint", "load"
 REACH = 0.5
-"""Of the bench's bar, at whose end a payload sits [m]."""
+"""Length of the bench's bar, which carries the payload at its end [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchSettings:
-    """Arguments that all environments on the bench share."""
+    """Arguments common to all environments on the bench."""
 
     drive: str | DriveMap = "CSG-25-100"
     level: str = "full"
@@ -101,12 +101,12 @@ class BenchSettings:
 
     @property
     def steps(self) -> int:
-        """Control periods of an episode."""
+        """Number of control periods of an episode."""
         return round(self.episode_s / self.period_s)
 
     @property
     def link_inertia(self) -> float:
-        """Link inertia of load and payload about the joint, nominal [kg·m²]."""
+        """Nominal inertia of load and payload about the joint [kg·m²]."""
         return self.load_inertia_kgm2 + self.payload_kg * REACH**2
 
 
@@ -125,11 +125,11 @@ class BenchCore(Core):
         """Build the model once, then ``count`` simulations of it.
 
         Args:
-            count: Of the episodes.
-            threads: Of the engine.
+            count: Number of episodes.
+            threads: Number of engine threads; 0: one per core.
             settings: Arguments of the environment.
-            loop_Hz: Natural frequency of the motor's own loop; None: it has none.
-            loop_damping_ratio: Of that loop.
+            loop_Hz: Natural frequency of the motor loop [Hz]; None: no loop.
+            loop_damping_ratio: Damping ratio of that loop [-].
         """
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise, s.level)
@@ -208,13 +208,18 @@ class BenchCore(Core):
         )
 
     def vary_load(self, index: int, shares: Array) -> None:
-        """Give one simulation a load of its own."""
+        """Change the load inertia of one simulation.
+
+        Args:
+            index: Index of the simulation.
+            shares: Relative change of the inertia [-]. Shape (1,).
+        """
         if self._inertia is not None:
             inertia = (1.0 + float(shares[0])) * self.settings.link_inertia
             self._inertia[index, self._body, 2] = inertia
 
     def motor_entries(self) -> tuple[Entry, ...]:
-        """Motor angle and speed as they are read."""
+        """Entries of the measured motor angle and speed."""
         ratio, limits = abs(self.joint.ratio), self.limits
         angle = ceiling(1.01 * ratio * float(limits.angle[0]))
         speed = ceiling(1.5 * float(limits.motor_speed[0]))
@@ -229,10 +234,10 @@ class BenchCore(Core):
         )
 
     def error_entries(self, acceleration: float) -> tuple[Entry, ...]:
-        """Tracking errors of motor angle and speed, as they are read.
+        """Entries of the measured tracking errors of motor angle and speed.
 
         Args:
-            acceleration: Largest of references, at the link [rad/s²].
+            acceleration: Largest acceleration of references at the link [rad/s²].
         """
         angle, speed = error_bounds(
             self.joint.ratio,
@@ -257,19 +262,19 @@ class BenchCore(Core):
         )
 
     def sensor_entries(self) -> tuple[Entry, ...]:
-        """Further sensors, where they are."""
-        limits, got = self.limits, []
+        """Entries of link encoder and torque sensor, if present."""
+        limits, entries = self.limits, []
         if self.sensors.link_encoder:
             angle = ceiling(1.01 * float(limits.angle[0]))
-            got.append(
+            entries.append(
                 Entry(meaning="link angle, read", unit="rad", low=-angle, high=angle)
             )
         if self.sensors.torque_sensor:
             top = ceiling(1.1 * float(limits.momentary_peak[0]))
-            got.append(
+            entries.append(
                 Entry(meaning="output torque, read", unit="N·m", low=-top, high=top)
             )
-        return tuple(got)
+        return tuple(entries)
 
 
 def _bench(
@@ -280,7 +285,7 @@ def _bench(
     spec.option.timestep = s.period_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     body = spec.body(BODY)
-    # the engine wants the largest of three inertias below the sum of the others
+    # the engine requires each principal inertia to be at most the sum of the others
     across = max(float(body.inertia[0]), 0.6 * s.link_inertia)
     body.inertia = np.array([across, across, s.link_inertia])
     attached = attach(
@@ -297,7 +302,15 @@ def _bench(
 
 
 def settings_of(kind: type[Any], arguments: dict[str, Any]) -> Any:
-    """Settings from keyword arguments, with an unknown one as a clear line."""
+    """Settings from keyword arguments.
+
+    Args:
+        kind: Class of the settings.
+        arguments: Keyword arguments of the environment.
+
+    Raises:
+        InputError: If an argument is unknown.
+    """
     known = kind.__dataclass_fields__
     if unknown := sorted(set(arguments) - set(known)):
         raise InputError(

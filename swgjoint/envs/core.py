@@ -1,8 +1,8 @@
-"""What all environments share: episodes of driven joints, n of them side by side.
+"""Base of all environments: n parallel episodes of driven joints.
 
-Every number is made here, on arrays that begin with the episodes, so that a single
-environment (n = 1) and a batch agree to the last bit. :mod:`swgjoint.envs.api` puts the
-two interfaces of gymnasium in front.
+All numbers are computed here, on arrays whose first axis is the episodes, so that a
+single environment (n = 1) and a batch are bit-identical. :mod:`swgjoint.envs.api`
+provides the two gymnasium interfaces.
 """
 
 from __future__ import annotations
@@ -30,31 +30,30 @@ from swgjoint.units import arcmin
 Rows = NDArray[np.intp]
 
 TRACKED = 50.0 * arcmin
-"""Error of a link to which the observed tracking error reaches [rad]: twenty times what
-a rigid plan leaves. A far larger range would hide from whoever scales by it what is to
-be controlled; beyond it the entry stays at its bound, and reference and reading are
-observed whole."""
+"""Link error at the bound of the observed tracking error [rad], twenty times the error
+of a rigid plan. With a much larger bound, agents that scale by it would not resolve the
+relevant errors. Larger errors are clipped; reference and reading are not."""
 REGAINED = 0.1
-"""Time in which the largest observed speed error would make that error [s]."""
+"""Time in which the largest observed speed error builds up that link error [s]."""
 
 LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
-"""What ``info["broken_limit"]`` counts."""
+"""Names of the limits by their number in ``info["broken_limit"]``."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One number of an observation or an action."""
+    """One quantity of an observation or an action."""
 
     meaning: str
     unit: str
     low: float
     high: float
     count: int = 1
-    """So many numbers of the kind, one per joint."""
+    """Number of values of this quantity, e.g. one per joint."""
 
 
 def table(entries: Sequence[Entry]) -> str:
-    """The entries as the table of a docstring."""
+    """Table of the entries for a docstring."""
     rows, first = [("index", "meaning", "unit", "range")], 0
     for e in entries:
         index = str(first) if e.count == 1 else f"{first}-{first + e.count - 1}"
@@ -67,7 +66,7 @@ def table(entries: Sequence[Entry]) -> str:
 
 
 def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
-    """Bounds of every number, low and high."""
+    """Lower and upper bounds of all values. Shapes (n_values,)."""
     low, high = np.array([(e.low, e.high) for e in entries for _ in range(e.count)]).T
     return low, high
 
@@ -75,17 +74,17 @@ def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
 def error_bounds(
     ratio: float, *, speed: float, acceleration: float, age: float, period: float
 ) -> tuple[float, float]:
-    """Ranges of observed errors of a motor's angle [rad] and speed [rad/s].
+    """Bounds of observed errors of motor angle [rad] and motor speed [rad/s].
 
-    A reading is held against the reference of now, so what the reference does in its
-    age comes on top.
+    A reading is compared with the current reference, so the bounds include the change
+    of the reference during the age of the reading.
 
     Args:
-        ratio: Of the drive.
-        speed: Largest of the reference, at the link [rad/s].
-        acceleration: Likewise [rad/s²].
-        age: Of the readings [s].
-        period: Of the control, over which a speed is the change of the angle [s].
+        ratio: Ratio of the drive [-].
+        speed: Largest speed of the reference at the link [rad/s].
+        acceleration: Largest acceleration of the reference at the link [rad/s²].
+        age: Age of the readings [s].
+        period: Control period, over which speeds are angle differences [s].
     """
     i = abs(ratio)
     return (
@@ -95,27 +94,27 @@ def error_bounds(
 
 
 def ceiling(value: float) -> float:
-    """A value rounded up to two digits: bounds that a table can state."""
+    """Value rounded up to two digits, for bounds in a table."""
     digit = 10.0 ** (floor(log10(value)) - 1)
     return max(value, float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EpisodeLimits:
-    """What ends an episode; arrays of shape (n_joints,)."""
+    """Limits that end an episode, as arrays of shape (n_joints,)."""
 
     angle: Array
-    """Angle of the links about ``centre`` [rad]."""
+    """Largest deviation of the link angle from ``centre`` [rad]."""
     centre: Array
-    """[rad]."""
+    """Centre of the range of the link angle [rad]."""
     motor_speed: Array
-    """[rad/s]."""
+    """Largest motor speed [rad/s]."""
     momentary_peak: Array
-    """Torque of the drives [N·m]."""
+    """Momentary peak torque of the drives [N·m]."""
     ratcheting: Array
-    """Torque at which teeth skip [N·m], inf where it is not known."""
+    """Ratcheting torque of the drives, inf if unknown [N·m]."""
     motor_torque: Array
-    """Torque of the motors, which hold it themselves [N·m]."""
+    """Largest motor torque, at which motors saturate without ending it [N·m]."""
 
 
 class Core(ABC):
@@ -138,14 +137,14 @@ class Core(ABC):
 
         Args:
             plant: The simulations.
-            joints: Nominal data, for the task.
-            loop: That the motors have in the engine.
-            limits: Of angle, speed and torque.
-            sensors: Of every joint.
-            tolerances: Of the drives; None: all are nominal.
-            period: Of the control [s].
-            steps: Control periods of an episode.
-            shared: Whether all episodes have one plan.
+            joints: Nominal data of the joints, for the task.
+            loop: Motor loops in the engine.
+            limits: Limits of angle, speed and torque.
+            sensors: Sensors of every joint.
+            tolerances: Tolerances of the drives; None: all drives are nominal.
+            period: Control period [s].
+            steps: Number of control periods of an episode.
+            shared: Whether all episodes have the same plan.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
@@ -160,7 +159,7 @@ class Core(ABC):
         self._readout = Readout(sensors, count, rated, period)
         self._rows = np.arange(count)
         self.instant = np.zeros(count, dtype=np.intp)
-        """Control periods since the start. Shape (n,)."""
+        """Number of control periods since the start. Shape (n,)."""
         # position, velocity, acceleration, load, known torque of the links
         own = np.arange(1 if shared else count)
         self._plan = np.zeros((own.size, steps + 1, 5, n))
@@ -171,9 +170,9 @@ class Core(ABC):
         """Deviations of every simulation's drives from the nominal ones."""
         self.observation_entries, self.action_entries = self.entries()
         self.action = np.zeros((count, sum(e.count for e in self.action_entries)))
-        """The last one, limited."""
+        """Last action after limiting [-]."""
         self.motor_torque = np.zeros((count, n))
-        """The last one [N·m]."""
+        """Last motor torque [N·m]."""
         self.output_torque = np.zeros((count, n))
         """Output torque of the drives [N·m]."""
         self._low, self._high = bounds(self.observation_entries)
@@ -186,44 +185,54 @@ class Core(ABC):
 
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Array:
-        """The plan of one episode, shape (steps + 1, 5, n_joints).
+        """Draw the plan of one episode. Shape (steps + 1, 5, n_joints).
 
-        Position, velocity, acceleration, load and known torque of the links, inertia
-        included.
+        It has position, velocity, acceleration, load torque and known torque of the
+        links, the latter including inertia.
         """
 
     @abstractmethod
     def command(self, action: Array) -> Array:
-        """Input of the motors for a limited action [N·m]. Shape (n, n_joints)."""
+        """Motor input for a limited action [N·m]. Shape (n, n_joints)."""
 
     def start(self, plan: Array) -> tuple[Array, Array]:
-        """Motor angles [rad], on the reference, and torques of the drives [N·m].
+        """Motor angles on the reference [rad] and drive torques [N·m] at the start.
 
         Args:
-            plan: Of the episode that begins.
+            plan: Plan of the episode.
         """
         return self.joints.ratio * plan[0, 0], plan[0, 4]
 
     @abstractmethod
     def columns(self) -> list[Array]:
-        """The observation, part by part, shapes (n, 1) or (n, n_joints).
+        """Parts of the observation. Shapes (n, 1) or (n, n_joints).
 
-        First the motor angles and speeds that are read, last :meth:`readings`.
+        Measured motor angles and speeds come first, :meth:`readings` come last.
         """
 
     @abstractmethod
     def reward(self) -> Array:
-        """Reward of the step that was taken. Shape (n,)."""
+        """Reward of the last step [-]. Shape (n,)."""
 
     @abstractmethod
     def vary_load(self, index: int, shares: Array) -> None:
-        """Let the load's inertia of one simulation differ; shares of (n_joints,)."""
+        """Change the load inertia of one simulation.
+
+        Args:
+            index: Index of the simulation.
+            shares: Relative changes of the inertia [-]. Shape (n_joints,).
+        """
 
     # -- episodes -------------------------------------------------------------
 
     def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
-        """Begin episodes of some simulations, each with its own generator."""
-        # new arrays: what was returned of the last step must not change
+        """Begin episodes of some simulations.
+
+        Args:
+            rows: Indices of the simulations.
+            rngs: Random generators, one for each of them.
+        """
+        # new arrays, because arrays returned by the last step must not change
         torque = self.output_torque.copy()
         for k, rng in zip(rows, rngs, strict=True):
             maps: tuple[DriveMap, ...] = tuple(d.drive for d in self.plant.drives)
@@ -255,8 +264,8 @@ class Core(ABC):
         """Take one control period.
 
         Args:
-            action: Shape (n, n_actions); beyond its range it is limited.
-            active: Episodes that go on; None: all. Shape (n,).
+            action: Actions, limited to -1 to 1 [-]. Shape (n, n_actions).
+            active: Whether episodes continue; None: all. Shape (n,).
 
         Raises:
             InputError: If the action has another shape or is not finite.
@@ -282,28 +291,28 @@ class Core(ABC):
         self.remember()
 
     def next_plan(self) -> Array:
-        """Plan at the end of the step that begins. Shape (n, 5, n_joints)."""
+        """Plan at the end of the next step. Shape (n, 5, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
         return np.asarray(self._plan[self._planned, after])
 
     def _look(self) -> None:
-        """Take in where the simulations stand."""
+        """Read the state of the simulations."""
         plant = self.plant
         self._here = np.minimum(self.instant, self.steps)
         self.now = self._plan[self._planned, self._here]
-        """Plan at this instant. Shape (n, 5, n_joints)."""
+        """Plan at the current instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
 
     def judge(self) -> None:
-        """Set what reward and info need of the state alone."""
+        """Set the quantities of reward and info that depend on the state alone."""
         self.link_error = self.link_angle - self.now[:, 0]
         """Link minus reference [rad]. Shape (n, n_joints)."""
 
     def remember(self) -> None:  # noqa: B027  (most have nothing to remember)
-        """After a step: carry on what reward and info need of the past."""
+        """Update the history that reward and info need, after a step."""
 
     def forget(self, rows: Rows) -> None:  # noqa: B027
-        """At the start of episodes: begin anew with that."""
+        """Reset this history at the start of episodes."""
 
     def _true(self) -> Array:
         parts = [self.motor_angle]
@@ -314,35 +323,35 @@ class Core(ABC):
         return np.concatenate(parts, axis=1)
 
     def observation(self) -> Array:
-        """What the sensors read and what is known, limited. Shape (n, n_entries)."""
+        """Sensor readings and known quantities, limited. Shape (n, n_entries)."""
         return np.clip(np.concatenate(self.columns(), axis=1), self._low, self._high)
 
     def readings(self) -> list[Array]:
-        """Of link encoder and torque sensor, where they are. Shapes (n, n_joints)."""
+        """Readings of link encoder and torque sensor, if present. (n, n_joints)."""
         n, value = len(self.joints.names), self._readout.value
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
     def broken(self) -> NDArray[np.int64]:
-        """Number of the limit that is broken, see :data:`LIMITS`. Shape (n,)."""
+        """Number of the exceeded limit, see :data:`LIMITS`. Shape (n,)."""
         limits, torque = self.limits, np.abs(self.output_torque)
-        got = np.zeros(len(torque), dtype=np.int64)
-        # what is not a number breaks every limit; the worst is named
+        numbers = np.zeros(len(torque), dtype=np.int64)
+        # NaN exceeds every limit; the last exceeded limit is reported
         for number, inside in (
             (1, np.abs(self.link_angle - limits.centre) <= limits.angle),
             (2, np.abs(self.plant.motor_speed) <= limits.motor_speed),
             (3, torque <= limits.momentary_peak),
             (4, torque <= limits.ratcheting),
         ):
-            got[~inside.all(axis=1)] = number
-        return got
+            numbers[~inside.all(axis=1)] = number
+        return numbers
 
     @property
     def over(self) -> NDArray[np.bool_]:
-        """Whether episodes have reached their length. Shape (n,)."""
+        """Whether episodes have reached their full length. Shape (n,)."""
         return self.instant >= self.steps
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """True values behind the observation, per joint where there are several."""
+        """True values without sensor errors, per joint if there are several joints."""
         error = self.link_angle - self.motor_angle / self.plant.ratio
         got: dict[str, NDArray[Any]] = {
             "link_error_arcmin": self.link_error / arcmin,
@@ -361,9 +370,9 @@ class Core(ABC):
 
     @property
     def task(self) -> Task:
-        """The motions of all episodes, episodes in front of the joints."""
+        """Motions of all episodes; the axis of episodes precedes that of joints."""
         if self._task is None:
-            # (5, steps + 1, n, n_joints); a copy, which the next episodes leave alone
+            # (5, steps + 1, n, n_joints); a copy, so that the next episodes keep it
             plan = self._plan[self._planned].transpose(2, 1, 0, 3).copy()
             age = self.sensors.delay_periods * self.period
             self._task = Task(
@@ -378,7 +387,7 @@ class Core(ABC):
         return self._task
 
     def read_measurements(self, observation: Array) -> Measured:
-        """What a controller reads from observations of any leading axes."""
+        """Measured values in observations with any leading axes, for controllers."""
         n, last = len(self.joints.names), observation.shape[-1]
         torque = last - n if self.sensors.torque_sensor else None
         link = (torque or last) - n if self.sensors.link_encoder else None
@@ -393,7 +402,7 @@ class Core(ABC):
 
 
 def _without(values: Array, rows: Rows) -> Array:
-    """A copy with zeros in some rows."""
-    got = values.copy()
-    got[rows] = 0.0
-    return got
+    """Copy with zeros in some rows."""
+    copy = values.copy()
+    copy[rows] = 0.0
+    return copy

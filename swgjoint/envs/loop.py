@@ -13,7 +13,7 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotorLoop:
-    r"""PD on the motor angle, inside the engine's step.
+    r"""PD control of the motor angle within the engine's step.
 
     .. math:: u = c - k_p \theta - k_d \dot\theta, \quad
         c = k_p\,i\,q_d + k_d\,i\,\dot q_d + u_\mathrm{ff}

@@ -1,4 +1,4 @@
-"""Simulations of one model with driven joints that run side by side."""
+"""Parallel simulations of one model with driven joints."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Index = NDArray[np.intp]
 class Plant:
     """Motors, drives and links of n simulations; joints are the last axis.
 
-    Arrays that begin with the simulations are exactly what a loop over simulations
-    gives, whatever n and the number of threads.
+    Results are bit-identical to those of a loop over single simulations, for any n and
+    any number of threads.
     """
 
     def __init__(
@@ -41,11 +41,11 @@ class Plant:
         """Make the simulations.
 
         Args:
-            model: Compiled; actuator j turns the motor of joint j with its torque.
-            drives: Of the joints, ``linear`` or ``full``.
-            count: Of the simulations.
-            sub_steps: Steps of the engine per control period.
-            threads: Of the engine; 0: one per core.
+            model: Compiled model, where actuator j applies the motor torque of joint j.
+            drives: Drives of the joints at ``linear`` or ``full``.
+            count: Number of simulations.
+            sub_steps: Number of engine steps per control period.
+            threads: Number of engine threads; 0: one per core.
             variable: Whether drives differ between simulations.
         """
         check_count("num_envs", count, 1)
@@ -70,7 +70,7 @@ class Plant:
                 mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, d.plugin)
                 for d in drives
             ]
-            # of every joint: acceleration of the rotor, then of the link
+            # per joint: acceleration of the rotor, then of the link
             others = [int(model.plugin_stateadr[k]) + 1 for k in instances]
             self._others = state, np.array(others)
             self._qacc = batch.bind("qacc")
@@ -78,30 +78,30 @@ class Plant:
 
     @property
     def motor_angle(self) -> Array:
-        """[rad]. Shape (n, n_joints)."""
+        """Motor angles [rad]. Shape (n, n_joints)."""
         return np.asarray(self._qpos[:, self._rotor_q])
 
     @property
     def motor_speed(self) -> Array:
-        """[rad/s]. Shape (n, n_joints)."""
+        """Motor speeds [rad/s]. Shape (n, n_joints)."""
         return np.asarray(self._qvel[:, self._rotor_v])
 
     @property
     def link_angle(self) -> Array:
-        """[rad]. Shape (n, n_joints)."""
+        """Link angles [rad]. Shape (n, n_joints)."""
         return np.asarray(self._qpos[:, self._link_q])
 
     @property
     def link_speed(self) -> Array:
-        """[rad/s]. Shape (n, n_joints)."""
+        """Link speeds [rad/s]. Shape (n, n_joints)."""
         return np.asarray(self._qvel[:, self._link_v])
 
     def output_torque(self) -> Array:
         """Torque of every drive on its link [N·m]. Shape (n, n_joints).
 
-        At ``full`` its mean over the engine's last step: what the link's acceleration
-        is more than all other forces cause, which the plugin keeps; at ``linear`` the
-        spring at the state.
+        At ``full`` this is the mean over the engine's last step, computed from the link
+        acceleration minus that by all other forces, which the plugin stores. At
+        ``linear`` it is the torque of spring and damper at the current state.
         """
         if self._others is not None:
             state, index = self._others
@@ -120,9 +120,9 @@ class Plant:
         """Advance by one control period.
 
         Args:
-            torque: Of the motors [N·m]. Shape (n, n_joints).
-            load: Against the links [N·m]. Same shape.
-            active: Simulations that move; None: all. Shape (n,).
+            torque: Motor torques [N·m]. Shape (n, n_joints).
+            load: Load torques against the links [N·m]. Same shape.
+            active: Whether simulations advance; None: all. Shape (n,).
         """
         self._ctrl[:, : torque.shape[1]] = torque
         self._load[:, self._link_v] = -load
@@ -135,13 +135,13 @@ class Plant:
         torque: Array,
         maps: Sequence[DriveMap],
     ) -> None:
-        """Let one simulation begin at rest, its drives carrying given torques.
+        """Set one simulation to rest with the drives under given torques.
 
         Args:
-            index: Of the simulation.
-            motor_angle: [rad]. Shape (n_joints,).
-            torque: Of the drives on the links [N·m]. Same shape.
-            maps: Of its joints.
+            index: Index of the simulation.
+            motor_angle: Motor angles [rad]. Shape (n_joints,).
+            torque: Torques of the drives on the links [N·m]. Same shape.
+            maps: Maps of the joints.
         """
         batch, links = self.batch, np.empty(len(maps))
         forces = np.zeros((len(maps), 2))
@@ -156,8 +156,8 @@ class Plant:
         self._qpos[index, self._rotor_q] = motor_angle
         if self._others is None:
             return
-        # what the plugin remembers of the step before, as if in balance: accelerations
-        # by all other forces cancel those by the drive, hysteresis is relaxed here
+        # initialise the plugin state as in equilibrium: accelerations by all other
+        # forces cancel those by the drive, and hysteresis is relaxed at this torsion
         batch.forward([index])
         state, others = self._others
         factor, inverse = (part[index] for part in self._factor)
@@ -170,15 +170,28 @@ class Plant:
             state[index, first : first + len(drive.hysteresis)] = torsion
 
     def vary(self, index: int, variations: Sequence[Variation]) -> None:
-        """Give one simulation drives of its own."""
+        """Vary the drives of one simulation.
+
+        Args:
+            index: Index of the simulation.
+            variations: Deviations of the drives from their maps, one per joint.
+
+        Raises:
+            InputError: If the plant was made with ``variable=False``.
+        """
         if self._user is None:
-            raise InputError("drives of this plant are all alike")
+            raise InputError("variations of a plant with variable=False; accepted: True")
         for tendon, variation in zip(self._tendons, variations, strict=True):
             self._user[index, tendon, :SIZE] = variation.numbers
 
 
 def specimen(attached: JointDrive, variation: Variation) -> JointDrive:
-    """The drive on a joint with the map of one specimen."""
+    """Drive of a joint with the map of one specimen.
+
+    Args:
+        attached: Nominal drive of the joint.
+        variation: Deviations of the specimen.
+    """
     return replace(
         attached,
         drive=variation.apply_to(attached.drive),
@@ -196,7 +209,7 @@ def _addresses(joints: Sequence[object]) -> tuple[Index, Index]:
 def _balance(
     drive: DriveMap, theta: float, torque: float
 ) -> tuple[float, tuple[float, float]]:
-    """Link angle at which the potential gives a torque, and its forces there."""
+    """Link angle [rad] at which the potential gives a torque, and its forces [N·m]."""
     psi = theta / drive.ratio
     for _ in range(50):
         on_input, on_output = (float(f) for f in drive.forces(theta, psi))
