@@ -180,7 +180,9 @@ class Plant:
             InputError: If the plant was made with ``variable=False``.
         """
         if self._user is None:
-            raise InputError("variations of a plant with variable=False; accepted: True")
+            raise InputError(
+                "variations of a plant with variable=False; accepted: True"
+            )
         for tendon, variation in zip(self._tendons, variations, strict=True):
             self._user[index, tendon, :SIZE] = variation.numbers
 
