@@ -90,7 +90,7 @@ def test_a_given_map_and_one_with_an_error_are_taken_as_they_are(synthetic_map):
             assert drive_of(section, known={"x": drive}, joint="a") is drive
         section = JointSection(drive="x", kinematic_error_arcmin=1.0)
         with pytest.raises(
-            InputError, match=naming("joints.a", "kinematic_error_arcmin", "1", "own")
+            InputError, match=naming("joints.a", "kinematic_error_arcmin", "1")
         ):
             drive_of(section, known={"x": drive}, joint="a")
     bare = DriveMap.linear(1e4)
@@ -154,7 +154,7 @@ def test_a_loaded_drive_takes_an_error_where_it_has_none(tmp_path, synthetic_map
     synthetic_map.save(own)
     got = load_drive(str(bare), kinematic_error_arcmin=2.0)
     assert peak_to_peak(got) / arcmin == pytest.approx(2.0, rel=0.05)
-    with pytest.raises(InputError, match=naming("kinematic_error_arcmin", "own")):
+    with pytest.raises(InputError, match=naming("kinematic_error_arcmin")):
         load_drive(str(own), kinematic_error_arcmin=2.0)
 
 

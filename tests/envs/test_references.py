@@ -70,6 +70,6 @@ def test_an_environment_has_the_error_that_it_asks_for():
         drive_of_environment("CSG-25-100", None).kinematic_error, whole.kinematic_error
     )
     with pytest.raises(
-        InputError, match=naming("kinematic_error_arcmin", "1", "'CSG-25-100'", "own")
+        InputError, match=naming("kinematic_error_arcmin", "1", "'CSG-25-100'")
     ):
         drive_of_environment(whole, 1.0)
