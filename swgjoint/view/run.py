@@ -1,4 +1,4 @@
-"""Scenes simulated for users: the run, and its recording for the viewer."""
+"""Simulate a scene and, on request, record it for the viewer."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ from swgjoint.sim.simulation import prepare_scene, simulate
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SceneRun(Run):
-    """A recorded run that can be written for the rerun viewer."""
+    """A recorded run that can be exported to the rerun viewer."""
 
     def to_rerun(self, path: str | Path) -> Path:
-        """Write the recording for the rerun viewer; see :mod:`swgjoint.view`."""
+        """Write a recording for the rerun viewer and return its path.
+
+        See :mod:`swgjoint.view.recording.recording`.
+        """
         from swgjoint.view.recording.recording import write_recording
 
         return write_recording({"": self}, path)
@@ -39,35 +42,41 @@ def run_scene(
     recording: str | Path | None = None,
     progress: Progress = silent,
 ) -> SceneRun:
-    """Simulate a scene from an equilibrium to its end.
+    """Simulate a scene from its initial equilibrium to its end.
 
-    A step that lies outside the region in which a joint's integration holds is cut into
-    ``run.assembly.sub_steps`` equal parts; the run records the scene's steps.
+    A step outside the stability region of a joint is divided into
+    ``run.assembly.sub_steps`` equal sub-steps. The run records the steps of the scene
+    only.
 
     Args:
-        scene: A scene, the path of a scene file, or the name of a bundled one.
-        overrides: Dotted keys of the scene with other values, as a mapping or as
-            ``key=value`` texts.
-        drives: Maps that replace the scene's drive references of these names.
-        controller: Drives the motors in place of the scene's own law, once a control
-            period on what the sensors of the scene read; limits of the motors,
-            payload, disturbances and start stay the scene's. It reads the link angle
-            where ``controller.feedback`` is ``link``, the output torque where
-            ``sensors.torque`` is there.
-        known_drives: Drive maps that the controller assumes for some joints; for the
-            others it assumes the simulated drive.
-        known_arm: What it takes the arm for, for instance
-            :class:`swgjoint.control.pinocchio_arm.PinocchioArm`, whose torques its
-            feed-forward then has; None: the scene's arm, with its payload if known.
-        name: What recordings and progress call the run; default: the scene's name.
-        recording: File that receives the recording for the viewer, like
-            :meth:`SceneRun.to_rerun` but begun while the steps are taken; a recording
-            that cannot be written is an ``OutputWarning``; the run is still returned.
-        progress: Called with the steps done.
+        scene: A scene, the path of a scene file, or the name of a bundled scene.
+        overrides: New values for dotted keys of the scene, as a mapping or as
+            ``key=value`` strings.
+        drives: Maps that replace the drive references of the scene, by reference.
+        controller: Controller that replaces the control law of the scene. It acts once
+            per control period on the sensor readings of the scene. Motor limits,
+            payload, disturbances and initial state remain those of the scene. It reads
+            the link angle if ``controller.feedback`` is ``link``, and the output torque
+            if the scene has ``sensors.torque``.
+        known_drives: Drive maps that the controller assumes, by joint; it assumes the
+            simulated drive for all other joints.
+        known_arm: Arm model that the controller assumes, for instance
+            :class:`swgjoint.control.pinocchio_arm.PinocchioArm`; its torques enter the
+            feed-forward. None for the arm of the scene, with its payload if known.
+        name: Name of the run in recordings and progress; None for the scene's name.
+        recording: File for the viewer recording, which is written during the
+            simulation; :meth:`SceneRun.to_rerun` writes it afterwards. If it cannot be
+            written, an ``OutputWarning`` is given and the run is still returned.
+        progress: Called with the number of completed steps.
+
+    Returns:
+        The recorded run.
 
     Raises:
-        InputError: If the scene, a drive or a joint cannot be used.
-        ComputationError: If the start is out of balance or the motion diverges.
+        InputError: If the scene, a drive or a joint cannot be used, or if
+            ``known_drives`` or ``known_arm`` is given without a controller.
+        ComputationError: If the initial state is not an equilibrium or the motion
+            diverges.
     """
     assembly, loop = prepare_scene(
         scene,

@@ -1,8 +1,9 @@
 """Quantified validity of the results of a run.
 
-Three things limit a figure: the map (its level, the torque that it covers, what its
-fit dropped), the orders that the step leaves out, and the step itself. The last is
-measured: the same motion with the same orders at half the step.
+Three things limit the accuracy of a figure: the map (its level, its torque range and
+the harmonics that its fit dropped), the orders that the step leaves out, and the
+integration error of the step. The integration error is estimated by a second run of the
+same motion with the same orders at half the step.
 """
 
 from __future__ import annotations
@@ -29,23 +30,25 @@ STEP_KEYS = {
     "transmission_error_arcmin": ("transmission_error_arcmin", "pp"),
     "torsion_arcmin": ("torsion_arcmin", "mean"),
 }
-"""Figures whose change is given, by their place in the metrics of a joint."""
+"""Path of each reported figure in the metrics of a joint."""
 OFF_COMMAND, LAG = 0.1, 3.0
-"""Distance of a link from its command that is said [deg], where it is also that many
-times the transmission error of its drive."""
+"""A warning is given if a link deviates from its command by more than ``OFF_COMMAND``
+[deg] and by more than ``LAG`` times the transmission error of its drive [-]."""
 MAX_STEPS = 400_000
-"""Of the finer run: some seconds."""
+"""Largest number of steps of the finer run, which takes a few seconds."""
 
 
 def step_error(run: Run) -> dict[str, Any]:
     """Change of the figures of a run when its step is halved.
 
-    The finer run keeps the orders of the coarser one: what the step leaves out is
-    listed as ``unresolved``, with its amplitude, and is no error of the integration.
+    The finer run has the same orders as the coarser one, so that the change contains
+    only the integration error. Orders that the step leaves out are listed separately
+    under ``unresolved`` with their amplitudes.
 
     Returns:
-        ``step_s`` of the finer run and ``joints``, by joint the absolute change under
-        :data:`STEP_KEYS`; ``reason`` instead of ``joints`` where it was not run.
+        ``step_s``, the step of the finer run [s], and ``joints``, the absolute change
+        of each figure of :data:`STEP_KEYS` by joint; ``reason`` instead of ``joints``
+        if the finer run was not made.
     """
     step = 0.5 * run.assembly.step
     steps = run.assembly.scene.simulation.duration_s / step
@@ -74,7 +77,7 @@ def step_error(run: Run) -> dict[str, Any]:
 
 
 def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
-    """The scene with drives that hold the orders of the run and no others."""
+    """The scene with drives that have exactly the orders of the run."""
     scene = run.assembly.scene
     sections, drives = {}, {}
     for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
@@ -95,38 +98,39 @@ def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
 def map_error(drive: DriveMap) -> list[str]:
     """Known errors of a map, one line each; empty if none is known."""
     info = drive.info
-    found, reason = map_validation(drive)
-    lines = [reason or ""] if found is None else [validation_summary(found)]
-    if found is not None and found.reason:
-        lines.append(f"sampling ended before its goal: {found.reason}")
+    validation, reason = map_validation(drive)
+    lines = [reason or ""] if validation is None else [validation_summary(validation)]
+    if validation is not None and validation.reason:
+        lines.append(f"sampling ended before its goal: {validation.reason}")
     perfect = info.get("perfect_teeth")
     source = perfect if isinstance(perfect, Mapping) else info
-    told = _numbers(source.get("energy_check"), "relative")
-    if told is not None:
+    values = _numbers(source.get("energy_check"), "relative")
+    if values is not None:
         lines.append(
-            "input torque of the finite elements at the samples, which the fit has not"
-            f" seen: {100.0 * told[0]:.2g} % of its ripple missed"
+            "the map deviates from the input torque of the finite elements, which the"
+            f" fit did not use, by up to {100.0 * values[0]:.2g} % of its ripple"
         )
     keys = ("threshold", "torque_Nm", "kinematic_error_rad")
-    told = _numbers(source.get("residual"), *keys)
-    if told is not None:
+    values = _numbers(source.get("residual"), *keys)
+    if values is not None:
         lines.append(
-            f"harmonics below {100.0 * told[0]:.2g} % dropped: {told[1]:.2g} N·m,"
-            f" {told[2] / arcmin:.2g} arcmin"
+            f"harmonics below {100.0 * values[0]:.2g} % are omitted; residual"
+            f" {values[1]:.2g} N·m, {values[2] / arcmin:.2g} arcmin"
         )
     stiffness = info.get("stiffness_range_Nm_rad")
     if isinstance(stiffness, list | tuple) and len(stiffness) == 2:
-        told = _numbers(dict(enumerate(stiffness)), 0, 1)
-        if told is not None:
-            low, high = told
+        values = _numbers(dict(enumerate(stiffness)), 0, 1)
+        if values is not None:
+            low, high = values
             lines.append(
-                f"tangent stiffness {low:.4g} to {high:.4g} N·m/rad in its range"
+                f"tangent stiffness {low:.4g} to {high:.4g} N·m/rad within the torque"
+                " range of the map"
             )
     return lines
 
 
 def _numbers(table: Any, *keys: Any) -> list[float] | None:
-    """Values of a table that came with a map; None where one is no finite number."""
+    """Values of a table in a map; None unless all are finite numbers."""
     values = [table.get(key) for key in keys] if isinstance(table, Mapping) else []
     numbers = [
         float(one)
@@ -139,11 +143,11 @@ def _numbers(table: Any, *keys: Any) -> list[float] | None:
 def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     """Warnings about the results of a run, one line each.
 
-    What takes a run out of its model is in its ``reasons``, see
+    Conditions that invalidate a run are in its ``reasons`` instead, see
     :mod:`swgjoint.sim.figures.verdict`.
 
     Args:
-        joints: Figures of the joints, see :meth:`swgjoint.sim.run.Run.metrics`.
+        joints: Figures by joint, see :meth:`swgjoint.sim.run.Run.metrics`.
     """
     lines = []
     for name, joint in joints.items():
@@ -151,8 +155,8 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
         if doubt is not None and joint["ripple_valid"]:
             low, high = joint["map_difference"]["torque_range_Nm"]
             lines.append(
-                f"{name}: torque ripple uncertain from {low:.4g} to {high:.4g} N·m: the"
-                f" map of {joint['drive']} {doubt}"
+                f"{name}: torque ripple is uncertain from {low:.4g} to {high:.4g} N·m:"
+                f" the map of {joint['drive']} {doubt}"
             )
         if joint["ripple_is_lower_bound"] and (carries := joint["resolving"]):
             lines.append(
@@ -166,23 +170,24 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
         share = (abs(drive["mean"]) + drive["pp"]) * arcmin / deg
         if off is not None and off > max(OFF_COMMAND, LAG * share):
             lines.append(
-                f"{name}: the link is up to {off:.2g} deg off its command at constant"
-                f" speed; the drive accounts for {60.0 * share:.2g} arcmin, the"
-                " controller for the rest (friction, gains, motor limits)"
+                f"{name}: the link deviates from its command by up to {off:.2g} deg at"
+                f" constant speed; the drive causes {60.0 * share:.2g} arcmin of this,"
+                " the control loop the rest (friction, gains, motor limits)"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:
             lines.append(
-                f"{name}: above its ratings: cubed mean"
-                f" {ratings['cubed_mean_Nm']:.3g} of {ratings['rated_Nm']:.3g} N·m,"
-                f" peak {ratings['peak_Nm']:.3g}"
-                f" of {ratings['repeated_peak_Nm']:.3g} N·m"
+                f"{name}: ratings exceeded: cubic mean torque"
+                f" {ratings['cubed_mean_Nm']:.3g} N·m (rated"
+                f" {ratings['rated_Nm']:.3g} N·m), peak torque"
+                f" {ratings['peak_Nm']:.3g} N·m (repeated peak"
+                f" {ratings['repeated_peak_Nm']:.3g} N·m)"
             )
     return lines
 
 
 def omissions_of(run: Run) -> list[str]:
-    """What the model leaves out and why, joints of the same together."""
+    """Parts that the model leaves out and why, one line per part and reason."""
     joints: dict[tuple[str, str], list[str]] = {}
     for item in run.contains["left_out"]:
         joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
@@ -194,6 +199,14 @@ def omissions_of(run: Run) -> list[str]:
 
 
 def left_out_share(run: Run, j: int) -> float:
-    """Torque of the orders left out, rated load, root of summed squares [N·m]."""
+    """Torque amplitude of the orders that the step leaves out, at rated torque [N·m].
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+
+    Returns:
+        Root of the sum of the squared amplitudes [N·m].
+    """
     left = run.assembly.transmissions[j].attached.unresolved
     return float(np.sqrt(sum(item.torque**2 for item in left)))

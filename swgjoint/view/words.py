@@ -1,4 +1,4 @@
-"""Keys of results as words with a unit, numbers as people read them."""
+"""Format the keys and values of results for display."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """Split a spec-sheet key into its words and its unit.
+    """Split a key of a spec sheet into its name in words and its unit.
 
     >>> words("lost_motion_arcmin")
     ('lost motion', 'arcmin')
@@ -27,7 +27,7 @@ def words(key: str) -> tuple[str, str]:
 
 
 def format_figure(value: object) -> str:
-    """A figure with four digits, - for None, yes and no.
+    """Format a value: four significant digits, yes or no, a dash for None.
 
     >>> format_figure(0.123456), format_figure(None)
     ('0.1235', '-')
@@ -46,5 +46,5 @@ def format_figure(value: object) -> str:
 
 
 def short(joint: str) -> str:
-    """Name of a joint without the word joint at its end."""
+    """Name of a joint in words, without the suffix ``_joint``."""
     return joint.removesuffix("_joint").replace("_", " ") or joint

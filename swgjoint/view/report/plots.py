@@ -1,4 +1,4 @@
-"""Pictures of the report: one of a joint, with all runs in every panel."""
+"""Pictures of the report: one per joint, with all runs in every panel."""
 
 from __future__ import annotations
 
@@ -20,15 +20,22 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 _COLUMNS = 1500
-"""Pairs of smallest and largest value that a line keeps; more are not seen."""
+"""Number of minimum-maximum pairs per line; more are not visible at this size."""
 
 
 def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
-    """Torque, torsion, error over time; ripple, its orders, torque against torsion.
+    """Draw the torque, torsion, error and ripple of one joint.
+
+    The upper panels show the output torque, the torsion and the transmission error over
+    time. The lower panels show the torque ripple, its order spectrum, and the torque
+    over the torsion.
 
     Args:
         runs: Runs of one motion by name.
-        joint: Which joint.
+        joint: Name of the joint.
+
+    Returns:
+        The PNG file.
     """
     from matplotlib.figure import Figure
 
@@ -42,7 +49,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
         style: dict[str, Any] = {"color": color, "ls": dash, "lw": 0.9, "label": label}
         plot_over_time(axes[0, 0], run.time, run.output_torque[:, j], **style)
         if is_rigid(run) and len(runs) > 1:
-            continue  # lines at zero that would set the scale
+            continue  # its zero lines would only set the scale
         plot_over_time(axes[0, 1], run.time, run.torsion[:, j] / arcmin, **style)
         error = run.transmission_error[:, j] / arcmin
         plot_over_time(axes[0, 2], run.time, error, **style)
@@ -54,16 +61,16 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
     steady = first.time[first.steady][[0, -1]]
     for axis in axes[0]:
         axis.axvspan(*steady, color="0.94", zorder=0)
-        axis.set_xlabel("time [s]   (shaded: figures)")
+        axis.set_xlabel("time [s]   (shaded: used for the figures)")
         axis.margins(x=0)
     _label(axes[0, 0], "output torque", "[N·m]")
     _label(axes[0, 1], "torsion", "[arcmin]")
     _label(axes[0, 2], "transmission error", "output − ideal output [arcmin]")
     _label(axes[1, 0], "torque ripple, last half turn", "[% of rated torque]")
-    axes[1, 0].set_xlabel("turns of the input")
-    _label(axes[1, 1], "orders of the ripple", "amplitude [% of rated torque]")
-    axes[1, 1].set_xlabel("cycles per turn of the input")
-    _label(axes[1, 2], "torque against torsion (shaded time)", "output torque [N·m]")
+    axes[1, 0].set_xlabel("input turns")
+    _label(axes[1, 1], "order spectrum of the ripple", "amplitude [% of rated torque]")
+    axes[1, 1].set_xlabel("order [cycles per input turn]")
+    _label(axes[1, 2], "torque over torsion (shaded part)", "output torque [N·m]")
     axes[1, 2].set_xlabel("torsion [arcmin]")
     handles, names = axes[0, 0].get_legend_handles_labels()
     if any(names):
@@ -77,19 +84,30 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
 def plot_over_time(
     axis: Any, time: NDArray[np.float64], values: NDArray[np.float64], **style: Any
 ) -> None:
-    """A line that keeps every peak and has no more points than the picture shows."""
+    """Draw a line that keeps every peak, with as many points as the picture can show.
+
+    Args:
+        axis: Axes to draw on.
+        time: Increasing times [s]. Shape (n,).
+        values: Values of the line. Shape (n,).
+        style: Keyword arguments of ``axis.plot``.
+    """
     axis.plot(*envelope(time, values), **style)
 
 
 def envelope(
     x: NDArray[np.float64], y: NDArray[np.float64], columns: int = _COLUMNS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest value of every piece of a signal, in their order.
+    """Reduce a signal to the minimum and maximum of every piece, in order.
 
     Args:
-        x: Increasing. Shape (n,).
-        y: Shape (n,).
-        columns: Pieces; a signal of twice as many samples or fewer stays as it is.
+        x: Increasing abscissas. Shape (n,).
+        y: Values. Shape (n,).
+        columns: Number of pieces of equal length; a signal of up to twice as many
+            samples is returned unchanged.
+
+    Returns:
+        Abscissas and values of the kept samples.
     """
     if y.size <= 2 * columns:
         return x, y

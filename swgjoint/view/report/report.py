@@ -1,4 +1,4 @@
-"""Runs as one HTML file that needs nothing else: no script, no address, no font."""
+"""Write runs as one self-contained HTML file, without scripts, links or fonts."""
 
 from __future__ import annotations
 
@@ -42,18 +42,22 @@ def write_report(
     check_step: bool = True,
     progress: Progress = silent,
 ) -> Path:
-    """Write runs of one motion as a self-contained page, whole or not at all.
+    """Write runs of one motion as a self-contained page; the write is atomic.
 
-    Comparison, validity with an error estimate of every result, plots of every joint,
-    spec sheet of every drive, settings of the scene and provenance.
+    The page contains a comparison of the runs, the validity of every run with an error
+    estimate of its figures, plots of every joint, the spec sheet of every drive, the
+    settings of the scenes, and the provenance of the results.
 
     Args:
-        runs: Runs by the name that the report shows; a lone run may be called ``""``.
+        runs: Runs by displayed name; an empty name is replaced by that of the run.
         path: File to write; its folder must exist.
-        summary: Table on top; that of the runs if None.
-        pictures: PNG below it by title.
-        check_step: Whether every run is repeated at half its step.
-        progress: Called with what is done.
+        summary: Table at the top; None for :func:`summary_table` of the runs.
+        pictures: PNG images below that table, by title.
+        check_step: Whether to repeat every run at half its step.
+        progress: Called with the number of completed sections.
+
+    Returns:
+        The path.
     """
     runs = {label or run.name: run for label, run in runs.items()}
     first = next(iter(runs.values()))
@@ -122,15 +126,18 @@ def write_tables(
     pictures: Mapping[str, bytes],
     settings: Mapping[str, str],
 ) -> Path:
-    """Write results that are no runs of a scene as a page of the same kind.
+    """Write results other than scene runs as a page of the same form.
 
     Args:
         path: File to write; its folder must exist.
-        title: Of the page.
-        description: Below the title.
-        tables: The first is the summary, the others follow the pictures.
-        pictures: PNG by title.
-        settings: Texts by title.
+        title: Title of the page.
+        description: Text below the title.
+        tables: Summary table, followed by the tables that appear below the pictures.
+        pictures: PNG images by title.
+        settings: Preformatted texts of the settings section, by title.
+
+    Returns:
+        The path.
     """
     return _write_page(
         path,
@@ -146,7 +153,7 @@ def write_tables(
 def _write_page(
     path: str | Path, *, pictures: Mapping[str, bytes], **sections: Any
 ) -> Path:
-    """Fill the template; sections that are not given are left out."""
+    """Fill the template; sections without content are omitted."""
     lists = ("alerts", "tables", "labels", "joints", "sheets")
     none: dict[str, Any] = dict.fromkeys(lists, ())
     page = _template().render(
@@ -163,14 +170,14 @@ def _write_page(
 
 
 def _drives(runs: Mapping[str, Run]) -> list[DriveMap]:
-    """Drives of all runs, each once."""
-    found: dict[tuple[str, str, str], DriveMap] = {}
+    """Distinct drives of all runs."""
+    drives: dict[tuple[str, str, str], DriveMap] = {}
     for run in runs.values():
         for transmission in run.assembly.transmissions:
             drive = transmission.drive
             key = (drive.name, drive.level, str(drive.info.get("design_hash")))
-            found.setdefault(key, drive)
-    return list(found.values())
+            drives.setdefault(key, drive)
+    return list(drives.values())
 
 
 def _template() -> Any:

@@ -1,4 +1,4 @@
-"""Tables of the report."""
+"""Tables of the HTML report."""
 
 from __future__ import annotations
 
@@ -38,31 +38,34 @@ PACKAGES = ("mujoco", "numpy", "scipy", "scikit-fem", "rerun-sdk", "matplotlib")
 
 @dataclass(frozen=True)
 class Cell:
-    """One figure of a table, as text; ``mark`` is ``good``, ``bad`` or ``text``."""
+    """One cell of a table."""
 
     text: str
     mark: str = ""
+    """``good`` or ``bad`` for the colour, ``text`` for left alignment, or empty."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Header of (name, unit), rows of cells, remarks below."""
+    """A table of the report."""
 
     header: Sequence[tuple[str, str]]
+    """Name and unit of every column."""
     rows: Sequence[Sequence[Cell]]
     title: str = ""
     notes: Sequence[str] = ()
+    """Remarks below the table."""
 
 
 WINDOWS = {
-    "constant speed": "at the constant-speed part of the motion",
+    "constant speed": "in the constant-speed part of the motion",
     "motion": "over the whole motion",
 }
-"""What figures are taken over."""
+"""Part of the motion from which the figures are computed."""
 
 
 def alerts(runs: Mapping[str, Run]) -> list[str]:
-    """Why runs are not valid, one line a reason."""
+    """Reasons why runs are not valid, one line per reason."""
     return [
         f"{label}: {NOT_VALID}: {reason}"
         for label, run in runs.items()
@@ -71,7 +74,7 @@ def alerts(runs: Mapping[str, Run]) -> list[str]:
 
 
 def summary_table(runs: Mapping[str, Run]) -> Table:
-    """One line a run: worst joint and tool."""
+    """Figures of the worst joint and of the tool, one row per run."""
     rows, window = [], ""
     for label, run in runs.items():
         metrics = run.metrics()
@@ -106,14 +109,14 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
             ("ripple", "% of rated, pp"),
             ("torsion, mean", "arcmin"),
             ("transmission error", "arcmin, pp"),
-            ("tool off its path", "mm, rms"),
+            ("tool path error", "mm, rms"),
             ("peak torque", "of repeated peak"),
             ("within ratings", ""),
-            ("speed", "times real time"),
+            ("simulation speed", "times real time"),
         ],
         rows=rows,
         notes=[
-            f"Largest of all joints, {WINDOWS[window]}.",
+            f"Largest value of all joints, {WINDOWS[window]}.",
             *_legend(
                 joint
                 for run in runs.values()
@@ -124,28 +127,39 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
 
 
 def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
-    """Largest ripple of some joints: a dash for none, > where orders are left out.
+    """Largest ripple of several joints, with its marks.
 
-    ~ and ! where the map of a joint among them differs from unseen solves.
+    The text is a dash if no joint has a ripple figure. ``>`` marks a lower bound, for
+    which the step leaves out important orders. ``~`` and ``!`` mark the largest
+    difference of the maps of these joints from unseen solves.
+
+    Args:
+        joints: Figures of the joints.
+        key: Key of the ripple figure.
     """
-    told = [joint for joint in joints if joint["ripple_missing"] is None]
-    if not told:
+    known = [joint for joint in joints if joint["ripple_missing"] is None]
+    if not known:
         return Cell("-")
-    most = max(told, key=lambda joint: float(joint[key]))
+    most = max(known, key=lambda joint: float(joint[key]))
     bound = "> " if most["ripple_is_lower_bound"] else ""
-    sign = worst([joint_mark(joint) for joint in told])
+    sign = worst([joint_mark(joint) for joint in known])
     text = f"{sign} {bound}{format_figure(most[key])}".strip()
     return Cell(text, "bad" if bound or sign else "")
 
 
 def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
-    """Peak to peak of a transmission error, marked as :func:`ripple_cell` does."""
+    """Peak-to-peak transmission error, marked like :func:`ripple_cell`.
+
+    Args:
+        joints: Figures of the joints whose maps determine the mark.
+        value: Peak-to-peak transmission error [arcmin].
+    """
     sign = worst([error_mark(joint, value) for joint in joints])
     return Cell(f"{sign} {format_figure(value)}".strip(), "bad" if sign else "")
 
 
 def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
-    """What the marks of figures mean; none without marks."""
+    """Legend of the marks of the figures; empty without marks."""
     marks = set()
     for joint in joints:
         error = joint["transmission_error_arcmin"]["pp"]
@@ -154,7 +168,13 @@ def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
-    """What limits the figures of one run, and their change at half the step."""
+    """Template section: limits of the figures of a run, their change at half the step.
+
+    Args:
+        label: Name of the run.
+        run: The run.
+        step: Result of ``swgjoint.view.validity.step_error``; None if not computed.
+    """
     simulation = run.assembly.scene.simulation
     metrics = run.metrics()
     limits = [*metrics["reasons"], *warnings_of(metrics["joints"])]
@@ -167,7 +187,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
         )
     )
     if step is not None and "reason" in step:
-        lines.append(Cell(f"change at half the step {step['reason']}"))
+        lines.append(Cell(f"change at half the step: {step['reason']}"))
     lines += [Cell(text) for text in omissions_of(run)]
     changes = (step or {}).get("joints", {})
     rows = []
@@ -202,17 +222,17 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
             ("level", ""),
             ("drive (source)", ""),
             ("map covers", "N·m"),
-            ("orders resolved up to", "per input turn"),
+            ("highest resolved order", "per input turn"),
             ("orders left out", "per input turn"),
-            ("their torque", "N·m, rated load"),
+            ("torque of these orders", "N·m, at rated torque"),
             ("ripple rms ±", "%"),
             ("transm. error ±", "arcmin"),
             ("torsion ±", "arcmin"),
         ],
         rows=rows,
         notes=[
-            "± is the change when the step is halved and the same orders are kept; the"
-            " error of the step is up to twice that."
+            "± is the change when the step is halved and the orders are unchanged. The"
+            " error due to the step is up to twice this change."
         ],
     )
     return {"title": label, "lines": lines, "table": table}
@@ -254,27 +274,27 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
         header=[
             ("", ""),
             ("torsion, mean", "arcmin"),
-            ("pp", "arcmin"),
+            ("torsion, pp", "arcmin"),
             ("transm. error, mean", "arcmin"),
-            ("pp", "arcmin"),
+            ("transm. error, pp", "arcmin"),
             ("ripple rms", "% of rated"),
-            ("pp", "% of rated"),
+            ("ripple, pp", "% of rated"),
             ("strongest orders", "per input turn"),
             ("peak torque", "N·m"),
-            ("cubed mean", "N·m"),
+            ("cubic mean torque", "N·m"),
             ("input speed", "rpm"),
             ("within ratings", ""),
         ],
         rows=rows,
         notes=[
-            "* no order of this joint's drive: vibration or another joint.",
+            "* no order of this joint's drive: vibration, modulation or another joint.",
             *_legend(run.metrics()["joints"][joint] for run in runs.values()),
         ],
     )
 
 
 def sheet_table(drive: DriveMap) -> dict[str, Any]:
-    """Spec sheet of one drive, compared with the values that its maker states."""
+    """Template section: spec sheet of one drive, with the manufacturer's values."""
     sheet = measure_spec(drive)
     stated = drive.info.get("stated")
     stated = stated if isinstance(stated, Mapping) else {}
@@ -302,7 +322,7 @@ def sheet_table(drive: DriveMap) -> dict[str, Any]:
     low, high = label["torque_range_Nm"]
     source = (
         f"Level {label['level']}, {low:.4g} to {high:.4g} N·m"
-        f"{'; the loop leaves that range' if label['beyond_range'] else ''}; ratings:"
+        f"{'; the loop exceeds this range' if label['beyond_range'] else ''}; ratings:"
         f" {label['ratings']}; hysteresis: {label['hysteresis']}; friction:"
         f" {label['friction']}; {_validated(drive)}."
     )
@@ -313,8 +333,8 @@ def sheet_table(drive: DriveMap) -> dict[str, Any]:
         "table": Table(
             header=[
                 ("", ""),
-                ("measured", ""),
-                *([("stated", "")] if stated else []),
+                ("map", ""),
+                *([("manufacturer", "")] if stated else []),
                 ("", ""),
                 ("", ""),
             ],
@@ -324,13 +344,13 @@ def sheet_table(drive: DriveMap) -> dict[str, Any]:
 
 
 def _validated(drive: DriveMap) -> str:
-    """The validation of a map in one phrase."""
-    found, _ = map_validation(drive)
-    return NOT_VALIDATED if found is None else validation_summary(found)
+    """Result of the validation of a map in one phrase."""
+    validation, _ = map_validation(drive)
+    return NOT_VALIDATED if validation is None else validation_summary(validation)
 
 
 def provenance_table(drives: Sequence[DriveMap]) -> Table:
-    """Where every map comes from and what is known of its error."""
+    """Origin and known errors of every map."""
     rows = []
     for drive in drives:
         info = drive.info
@@ -354,12 +374,12 @@ def provenance_table(drives: Sequence[DriveMap]) -> Table:
                 Cell("; ".join(map_error(drive)), "text"),
             ]
         )
-    names = ("drive", "level", "map from", "design hash", "ratings", "error of the map")
+    names = ("drive", "level", "origin", "design hash", "ratings", "known errors")
     return Table(title="Maps", header=[(name, "") for name in names], rows=rows)
 
 
 def versions_table() -> Table:
-    """Versions of the packages that made the report."""
+    """Versions of Python, swgjoint and the packages in :data:`PACKAGES`."""
     versions = {"python": platform.python_version(), "swgjoint": __version__}
     for name in PACKAGES:
         versions[name] = metadata.version(name)
@@ -375,5 +395,5 @@ def _cells(*values: Any) -> list[Cell]:
 
 
 def inline_picture(data: bytes) -> str:
-    """A picture as text inside the page."""
+    """Base64 text of a picture that is embedded in the page."""
     return base64.b64encode(data).decode("ascii")
