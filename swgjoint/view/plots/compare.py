@@ -1,4 +1,4 @@
-"""A comparison as a picture and as a table of the report."""
+"""Comparison of drives as a picture and as a table of the report."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ HEADER = {
     "transmission_error_ripple_arcmin": ("error ripple", "arcmin, pp"),
     "transmission_error_arcmin": ("transm. error", "arcmin, pp"),
     "torsion_arcmin": ("torsion", "arcmin, mean"),
-    "tool_path_rms_mm": ("tool off path", "mm, rms"),
+    "tool_path_rms_mm": ("tool path error", "mm, rms"),
     "K1_Nm_rad": ("K1", "N·m/rad"),
     "von_mises_MPa": ("von Mises", "MPa"),
     "fatigue_safety_factor": ("fatigue safety", ""),
     "peak_torque_of_rating": ("peak", "of rating"),
     "wall_s": ("computed in", "s"),
 }
-"""Figures of a row as people read them: name and unit."""
+"""Displayed name and unit of the figures of a row."""
 JUDGED_BY = {
     "ripple_rms_percent": tuple(QUANTITIES),
     "ripple_pp_percent": tuple(QUANTITIES),
     "transmission_error_ripple_arcmin": ("output_error",),
 }
-"""Quantities of the validation of a map that a figure depends on."""
+"""Quantities of the map validation on which a figure depends."""
 _ERROR = "transmission_error_arcmin"
 PANELS = (
     "ripple_rms_percent",
@@ -47,13 +47,18 @@ PANELS = (
     "peak_torque_of_rating",
 )
 _WIDE = 30.0
-"""From this ratio of the largest to the smallest an axis is logarithmic."""
+"""Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 
 def cell(row: Mapping[str, Any], key: str) -> str:
-    """A figure as text: a dash for none, > before a ripple that lacks orders.
+    """Format a figure with its marks.
 
-    ~ and ! where the map differs from unseen solves.
+    The text is a dash if a ripple has no figure. ``>`` marks a ripple that is a lower
+    bound. ``~`` and ``!`` mark the difference of the map from unseen solves.
+
+    Args:
+        row: JSON object of a row.
+        key: Key of the figure.
     """
     if key in RIPPLE and row["ripple_missing"]:
         return "-"
@@ -66,7 +71,7 @@ def cell(row: Mapping[str, Any], key: str) -> str:
 
 
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
-    """The figures that at least one row knows."""
+    """Displayed name and unit of the figures that at least one row has, by key."""
     return {
         key: title
         for key, title in HEADER.items()
@@ -77,7 +82,12 @@ def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
 def comparison_table(
     rows: Sequence[Compared], spec: Mapping[str, float] | None = None
 ) -> Table:
-    """One line an argument; what misses its limit is marked."""
+    """Table with one row per argument; figures that miss their limit are marked.
+
+    Args:
+        rows: Results of the comparison.
+        spec: Limits by figure; None without a spec.
+    """
     shown_keys = columns(rows)
     verdict = [("spec", "")] if spec else []
     lines = []
@@ -98,9 +108,9 @@ def comparison_table(
         header=[("", ""), ("level", ""), *shown_keys.values(), *verdict],
         rows=lines,
         notes=[
-            "Worst joint of the scene; K1 and von Mises stress (mean over a pitch of"
-            " the largest, at rated torque) are those of the drive, no K1 at a level"
-            " without compliance.",
+            "Figures are those of the worst joint of the scene. K1 and the von Mises"
+            " stress (largest stress at rated torque, averaged over a pitch) are those"
+            " of the drive. Levels without compliance have no K1.",
             *([f"Spec: {', '.join(limits)}."] if limits else []),
             *left_out_notes(rows),
         ],
@@ -108,27 +118,34 @@ def comparison_table(
 
 
 def left_out_notes(rows: Sequence[Compared]) -> list[str]:
-    """Where ripple says less than it seems: orders beyond the step, doubtful maps."""
-    found: dict[tuple[str, ...], list[str]] = {}
+    """Notes on incomplete ripple: orders that the step leaves out, uncertain maps."""
+    by_joints: dict[tuple[str, ...], list[str]] = {}
     for row in rows:
-        found.setdefault(row.strongest_order_left_out, []).append(row.argument)
+        by_joints.setdefault(row.strongest_order_left_out, []).append(row.argument)
     notes = [
         f"too fast for the step, strongest order left out: {', '.join(joints)}"
         + ("" if len(names) == len(rows) else f" ({', '.join(names)})")
-        for joints, names in found.items()
+        for joints, names in by_joints.items()
         if joints
     ]
     marks = set()
     for row in rows:
-        told = row.to_json()
-        marks |= {joint_mark(told), error_mark(told, row.transmission_error_arcmin)}
+        figures = row.to_json()
+        error = row.transmission_error_arcmin
+        marks |= {joint_mark(figures), error_mark(figures, error)}
     return [*notes, mark_legend(marks)] if marks - {""} else notes
 
 
 def comparison_picture(
     rows: Sequence[Compared], scene: str, spec: Mapping[str, float] | None = None
 ) -> bytes:
-    """PNG: bars of every figure, one panel each, limits of the spec as lines."""
+    """Draw one bar chart per figure, with the limits of the spec as lines, as PNG.
+
+    Args:
+        rows: Results of the comparison.
+        scene: Name of the scene.
+        spec: Limits by figure; None without a spec.
+    """
     from matplotlib.figure import Figure
 
     panels = [
@@ -159,7 +176,7 @@ def _bars(
     colors: Sequence[tuple[float, ...]],
     limit: float | None,
 ) -> None:
-    """One figure of all rows, each bar with its value."""
+    """Draw one figure of all rows, with its value at every bar."""
     values = [row.figure(key) for row in rows]
     heights = [value or 0.0 for value in values]
     seen = [value for value in heights if value > 0.0]
@@ -180,8 +197,10 @@ def _bars(
     if limit is not None:
         ax.axvline(limit, color="tab:red", ls="--", lw=1.2)
     name, unit = HEADER[key]
-    better = "more" if key in LOWER else "less"
+    better = "higher" if key in LOWER else "lower"
     ax.set_title(f"{name}{f' [{unit}]' if unit else ''}", fontsize="small")
-    ax.set_xlabel(f"{better} is better{', log' if wide else ''}", fontsize="x-small")
+    ax.set_xlabel(
+        f"{better} is better{', log scale' if wide else ''}", fontsize="x-small"
+    )
     ax.tick_params(labelsize="small")
     ax.tick_params(axis="x", which="minor", labelbottom=False)

@@ -19,15 +19,17 @@ if TYPE_CHECKING:
 
 _FLEXSPLINE, _CIRCULAR_SPLINE, _WAVE_GENERATOR = "tab:blue", "tab:red", "tab:green"
 _FOLLOWS = 0.02
-"""A rim is drawn along an outline whose length is within this of the bore's."""
+"""The rim is drawn along an outline whose length differs from that of the bore by less
+than this fraction [-]."""
 
 
 def design_picture(design: Design) -> bytes:
-    """PNG: teeth in mesh at a lobe, exaggerated wave generator, whole drive.
+    """Draw teeth in mesh at a lobe, the wave generator enlarged, and the drive as PNG.
 
     The flexspline is drawn with rigid teeth on the neutral line that follows the wave
-    generator; where the outline is much shorter than the bore (rollers) as a ring
-    deflected by w_0 cos(lobes phi). No forces, no elastic contact.
+    generator. If the outline of the wave generator is much shorter than the bore, as
+    with rollers, the neutral line is that of a ring deflected by w_0 cos(lobes phi).
+    The picture shows neither forces nor elastic contact.
     """
     from matplotlib.figure import Figure
 
@@ -58,13 +60,13 @@ def _summary(design: Design) -> str:
 
 
 def _flank(profile: ToothProfile, count: int) -> Array:
-    """One tooth from root to root, counter-clockwise for an external one (n, 2)."""
+    """One tooth from root to root, counter-clockwise if it is external (n, 2) [m]."""
     right, _, _ = profile.evaluate(np.linspace(0.0, profile.stations[-1], count))
     return np.concatenate([right[::-1], right[1:] * np.array([-1.0, 1.0])])
 
 
 def _flexspline(design: Design, theta: Array) -> tuple[Array, Array]:
-    """Points of the neutral line (n, 2) and rotations (n,) of teeth at rim angles."""
+    """Points (n, 2) [m] and rotations (n,) [rad] of the neutral line at rim angles."""
     bore = 2.0 * np.pi * design.flexspline_inner_radius
     if abs(wave_generator(design).perimeter / bore - 1.0) < _FOLLOWS:
         pose = neutral_line(design).pose(theta)
@@ -80,7 +82,7 @@ def _flexspline(design: Design, theta: Array) -> tuple[Array, Array]:
 
 
 def _teeth(design: Design, theta: Array, count: int) -> Array:
-    """Flexspline teeth at rim angles theta (n, points, 2) [m]."""
+    """Outlines of the flexspline teeth at rim angles theta (n, points, 2) [m]."""
     tooth = _flank(tooth_profile(design, "flexspline"), count)
     r = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
     point, angle = _flexspline(design, theta)
@@ -88,21 +90,21 @@ def _teeth(design: Design, theta: Array, count: int) -> Array:
 
 
 def _turned(points: Array, angle: Array) -> Array:
-    """Points (n, 2) turned by every angle (k,), counter-clockwise (k, n, 2)."""
+    """Points (n, 2) rotated counter-clockwise by every angle (k,), shape (k, n, 2)."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = points.T
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def _spaces(design: Design, which: Array, count: int) -> Array:
-    """Teeth of the circular spline either side of space 0 on +y (n, points, 2) [m]."""
+    """Teeth of the circular spline (n, points, 2) [m]; space 0 is on the +y axis."""
     tooth = _flank(tooth_profile(design, "circular_spline"), count)
     pitch = 2.0 * np.pi / design.drive.teeth_circular_spline
     return _turned(tooth, (which + 0.5) * pitch)
 
 
 def _mesh(ax: Any, design: Design) -> None:
-    """Some teeth of both members around the lobe, wave generator and bore."""
+    """Draw the teeth of both members near the lobe, the bore and the wave generator."""
     pitch = 2.0 * np.pi / design.drive.teeth_flexspline
     which = np.arange(-5.0, 6.0)
     teeth = np.concatenate(_teeth(design, pitch * which, 160)) / mm
@@ -127,7 +129,7 @@ def _mesh(ax: Any, design: Design) -> None:
     for index, curve in enumerate(wave_generator(design).outlines(4001)):
         label = "wave generator" if index == 0 else None
         ax.plot(*(curve / mm).T, color=_WAVE_GENERATOR, lw=1.2, label=label)
-    # as wide as the teeth, less the outer halves of the last ones
+    # crop to the teeth without the outer halves of the last ones
     half = 4.4 * np.pi * design.drive.module_mm
     ax.set_xlim(-half, half)
     ax.set_ylim(float(bore[:, 1].min()) - 1.2 * design.drive.module_mm, top)
@@ -136,7 +138,7 @@ def _mesh(ax: Any, design: Design) -> None:
 
 
 def _exaggerated(ax: Any, design: Design) -> None:
-    """Outline with its distance to the undeformed bore enlarged."""
+    """Draw the outline with its distance from the undeformed bore enlarged."""
     bore, w0 = design.flexspline_inner_radius, lobe_height(design)
     factor = max(1.0, round(0.2 * bore / w0))
     turn = np.linspace(0.0, 2.0 * np.pi, 721)
@@ -145,7 +147,7 @@ def _exaggerated(ax: Any, design: Design) -> None:
     for index, curve in enumerate(wave_generator(design).outlines(2881)):
         r = np.hypot(*curve.T)
         stretched = bore + factor * (r - bore)
-        # what lies deep inside has no place in this picture
+        # hide points far inside the bore
         stretched[stretched < 0.25 * bore] = np.nan
         label = "wave generator" if index == 0 else None
         shown = curve * (stretched / r)[:, None] / mm
@@ -156,12 +158,12 @@ def _exaggerated(ax: Any, design: Design) -> None:
     r = np.hypot(*line.T)
     shown = line * ((bore + factor * (r - bore)) / r)[:, None] / mm
     ax.plot(*shown.T, color=_FLEXSPLINE, lw=0.9, label="bore of the flexspline")
-    ax.set_title(f"distances to the undeformed bore times {factor:g}")
+    ax.set_title(f"distances from the undeformed bore times {factor:g}")
     ax.legend(loc="center", fontsize=8)
 
 
 def _whole(ax: Any, design: Design) -> None:
-    """All teeth of both members and the wave generator, to scale."""
+    """Draw all teeth of both members and the wave generator to scale."""
     drive = design.drive
     count, circular_spline_teeth = drive.teeth_flexspline, drive.teeth_circular_spline
     theta = 2.0 * np.pi * np.arange(count) / count

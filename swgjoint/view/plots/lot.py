@@ -1,4 +1,4 @@
-"""Picture of a lot: how its figures are distributed, and the yield over the limit."""
+"""Picture of a lot: distribution of its figures, and yield over the limit."""
 
 from __future__ import annotations
 
@@ -17,17 +17,20 @@ _LABELS = {
 
 
 def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | None:
-    """PNG of a lot; None where no drive was solved.
+    """Draw the histogram of every figure, and the yield over its limit, as PNG.
 
     Args:
-        result: Of :func:`swgjoint.explore.lot.run_lot`.
+        result: Result of :func:`swgjoint.explore.lot.run_lot`.
         lower: Figures that a spec limits from below.
+
+    Returns:
+        The PNG file; None if no drive was solved.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import PercentFormatter
 
     rows = result["rows"]
-    keys = [key for key, found in result["figures"].items() if found is not None]
+    keys = [key for key, value in result["figures"].items() if value is not None]
     if not keys:
         return None
     figure = Figure(figsize=(1.0 + 4.2 * len(keys), 6.0), layout="constrained")
@@ -35,7 +38,7 @@ def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | No
     for (above, below), key in zip(axes.T, keys, strict=True):
         values = np.sort([row[key] for row in rows if row[key] is not None])
         above.hist(values, bins="auto", color="tab:blue", alpha=0.6)
-        # drives that cannot be solved meet no limit
+        # drives without a solution count as not meeting the limit
         part = np.arange(1, values.size + 1) / len(rows)
         if key in lower:
             part = part[::-1]
@@ -51,7 +54,7 @@ def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | No
             alone = result["yield"]["by_limit"][key]["part"]
             below.set_title(f"limit {limit:g}: {100 * alone:.1f} % pass", fontsize=10)
     axes[0][0].set_ylabel("drives")
-    axes[1][0].set_ylabel("yield at this limit alone")
+    axes[1][0].set_ylabel("yield for this limit alone")
     meaning = {
         "limit": "errors as large as the tolerances",
         "uniform": "errors drawn between zero and the tolerances",

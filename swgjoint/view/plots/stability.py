@@ -1,4 +1,4 @@
-"""The picture of the stability study."""
+"""Picture of the stability study."""
 
 from __future__ import annotations
 
@@ -26,11 +26,14 @@ _SCHEMES = {
 
 
 def stability_picture(rows: Sequence[StabilityRow], *, scheme: str, free: str) -> bytes:
-    """PNG: outcomes by situation, sub-steps, numerical damping, error, free running.
+    """Draw the results of the stability study as PNG.
+
+    Panels: share of the outcomes by scheme and group, number of sub-steps, numerical
+    damping ratio, error of the link, and energy change of the long free runs.
 
     Args:
-        rows: Of the study.
-        scheme: That of the joint; the others are there for comparison.
+        rows: Rows of the study.
+        scheme: Scheme that the joint uses; the others are drawn for comparison.
         free: Group of the long free runs.
     """
     from matplotlib.figure import Figure
@@ -48,15 +51,15 @@ def stability_picture(rows: Sequence[StabilityRow], *, scheme: str, free: str) -
 
 
 def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Share of every outcome, one bar for a situation and scheme."""
+    """Share of every outcome, one bar per scheme and group."""
     names = list(dict.fromkeys((row.scheme, row.group) for row in rows))
     names.sort(key=lambda name: list(_SCHEMES).index(name[0]))
     left = [0.0] * len(names)
     for outcome in _COLOURS:
         share = []
         for name in names:
-            own = [r.outcome for r in rows if (r.scheme, r.group) == name]
-            share.append(100.0 * own.count(outcome) / len(own))
+            outcomes = [r.outcome for r in rows if (r.scheme, r.group) == name]
+            share.append(100.0 * outcomes.count(outcome) / len(outcomes))
         axis.barh(
             range(len(names)), share, left=left, color=_COLOURS[outcome], label=outcome
         )
@@ -73,7 +76,7 @@ def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """How many sub-steps the grid takes."""
+    """Cumulative share of the runs over the number of sub-steps."""
     for step in sorted({row.step_s for row in rows}):
         parts = sorted(row.sub_steps or 100 for row in rows if row.step_s == step)
         share = [100.0 * (k + 1) / len(parts) for k in range(len(parts))]
@@ -82,14 +85,14 @@ def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
     axis.set_xscale("log")
     axis.set_xlim(0.9, 100)
     axis.set_ylim(0, 101)
-    axis.set_xlabel("sub-steps (beyond 64: refused)")
+    axis.set_xlabel("sub-steps (more than 64 are refused)")
     axis.set_ylabel("share of the runs [%]")
     axis.legend(fontsize="small", title="step")
     axis.grid(alpha=0.3)
 
 
 def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Numerical damping ratio of the steps, and damping ratio of the drives."""
+    """Numerical damping ratio of the schemes, and damping ratio of the drives."""
     for scheme, colour in _SCHEMES.items():
         if scheme == "discrete, never cut":
             continue
@@ -118,7 +121,7 @@ def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Largest error of the link while it turns freely."""
+    """Largest error of the link angle in the free runs."""
     for scheme, colour in _SCHEMES.items():
         points = [
             (row.phase_step, row.error)
@@ -131,17 +134,17 @@ def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel("step times torsion frequency [rad]")
-    axis.set_title("error of the link, free [arcmin]", fontsize=10)
+    axis.set_title("error of the link angle, free runs [arcmin]", fontsize=10)
     _legend(axis)
     axis.grid(alpha=0.3)
 
 
 def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Energy left after ten seconds."""
-    own = [row for row in rows if row.energy_balance is not None]
+    """Relative energy change at the end of the free runs of ten seconds."""
+    known = [row for row in rows if row.energy_balance is not None]
     axis.plot(
-        [row.phase_step for row in own],
-        [100.0 * (row.energy_balance or 0.0) for row in own],
+        [row.phase_step for row in known],
+        [100.0 * (row.energy_balance or 0.0) for row in known],
         ".",
         color=_SCHEMES["discrete"],
     )
@@ -155,6 +158,6 @@ def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _legend(axis: Any) -> None:
-    """A legend where there is something to tell apart."""
+    """Draw a legend if any line has a label."""
     if axis.get_legend_handles_labels()[0]:
         axis.legend(fontsize="small")

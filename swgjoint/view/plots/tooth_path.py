@@ -15,12 +15,18 @@ if TYPE_CHECKING:
     from swgjoint.gear.teeth.tooth_path import ToothPath
 
 SHOWN = 25
+"""Approximate number of tooth positions in the picture."""
 
 
 def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
-    """PNG: the tooth at equal steps in its space, and its clearance over the passage.
+    """Draw a tooth at equal steps in its space, and its clearance, as PNG.
 
-    Rigid teeth on the shape of the neutral line; overlap is what elasticity takes up.
+    The teeth are rigid and follow the shape of the neutral line. Elastic deformation
+    must take up an overlap.
+
+    Args:
+        design: The design.
+        path: Passage of its flexspline tooth.
     """
     from matplotlib.figure import Figure
 
@@ -28,7 +34,7 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     space, clearance = figure.subplots(1, 2)
     ring = tooth_profile(design, "circular_spline")
     outline, _, _ = ring.evaluate(np.linspace(0.0, ring.stations[-1], 200))
-    # the right half of the space lies half a pitch beside the tooth that bounds it
+    # the axis of the space is half a pitch from that of the tooth that bounds it
     cos, sin = np.cos(ring.half_pitch), np.sin(ring.half_pitch)
     x, y = -outline[:, 0], outline[:, 1]
     right = np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
@@ -56,7 +62,7 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     )
     clearance.set_yscale("symlog", linthresh=1.0)
     clearance.set_xlabel("angle of the tooth from the lobe [deg]")
-    clearance.set_ylabel("clearance [µm], negative: overlap")
+    clearance.set_ylabel("clearance [µm] (negative: overlap)")
     where = path.where[worst].replace("_", " ")
     clearance.set_title(
         f"smallest {path.smallest_clearance / um:.3g} µm ({where})", fontsize="medium"

@@ -1,4 +1,4 @@
-"""A tuning run as a picture, as text and as a page."""
+"""Result of a tuning run as a picture, as text and as an HTML page."""
 
 from __future__ import annotations
 
@@ -19,33 +19,32 @@ if TYPE_CHECKING:
     from swgjoint.explore.tune.result import GainCandidate, Tuned
 
 COLORS = ("0.45", "C1", "C2", "C0")
-"""Of the candidates; the tuned controller has the last."""
+"""Colours of the candidates; the tuned controller has the last one."""
 
 
 def claims(found: Tuned) -> list[str]:
-    """What came out, a line each; none says more than the figures do."""
+    """Findings of a tuning run in sentences, one line each."""
     baseline, best = found.baseline, found.best
     better = int((best.held_out < baseline.held_out).sum())
     count = best.held_out.size
     lines = [
-        f"{best.name}: {_cost(best)} on {count} seeds that no search has seen,"
+        f"{best.name}: cost {_cost(best)} on {count} held-out seeds,"
         f" {_less(found, best)} than PD by the textbook rule ({_cost(baseline)}),"
-        f" better on {better} of them"
+        f" lower on {better} of them"
     ]
     if len(found.candidates) > 2:
         _, pd, ruled, _ = found.candidates
         lines += [
-            f"of that, tuning the two gains of PD alone: {_cost(pd)},"
-            f" {_less(found, pd)}",
+            f"tuning the two gains of PD alone: {_cost(pd)}, {_less(found, pd)}",
             f"feed-forward alone, gains by the rule: {_cost(ruled)},"
-            f" {_less(found, ruled)}; tuning it changes that by"
+            f" {_less(found, ruled)}; tuning changes this cost by"
             f" {100.0 * (best.held_out.mean() / ruled.held_out.mean() - 1.0):+.0f} %",
         ]
     wide = best.held_out.mean() / best.training.mean() - 1.0
     lines.append(
-        f"on the seeds of the search it costs {best.training.mean() / arcmin:.3g}"
-        f" arcmin; the others are {abs(100 * wide):.0f} %"
-        f" {'above' if wide > 0 else 'below'} that"
+        f"its cost on the seeds of the search is {best.training.mean() / arcmin:.3g}"
+        f" arcmin; on the held-out seeds it is {abs(100 * wide):.0f} %"
+        f" {'higher' if wide > 0 else 'lower'}"
     )
     at_bound = [
         p.key
@@ -53,12 +52,20 @@ def claims(found: Tuned) -> list[str]:
         if not 0.01 < place < 0.99
     ]
     if at_bound:
-        lines.append(f"at a bound of the search: {', '.join(at_bound)}")
+        lines.append(f"parameters at a bound of the search: {', '.join(at_bound)}")
     return lines
 
 
 def write_files(found: Tuned, folder: Path) -> list[str]:
-    """``tune.png``, ``tune.json`` and ``report.html``; returns their paths."""
+    """Write ``tune.png``, ``tune.json`` and ``report.html``.
+
+    Args:
+        found: Result of the tuning run.
+        folder: Folder of the files.
+
+    Returns:
+        Paths of the written files.
+    """
     outputs, pictures = Outputs(folder), {}
 
     def drawn() -> bytes:
@@ -87,7 +94,7 @@ def write_files(found: Tuned, folder: Path) -> list[str]:
 
 
 def picture(found: Tuned) -> bytes:
-    """PNG: searches, costs by held-out seed, one episode of baseline and best."""
+    """Draw the searches, the costs by held-out seed and one episode as PNG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 7.5), layout="constrained")
@@ -128,9 +135,9 @@ def _draw_seeds(ax: Any, found: Tuned) -> None:
         yscale="log",
         xlabel="seed",
         ylabel="cost [arcmin]",
-        title="seeds that no search has seen, and their means",
+        title="held-out seeds, and their means",
     )
-    # room above the points for their names
+    # leave room for the legend above the points
     ax.set_ylim(top=4.0 * found.baseline.held_out.max() / arcmin)
     ax.ticklabel_format(axis="x", useOffset=False)
     _plain_ticks(ax)
@@ -138,7 +145,7 @@ def _draw_seeds(ax: Any, found: Tuned) -> None:
 
 
 def _draw_episode(axes: Any, found: Tuned) -> None:
-    """The held-out episode in which the cost of the baseline is the median."""
+    """Draw the held-out episode in which the baseline has its median cost."""
     order = np.argsort(found.baseline.held_out)
     k = int(order[order.size // 2])
     seed = found.settings.seeds[1][k]
@@ -152,7 +159,7 @@ def _draw_episode(axes: Any, found: Tuned) -> None:
     other = axes[1].twinx()
     trace = found.best.trace
     other.plot(trace.time, np.degrees(trace.reference[:, k]), color="0.75", lw=1.0)
-    other.set_ylabel("reference of the link [deg], grey")
+    other.set_ylabel("reference of the link [deg] (grey)")
     for ax in axes:
         ax.set_xlabel("time [s]")
         ax.margins(x=0)
@@ -160,7 +167,7 @@ def _draw_episode(axes: Any, found: Tuned) -> None:
 
 
 def _plain_ticks(ax: Any) -> None:
-    """Numbers instead of powers of ten on a short logarithmic axis."""
+    """Plain numbers instead of powers of ten on a short logarithmic axis."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -193,10 +200,10 @@ def _summary(found: Tuned) -> Table:
         header=[
             ("", ""),
             ("cost, held-out seeds", "arcmin"),
-            ("spread", "arcmin"),
+            ("standard deviation", "arcmin"),
             ("cost, seeds of the search", "arcmin"),
-            ("less than the textbook", "%"),
-            ("broken limits", f"of {s.training + s.held_out}"),
+            ("reduction against the textbook rule", "%"),
+            ("episodes with a broken limit", f"of {s.held_out}"),
         ],
         rows=rows,
         notes=[
@@ -204,9 +211,9 @@ def _summary(found: Tuned) -> Table:
             " error e of the link, the motor torque u over its limit, s ="
             f" {found.error_scale / arcmin:g} arcmin, w = {found.effort_weight:g}; at"
             f" most {found.worst / arcmin:.0f} arcmin.",
-            "Textbook rule: natural frequency a third of the anti-resonance of the"
-            f" nominal link on its drive, {found.anti_resonance:.3g} Hz, damping ratio"
-            " 0.7.",
+            "Textbook rule: the natural frequency is a third of the anti-resonance of"
+            f" the nominal link on its drive, {found.anti_resonance:.3g} Hz; the damping"
+            " ratio is 0.7.",
             f"Environment: {plant}. Optimiser {s.optimiser}, seed {s.seed},"
             f" {sum(x.evaluations for x in found.searches.values())} candidates,"
             f" {found.wall:.0f} s.",
@@ -259,7 +266,7 @@ def _by_seed(found: Tuned) -> Table:
     names = [(one.name, "arcmin") for one in found.candidates]
     return Table(
         title="Cost by held-out seed",
-        header=[("seed", ""), *names, ("tuned less than textbook", "%")],
+        header=[("seed", ""), *names, ("reduction against the textbook rule", "%")],
         rows=rows,
     )
 
