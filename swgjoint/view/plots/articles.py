@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes | None:
-    """PNG: radial stiffness by what is open, stress and safety over the torque.
+    """Draw radial stiffnesses, lobe forces, stress amplitudes and safety as PNG.
 
     Args:
-        parts: That were run.
+        parts: Names of the computed parts.
         found: Results by task.
 
     Returns:
-        None if no part that was run has a panel.
+        The PNG file; None if no computed part has a panel.
     """
     panels: list[Callable[[Any, Mapping[str, Found]], None]] = []
     if "force" in parts:
@@ -40,7 +40,7 @@ def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes 
 
 
 def _force(ax: Any, found: Mapping[str, Found]) -> None:
-    """Stiffness of every variant at three places."""
+    """Draw the radial stiffness of every variant at three places of the load."""
     named = {
         name.removeprefix("force, ").replace("force", "as bundled"): result
         for name, result in found.items()
@@ -60,11 +60,11 @@ def _force(ax: Any, found: Mapping[str, Found]) -> None:
 
 
 def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
-    """Force and play over the deflection of a lobe."""
+    """Draw the lobe force and the play of the output over the lobe deflection."""
     result = found.get("force, lobes", {})
     ax.set_title("between two lobes, large rotations", fontsize="medium")
     ax.set_xlabel("deflection of a lobe [mm]")
-    ax.set_ylabel("force of a lobe [N]")
+    ax.set_ylabel("force on a lobe [N]")
     ax.grid(alpha=0.3)
     if "force_N" not in result:
         return
@@ -80,7 +80,7 @@ def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
     right = ax.twinx()
     right.plot(deflection, result["play_mrad"], "tab:red", marker=".", ls="--")
     right.axhline(0.0, color="tab:red", lw=0.5)
-    right.set_ylabel("play of the output [mrad]; line: w_0", color="tab:red")
+    right.set_ylabel("play of the output [mrad] (vertical line: w_0)", color="tab:red")
 
 
 _LINES = (
@@ -93,13 +93,13 @@ _LINES = (
 
 
 def _amplitude(ax: Any, found: Mapping[str, Found]) -> None:
-    """Nominal stress around at the roots."""
+    """Draw the amplitude of the circumferential normal stress at the roots."""
     _over_torque(ax, found, "normal_amplitude_MPa")
-    ax.set_ylabel("nominal amplitude at the roots [MPa]")
+    ax.set_ylabel("normal stress amplitude at the roots [MPa]")
 
 
 def _safety(ax: Any, found: Mapping[str, Found]) -> None:
-    """Safety factors, shell theory among them."""
+    """Draw the safety factors, with those of shell theory."""
     _over_torque(ax, found, "S")
     known = [f["by_torque"] for f in found.values() if "by_torque" in f]
     rows = known[0] if known else []

@@ -1,4 +1,4 @@
-"""The picture of ``swgjoint bench fe``."""
+"""Picture of ``swgjoint bench fe``."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from swgjoint.pictures import png
 
 STYLES = {
     "ring": ("C2", "^", "ring"),
-    "2d linear": ("C0", "x", "plane, linear"),
-    "2d": ("C0", "s", "plane"),
-    "3d linear": ("C3", "x", "space, linear"),
-    "3d": ("C3", "o", "space"),
+    "2d linear": ("C0", "x", "2D, linear"),
+    "2d": ("C0", "s", "2D"),
+    "3d linear": ("C3", "x", "3D, linear"),
+    "3d": ("C3", "o", "3D"),
 }
-"""Colour, marker and name of every kind."""
+"""Colour, marker and name by kind of model."""
 LEAST = 1e-3
-"""Errors below are drawn here [%]."""
+"""Smaller errors are drawn at this value [%]."""
 
 
 def cost_picture(
@@ -26,15 +26,13 @@ def cost_picture(
     bounds: Collection[float],
     seconds: Callable[[Mapping[str, Any]], float],
 ) -> bytes:
-    """PNG: size of the error over the time of one core, one panel a quantity.
-
-    The line is the Pareto front: nothing cheaper comes nearer to the reference.
+    """Draw the absolute error over CPU time with the Pareto front as PNG.
 
     Args:
-        result: Of :func:`swgjoint.bench.fe.cost.run_fe_cost`.
-        quantities: One panel each.
-        bounds: Errors that are marked [%].
-        seconds: Cost of a row.
+        result: Result of :func:`swgjoint.bench.fe.cost.run_fe_cost`.
+        quantities: Quantities of the rows, one panel each.
+        bounds: Error bounds that are marked [%].
+        seconds: Function that returns the CPU time of a row [s].
     """
     from matplotlib.figure import Figure
 
@@ -71,8 +69,8 @@ def cost_picture(
         for bound in bounds:
             ax.axhline(bound, color="0.9", zorder=0)
         ax.set(xscale="log", yscale="log", title=quantity)
-        ax.set(xlabel="seconds of one core", ylabel="error [%]")
+        ax.set(xlabel="CPU time [s]", ylabel="error [%]")
         ax.margins(x=0.12, y=0.1)
     panels[0, 0].legend(fontsize="small")
-    figure.suptitle(f"{result['design']} against {reference}")
+    figure.suptitle(f"{result['design']}, reference: {reference}")
     return png(figure, dpi=100)

@@ -1,4 +1,4 @@
-"""The picture of ``swgjoint bench joint``, one a scene."""
+"""Picture of one scene of ``swgjoint bench joint``."""
 
 from __future__ import annotations
 
@@ -25,29 +25,34 @@ _MARKERS = {
 }
 _TITLES = {
     "link_angle": "link angle, rms of the worst joint",
-    "tool_position": "tool, rms",
+    "tool_position": "tool position, rms",
     "torsion": "torsion, rms of the worst joint",
-    "ripple_spectrum": "torque ripple, lines of its spectrum",
+    "ripple_spectrum": "torque ripple, spectral lines",
 }
 
 
 def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
-    """PNG: error over cost, a panel a quantity, and the damping that steps add."""
+    """Draw the error of every quantity over cost, and numerical damping, as PNG.
+
+    Args:
+        scene: Name of the scene.
+        rows: Rows of the benchmark of this scene.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15.0, 8.5), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
     for axis, (quantity, unit) in zip(axes, QUANTITIES.items(), strict=False):
-        own = [
+        known = [
             row
             for row in rows
             if row["quantity"] == quantity and row["error"] and row["cost"]
         ]
-        _points(axis, own)
-        front = sorted((r["cost"], r["error"]) for r in own if r["pareto"])
-        axis.plot(*zip(*front, strict=True), color="black", lw=1, label="front")
+        _points(axis, known)
+        front = sorted((r["cost"], r["error"]) for r in known if r["pareto"])
+        axis.plot(*zip(*front, strict=True), color="black", lw=1, label="Pareto front")
         axis.set(title=_TITLES[quantity], ylabel=f"error [{unit}]")
-        axis.set_xlabel("CPU time over that of the rigid arm at 1 ms")
+        axis.set_xlabel("CPU time / CPU time of the rigid arm at 1 ms")
     axes[0].legend(fontsize="x-small", ncols=2)
     _damping(axes[4], rows)
     _own_error(axes[5], rows)
@@ -55,7 +60,7 @@ def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
         axes[5].plot([], [], _MARKERS[name], color="black", mfc="none", label=name)
     axes[5].legend(fontsize="x-small")
     against = next(row["reference"] for row in rows)
-    figure.suptitle(f"{scene} against {against}")
+    figure.suptitle(f"scene {scene}, reference: {against}")
     return png(figure, dpi=90)
 
 
@@ -74,35 +79,35 @@ def _points(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _damping(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
-    """What the steps add to the damping of the first mode, over the step."""
-    own = [row for row in rows if row["quantity"] == "damping_ratio"]
-    _over_step(axis, own, "error")
-    first = own[0] if own else None
+    """Draw the numerical damping ratio of the first mode over the step."""
+    damped = [row for row in rows if row["quantity"] == "damping_ratio"]
+    _over_step(axis, damped, "error")
+    first = damped[0] if damped else None
     name = "first mode" if first is None else f"mode at {first['frequency_Hz']:.0f} Hz"
     axis.set_xscale("log")
     axis.set_yscale("symlog", linthresh=1e-3)
-    axis.set(title=f"damping ratio that steps add, {name}", xlabel="step [ms]")
+    axis.set(title=f"numerical damping ratio, {name}", xlabel="step [ms]")
     for level in (0.005, -0.005):
         axis.axhline(level, color="0.6", lw=1, ls="--")
     axis.grid(alpha=0.3)
 
 
 def _own_error(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
-    """Error that the steps alone make, over the step."""
-    own = [r for r in rows if r["quantity"] == "link_angle" and r["own_error"]]
-    _over_step(axis, own, "own_error")
+    """Draw the error due to the step alone over the step."""
+    known = [r for r in rows if r["quantity"] == "link_angle" and r["own_error"]]
+    _over_step(axis, known, "own_error")
     axis.set(
         xscale="log",
         yscale="log",
-        title="link angle against the same level",
+        title="link angle, error relative to the same level",
         xlabel="step [ms]",
-        ylabel="[arcmin]",
+        ylabel="error [arcmin]",
     )
     axis.grid(alpha=0.3, which="both")
 
 
 def _over_step(axis: Any, rows: Sequence[dict[str, Any]], value: str) -> None:
-    """A line for every level and integrator."""
+    """Draw one line per level and integrator."""
     for key in dict.fromkeys((row["model"], row["integrator"]) for row in rows):
         points = sorted(
             (1e3 * row["step_s"], row[value])

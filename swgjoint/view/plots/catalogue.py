@@ -1,4 +1,4 @@
-"""Picture of the comparison with the catalogue: model over catalogue."""
+"""Picture of the comparison with the catalogue: ratio of model to catalogue."""
 
 from __future__ import annotations
 
@@ -15,10 +15,15 @@ _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
 def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
-    """PNG over ratio and size, brackets as bars; None where there is nothing to show.
+    """Draw the ratio of model to catalogue over gear ratio and size as PNG.
+
+    Bars are the brackets of the variants.
 
     Args:
-        rows: Of the study.
+        rows: Rows of the study.
+
+    Returns:
+        The PNG file; None if no row can be drawn.
     """
     from matplotlib.figure import Figure
 
@@ -62,7 +67,7 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
         colour = _COLOURS[k % len(_COLOURS)]
         axes[0].plot([], [], "o", color=colour, label=f"size {size}")
     axes[0].legend(fontsize="small")
-    axes[0].set_ylabel("model over catalogue")
+    axes[0].set_ylabel("model / catalogue")
     figure.suptitle(
         "middle and bracket of the variants; triangle: lower bound; grey: goal"
     )

@@ -1,4 +1,4 @@
-"""Comparison of the baseline controllers as a text table and a picture."""
+"""Comparison of the baseline controllers as a text table and as a picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
 
 
 def ladder_table(found: Ladder) -> list[str]:
-    """Lines of a table, one a rung, mean ± standard deviation."""
+    """Lines of a text table: mean ± standard deviation, one row per controller."""
     header = ["", *found.units]
     rows = [["", *found.units.values()]]
     for rung, figures in found.figures.items():
@@ -30,23 +30,34 @@ def ladder_table(found: Ladder) -> list[str]:
         "  ".join(cell.ljust(w) for cell, w in zip(row, wide, strict=True)).rstrip()
         for row in [header, *rows]
     ]
-    return [*lines, "* what this controller is made for"]
+    return [*lines, "* figure that this controller is designed for"]
 
 
 def ladder_picture(name: str, found: Ladder) -> bytes:
-    """PNG: signals of the first specimen, and the figures of all."""
+    """Draw the signals of the first specimen, and the figures of all, as PNG.
+
+    Args:
+        name: Name of the drive.
+        found: Results of the controllers.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
     axes = figure.subplots(2, 3)
     signals = (
-        (axes[0, 0], "time", "tracking", "time [s]", "link error, move [arcmin]"),
+        (
+            axes[0, 0],
+            "time",
+            "tracking",
+            "time [s]",
+            "link error in the fast move [arcmin]",
+        ),
         (
             axes[0, 1],
             "output",
             "positioning",
             "output [deg]",
-            "slow turn, mean off [arcmin]",
+            "link error in the slow turn\nminus mean [arcmin]",
         ),
         (axes[0, 2], "even_time", "ripple", "time [s]", "output torque - mean [N·m]"),
     )
@@ -71,5 +82,7 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
         ax.set(title=f"{key} [{found.units[key]}]")
         ax.grid(alpha=0.3, axis="y")
     count = next(iter(found.figures.values()))[bars[0]].size
-    figure.suptitle(f"{name}: above one specimen, below {count} (dots) and their mean")
+    figure.suptitle(
+        f"{name}: one specimen (top), mean of {count} specimens (bottom, dots)"
+    )
     return png(figure, dpi=100)

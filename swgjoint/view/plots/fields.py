@@ -1,4 +1,4 @@
-"""Pictures of the fields of a simulation of meshing."""
+"""Pictures of the fields of a 2D simulation of meshing."""
 
 from __future__ import annotations
 
@@ -27,17 +27,22 @@ if TYPE_CHECKING:
 
 
 KINDS = ("tensile", "|compressive|", "von Mises")
-SHOWN_TEETH = 6.0  # to either side of an axis
+SHOWN_TEETH = 6.0
+"""Number of teeth drawn on either side of an axis."""
 LEVELS = 12
+"""Number of contour levels."""
 PALE = (0.9, 0.92, 0.97, 1.0)
+"""Colour of the lowest level."""
 SNAPSHOTS = 4
+"""Largest number of positions that are drawn individually."""
 MPa, N_mm = 1e6, 1e3
 
 
 def field_pictures(run: MeshingRun) -> dict[str, bytes]:
-    """PNGs by name: stress contours, tooth forces, root stress, contact arcs.
+    """PNG files by name: stress contours, tooth forces, root stress, contact arcs.
 
-    Contours of the last position that was solved; none if there is no such position.
+    The contours are those of the last solved position. The result is empty if no
+    position was solved.
     """
     states = run.states
     if not states:
@@ -51,9 +56,13 @@ def field_pictures(run: MeshingRun) -> dict[str, bytes]:
 
 
 def contour_picture(run: MeshingRun, state: State) -> bytes:
-    """PNG: stresses of both members near a lobe and near the minor axis.
+    """Draw the stresses of both members near a lobe and near the minor axis as PNG.
 
-    One scale per row; the wave generator in grey, tooth forces as arrows.
+    Every row has one scale. The wave generator is grey, tooth forces are arrows.
+
+    Args:
+        run: The simulation.
+        state: Equilibrium to draw.
     """
     figure = _figure(14.0, 6.9)
     axes = figure.subplots(3, 2)
@@ -84,7 +93,7 @@ def contour_picture(run: MeshingRun, state: State) -> bytes:
 def _contour(
     ax: Any, member: MemberField, row: int, turn: float, half_width: float, levels: Any
 ) -> Any:
-    """Filled contours of the sectors about the +y axis after a turn."""
+    """Draw filled contours of the sectors near the +y axis after a rotation [rad]."""
     from matplotlib import colormaps
 
     points = rotate(member.points, turn)
@@ -99,7 +108,7 @@ def _contour(
     cells = (triangles + nodes * np.arange(len(near))[:, None, None]).reshape(-1, 3)
     ax.plot(*(points[near][:, member.outline] / mm).T, "k", lw=0.6)
     values = np.clip(member.maxima[row][near].ravel() / MPa, levels[0], levels[-1])
-    # the lowest level is pale, so that the teeth stand out from each other
+    # the lowest level is pale, so that single teeth remain distinguishable
     colours = [PALE, *colormaps["turbo"](np.linspace(0.1, 1.0, len(levels) - 2))]
     return ax.tricontourf(x, y, cells, values, levels=levels, colors=colours)
 
@@ -107,7 +116,7 @@ def _contour(
 def _force_arrows(
     ax: Any, run: MeshingRun, state: State, turn: float, half_width: float
 ) -> None:
-    """Forces of the circular spline on the flexspline at their points."""
+    """Draw the forces of the circular spline on the flexspline at their points."""
     contacts, model = state.contacts, run.model
     if contacts is None or not len(contacts):
         return
@@ -146,11 +155,16 @@ def _frame(ax: Any, run: MeshingRun, half_width: float) -> None:
 
 
 def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
-    """PNG: forces on both flanks at some positions, and at all of them together."""
+    """Draw the flank forces at single positions, and at all positions together, as PNG.
+
+    Args:
+        run: The simulation.
+        states: Its equilibria.
+    """
     model, pitch = run.model, 2.0 * pi / run.model.element.sectors
     angles = np.array([tooth_angles(model, state) for state in states])
     forces = np.array([tooth_forces(model, state) for state in states])
-    # teeth counted from their lobe, whichever it is
+    # number of the tooth from its closest lobe
     window = 2.0 * pi / run.design.lobes
     place = ((angles + 0.5 * window) % window - 0.5 * window) / pitch
     chosen = np.unique(np.linspace(0, len(states) - 1, SNAPSHOTS).astype(int))
@@ -192,31 +206,36 @@ def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
 
 
 def root_stress_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
-    """PNG: stress at a tooth root against the lobe (thesis figures 4.19 and 4.20)."""
-    found = root_stress(run.model, states, run.design.lobes)
+    """Draw the tooth-root stress over the lobe angle as PNG (thesis fig. 4.19, 4.20).
+
+    Args:
+        run: The simulation.
+        states: Its equilibria.
+    """
+    root = root_stress(run.model, states, run.design.lobes)
     figure = _figure(9.0, 7.0)
     axes = figure.subplots(2, 1, sharex=True)
-    one = np.argsort(found.lobe_position[:, found.tooth])
-    every = np.argsort(found.lobe_position.ravel())
+    one = np.argsort(root.lobe_position[:, root.tooth])
+    every = np.argsort(root.lobe_position.ravel())
     lines = (
-        (axes[0], found.tensile, "tensile", "tab:green"),
-        (axes[0], found.compressive, "|compressive|", "tab:blue"),
-        (axes[1], found.von_mises, "von Mises", "0.2"),
+        (axes[0], root.tensile, "tensile", "tab:green"),
+        (axes[0], root.compressive, "|compressive|", "tab:blue"),
+        (axes[1], root.von_mises, "von Mises", "0.2"),
     )
     for ax, values, name, colour in lines:
         ax.plot(
-            found.lobe_position.ravel()[every] / deg,
+            root.lobe_position.ravel()[every] / deg,
             values.ravel()[every] / MPa,
             ".",
             ms=1.5,
             color=colour,
         )
         ax.plot(
-            found.lobe_position[one, found.tooth] / deg,
-            values[one, found.tooth] / MPa,
+            root.lobe_position[one, root.tooth] / deg,
+            values[one, root.tooth] / MPa,
             ".-",
             color=colour,
-            label=f"{name}, tooth {found.tooth}",
+            label=f"{name}, tooth {root.tooth}",
         )
     for ax in axes:
         ax.grid(alpha=0.3)
@@ -224,7 +243,7 @@ def root_stress_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
         ax.set_ylabel("stress at the root [MPa]")
         ax.set_ylim(bottom=0.0)
     axes[1].set_xlabel(
-        "angle of the lobe from the root [deg], negative before it passes"
+        "angle of the lobe from the root [deg], negative before the lobe passes"
         " (small dots: all teeth)"
     )
     figure.suptitle(_title(run, None), fontsize="medium")
@@ -232,17 +251,24 @@ def root_stress_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
 
 
 def contact_arc_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
-    """PNG: load of the wave generator along the bore, and its arcs over the turn."""
+    """Draw the load of the wave generator and its contact arcs as PNG.
+
+    The load is drawn along the bore, the arcs of the first lobe over the turn.
+
+    Args:
+        run: The simulation.
+        states: Its equilibria.
+    """
     lobes = run.design.lobes
-    found = [wave_generator_contact(run.model, state, lobes) for state in states]
+    contacts = [wave_generator_contact(run.model, state, lobes) for state in states]
     figure = _figure(10.0, 7.0)
     load, arcs = figure.subplots(2, 1)
     chosen = np.unique(np.linspace(0, len(states) - 1, SNAPSHOTS).astype(int))
     for k in chosen:
         at = states[k].wave_generator_angle / deg
         load.plot(
-            found[k].angle / deg,
-            found[k].line_load / N_mm,
+            contacts[k].angle / deg,
+            contacts[k].line_load / N_mm,
             lw=1.0,
             label=f"{at:.4g} deg",
         )
@@ -252,7 +278,7 @@ def contact_arc_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
     load.set_xlabel("angle along the bore from the first lobe [deg]")
     load.set_ylabel("wave-generator load [N/mm],\nsmoothed over two tooth pitches")
     load.legend(fontsize="small", title="wave generator at", ncols=2)
-    for state, contact in zip(states, found, strict=True):
+    for state, contact in zip(states, contacts, strict=True):
         for low, high in contact.arcs[0]:
             arcs.plot(
                 [state.wave_generator_angle / deg] * 2,
@@ -279,12 +305,12 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _title(run: MeshingRun, state: State | None) -> str:
-    """Drive, load and which way the power flows."""
+    """Drive, load and direction of the power flow."""
     turn = run.steps[-1].input_angle - run.steps[0].input_angle
     power = run.torque / run.design.ratio * turn
     flow = ""
     if power:
-        flow = ", input drives" if power > 0.0 else ", output drives the input back"
+        flow = ", input drives" if power > 0.0 else ", output back-drives the input"
     at = ""
     if state is not None:
         at = f", wave generator at {state.wave_generator_angle / deg:.4g} deg"

@@ -1,4 +1,4 @@
-"""Picture of an identification: torques measured and modelled, loop, what is left."""
+"""Picture of an identification: measured and modelled torques, residuals, loop."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 
 
 def png(found: Identified) -> bytes:
-    """The picture as a file."""
+    """The picture as a PNG file."""
     out = io.BytesIO()
     save_png(picture(found), out, dpi=120)
     return out.getvalue()
 
 
 def picture(found: Identified) -> Figure:
-    """Every channel over time with its residual; torsion loop; kinematic error."""
+    """Draw every channel with its residual, the torsion loop and kinematic error."""
     from matplotlib.figure import Figure
 
     measured = found.model.measured_torques()
@@ -42,7 +42,7 @@ def picture(found: Identified) -> Figure:
         row[0].legend(loc="upper right")
         _line(row[1], time, left, "", color="tab:red", lw=0.6)
         row[1].set_ylabel(
-            f"measured less model, {np.sqrt(np.mean(left**2)):.2g} N·m rms"
+            f"measured minus model [N·m], rms {np.sqrt(np.mean(left**2)):.2g}"
         )
         for ax in row:
             ax.set_xlabel("time [s]")
@@ -53,14 +53,14 @@ def picture(found: Identified) -> Figure:
 
 
 def _line(ax: Any, x: Any, y: Any, label: str, **style: Any) -> None:
-    """A line that breaks where samples were left out."""
+    """Draw a line that is interrupted where samples were excluded."""
     gaps = np.flatnonzero(np.diff(x) > 1.5 * np.median(np.diff(x))) + 1
     broken = np.insert(np.asarray(y, float), gaps, np.nan)
     ax.plot(np.insert(np.asarray(x, float), gaps, np.nan), broken, label=label, **style)
 
 
 def _loop(ax: Any, found: Identified) -> None:
-    """Torque over the torsion of the log, and the spring of the map."""
+    """Draw the torque over the torsion of the log, and the spring of the map."""
     drive, model = found.drive, found.model
     values = np.array([e.value for e in found.estimates.values()])
     a, b = model.amplitudes(values).T
@@ -83,11 +83,11 @@ def _loop(ax: Any, found: Identified) -> None:
 
 
 def _error(ax: Any, found: Identified) -> None:
-    """No-load error of the map over the first turns of the input."""
-    ax.set_xlabel("turns of the input")
+    """Draw the kinematic error of the map over the first input turns."""
+    ax.set_xlabel("input turns")
     ax.set_ylabel("kinematic error [arcmin]")
     if not len(found.model.orders):
-        ax.text(0.5, 0.5, "not looked for", ha="center", transform=ax.transAxes)
+        ax.text(0.5, 0.5, "no orders fitted", ha="center", transform=ax.transAxes)
         return
     drive = found.drive
     turns = np.linspace(0.0, _TURNS, 200 * _TURNS)

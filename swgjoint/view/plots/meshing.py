@@ -1,4 +1,4 @@
-"""Pictures of a simulation of meshing."""
+"""Picture of the course of a simulation of meshing."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _KINDS = {"tensile": "tab:red", "compressive": "tab:blue", "von_mises": "0.3"}
 
 
 def meshing_picture(result: Mapping[str, Any]) -> bytes:
-    """PNG of the per-step maxima, error, wave-generator torque and contact.
+    """Draw stress maxima, error, wave-generator torque and contacts per step as PNG.
 
     Args:
-        result: The JSON object of ``swgjoint meshing``.
+        result: JSON object of ``swgjoint meshing``.
     """
     from matplotlib.figure import Figure
 
@@ -33,7 +33,7 @@ def meshing_picture(result: Mapping[str, Any]) -> bytes:
     solved = values[np.isfinite(values)]
     mean = float(solved.mean()) if solved.size else 0.0
     error.plot(angle, values - mean, ".-", color="tab:green")
-    error.set_ylabel(f"output error less\n{mean:.4g} [arcsec]")
+    error.set_ylabel(f"output error [arcsec],\nmean {mean:.4g} subtracted")
     for ax, key, label in (
         (torque, "wave_generator_torque_Nm", "wave-generator\ntorque [N·m]"),
         (pairs, "pairs_in_contact", "tooth pairs\nin contact"),
@@ -52,5 +52,5 @@ def meshing_picture(result: Mapping[str, Any]) -> bytes:
 
 
 def _gaps(values: list[float | None]) -> list[float]:
-    """Failed steps leave a gap in the line."""
+    """Values with NaN for failed steps, which leave a gap in the line."""
     return [float("nan") if value is None else value for value in values]

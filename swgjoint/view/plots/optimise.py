@@ -1,4 +1,4 @@
-"""The front of a search, how it was reached, and which values make it."""
+"""Picture of a search: the front, the course of the search, and the parameters."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from swgjoint.explore.optimise.optimise import Optimum
     from swgjoint.explore.sweep.plan import Parameter
 
-Axes = Any  # of matplotlib, which is imported when a picture is made
+Axes = Any  # matplotlib is imported only when a picture is drawn
 
 
 def optimum_picture(found: Optimum) -> bytes:
-    """PNG of three axes: the front, the best so far, the values along the front."""
+    """Draw the front, the best value so far, and the parameters of the front as PNG."""
     from matplotlib.figure import Figure
 
     canvas = Figure(figsize=(16.0, 5.4), layout="constrained")
@@ -33,17 +33,17 @@ def optimum_picture(found: Optimum) -> bytes:
 
 
 def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> Any:
-    """A figure of designs, NaN where there is none."""
-    found = []
+    """One figure of several designs; NaN if a design has no value."""
+    values = []
     for candidate in candidates:
         record = candidate.confirmed if confirmed else candidate.record
         value = None if record is None else record.figures.get(name)
-        found.append(np.nan if value is None else value)
-    return np.array(found)
+        values.append(np.nan if value is None else value)
+    return np.array(values)
 
 
 def _front(axis: Axes, found: Optimum) -> None:
-    """The first two objectives; of a single one over the order of trial."""
+    """Draw the first two objectives, or a single one over the sequence of designs."""
     names = [o.figure for o in found.file.objectives]
 
     def places(candidates: Sequence[Candidate], *, confirmed: bool) -> tuple[Any, Any]:
@@ -82,7 +82,7 @@ def _front(axis: Axes, found: Optimum) -> None:
 
 
 def _view(axis: Axes, found: Optimum, names: Sequence[str]) -> None:
-    """Limits that show the front and its rivals; designs far off are left outside."""
+    """Crop the axes to the front and the compared designs."""
     near = [*found.front, found.start, *found.beside]
     for name, limit in zip(names[:2], (axis.set_xlim, axis.set_ylim), strict=True):
         values = np.concatenate(
@@ -94,7 +94,7 @@ def _view(axis: Axes, found: Optimum, names: Sequence[str]) -> None:
 
 
 def _course(axis: Axes, found: Optimum) -> None:
-    """Best value so far of every objective against the start's."""
+    """Draw the best value so far of every objective, relative to the start design."""
     for objective in found.file.objectives:
         values = _figures(found.tried, objective.figure, confirmed=False)
         kept = [
@@ -115,13 +115,16 @@ def _course(axis: Axes, found: Optimum) -> None:
         )
     axis.axhline(1.0, color="black", lw=0.8)
     axis.set_xlabel("designs tried")
-    axis.set_ylabel("best so far / start")
+    axis.set_ylabel("best value so far / value of the start")
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
 
 
 def _values(axis: Axes, found: Optimum) -> None:
-    """Parameters of the front, each over its range, coloured by the first objective."""
+    """Draw the parameters of the front over their ranges.
+
+    The colour shows the first objective.
+    """
     import matplotlib
 
     parameters = found.file.plan.parameters
@@ -143,12 +146,12 @@ def _values(axis: Axes, found: Optimum) -> None:
             labels.append(label_of(parameter.column))
     axis.set_yticks(range(len(labels)), labels, fontsize=8)
     axis.set_xlim(-0.05, 1.05)
-    axis.set_xlabel("part of the range; dark: best of the first objective")
+    axis.set_xlabel("position in the range (dark: best value of the first objective)")
     axis.grid(alpha=0.3)
 
 
 def _part(parameter: Parameter, value: Any) -> float:
-    """Where a value lies in its range or list, 0 to 1."""
+    """Position of a value in its range or list, from 0 to 1."""
     if parameter.values is not None:
         return parameter.values.index(value) / max(len(parameter.values) - 1, 1)
     assert parameter.low is not None and parameter.high is not None

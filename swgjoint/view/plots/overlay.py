@@ -1,4 +1,4 @@
-"""Picture of a measured torque loop over the predicted one, and what is left."""
+"""Picture of a measured and a predicted torque loop, and their difference."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 def overlay_picture(name: str, laid: Overlay) -> bytes:
-    """PNG: both loops over the torque; measured less predicted, by direction.
+    """Draw both loops over the torque, and the residuals by load direction, as PNG.
 
     Args:
         name: Name of the drive.
-        laid: Both loops.
+        laid: Measured and predicted loop.
     """
     from matplotlib.figure import Figure
 
@@ -36,7 +36,7 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
     loops.legend(fontsize="small")
     residual = laid.residual / arcmin
     for rising, colour in ((True, "tab:blue"), (False, "tab:orange")):
-        label = "torque rises" if rising else "torque falls"
+        label = "increasing torque" if rising else "decreasing torque"
         for begin, end in laid.measured.turns():
             if (torque[end] > torque[begin]) == rising:
                 part = slice(begin, end + 1)
@@ -49,11 +49,11 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
             edges = sign * np.array([row["from_Nm"], row["to_Nm"]])
             band = np.full(2, row["rms_arcmin"])
             rest.fill_between(edges, -band, band, color="0.5", alpha=0.2, lw=0)
-    rest.set_title("measured less predicted (grey: rms)")
-    rest.set_ylabel("[arcmin]")
+    rest.set_title("measured minus predicted (grey: rms)")
+    rest.set_ylabel("residual torsion [arcmin]")
     rest.legend(fontsize="small")
     for axis in (loops, rest):
         axis.set_xlabel("torque [N·m]")
         axis.grid(alpha=0.3)
-    figure.suptitle(f"{name}: measured loop over the prediction")
+    figure.suptitle(f"{name}: measured and predicted torque loop")
     return png(figure, dpi=130)

@@ -15,16 +15,17 @@ from swgjoint.units import deg, mm, um
 if TYPE_CHECKING:
     from swgjoint.validation.ring import RingCase
 
-LARGER = 8.0  # factor of the drawn deflection
+LARGER = 8.0
+"""Magnification of the drawn deflection."""
 
 
 def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes:
-    """PNG: the shape, the deflection around the ring, and b_G over a_G.
+    """Draw the shape, the deflection around the ring, and b_G over a_G as PNG.
 
     Args:
-        cases: Rings by thickness.
-        fine: Refinement to show.
-        total: a_G + b_G of the last point of measurement [m].
+        cases: Rings of different thickness; the first one is drawn in its shape.
+        fine: Mesh refinement of the results to draw.
+        total: a_G + b_G at the last point of measurement [m].
     """
     from matplotlib.figure import Figure
 
@@ -37,7 +38,7 @@ def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes
 
 
 def _shape(ax: Any, case: RingCase, fine: int) -> None:
-    """Outside of the ring at rest and pulled, deflections enlarged."""
+    """Draw the outside of the ring at rest and pulled, with enlarged deflections."""
     radius = case.ring.outer_radius
     phi = np.linspace(0.0, 2.0 * pi, 400)
     ax.plot(*(radius / mm * np.array([np.sin(phi), np.cos(phi)])), "k--", lw=0.8)
@@ -54,7 +55,7 @@ def _shape(ax: Any, case: RingCase, fine: int) -> None:
 
 
 def _around(ax: Any, case: RingCase, fine: int) -> None:
-    """Deflection over the angle at the largest travel, with theory."""
+    """Draw the deflection over the angle at the largest travel, with theory."""
     radius, quarter = case.ring.outer_radius, case.pulled[fine].outline[-1]
     polar, away = np.arctan2(*quarter.T), np.hypot(*quarter.T) - radius
     ax.plot(polar / deg, away / mm, label="finite elements")
@@ -62,19 +63,19 @@ def _around(ax: Any, case: RingCase, fine: int) -> None:
     ax.plot(polar / deg, small / mm, "k:", label="thin ring, small deflections")
     ax.axhline(0.0, color="0.6", lw=0.8)
     ax.axvline(45.0, color="0.6", lw=0.8)
-    ax.set_title("outward deflection of the outside", fontsize="medium")
+    ax.set_title("outward deflection of the outer surface", fontsize="medium")
     ax.set_xlabel("angle from the rollers [deg]")
-    ax.set_ylabel("[mm]")
+    ax.set_ylabel("deflection [mm]")
     ax.legend(fontsize="small")
     ax.grid(alpha=0.3)
 
 
 def _inward(ax: Any, cases: Sequence[RingCase], fine: int, total: float) -> None:
-    """b_G over a_G of all rings, the elastica and the closed form."""
+    """Draw b_G over a_G of all rings, the elastica and the closed form."""
     for case in cases:
-        found = case.pulled[fine].deflection
-        ax.plot(found[:, 0] / mm, -found[:, 1] / um, ".-", label=case.name)
-    crown = np.linspace(0.0, float(found[-1, 0]), 9)
+        deflection = case.pulled[fine].deflection
+        ax.plot(deflection[:, 0] / mm, -deflection[:, 1] / um, ".-", label=case.name)
+    crown = np.linspace(0.0, float(deflection[-1, 0]), 9)
     bent = [case.elastica_inward(float(a)) / um if a else 0.0 for a in crown]
     ax.plot(crown / mm, bent, "k--", lw=1.0, label="thin ring, large rotations")
     small = -float(small_deflection(pi / 4))

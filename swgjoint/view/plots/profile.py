@@ -18,10 +18,14 @@ _COLOURS = {"flexspline": "tab:blue", "circular_spline": "tab:red"}
 
 
 def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> bytes:
-    """PNG of one tooth of each member, pitch points at the same height.
+    """Draw one tooth of each member as PNG, with the pitch points at the same height.
 
-    The circular spline is drawn as its steel lies, so that its gap at the middle takes
-    the flexspline tooth; junctions of the segments are marked.
+    The left panel shows both teeth and marks the junctions of their segments. The right
+    panel shows the flexspline tooth in a tooth space of the circular spline.
+
+    Args:
+        design: The design.
+        profiles: Tooth profiles by member.
     """
     from matplotlib.figure import Figure
 
@@ -34,13 +38,13 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
         marks, _, _ = profile.evaluate(stations)
         shift = np.array([0.0, profile.pitch_radius])
         for k, ax in enumerate(axes):
-            # right: the gap of the circular spline, half a pitch beside its tooth
+            # the right panel is centred on a space, half a pitch from the tooth
             turn = profile.half_pitch if k == 1 and profile.internal else 0.0
             c, s = np.cos(turn), np.sin(turn)
             for side in (1.0, -1.0):
                 mirror = np.array([side, 1.0])
                 rotation = np.array([[c, s], [-s, c]])
-                # a mirrored flank of the next tooth closes the gap
+                # the mirrored flank of the next tooth is the other side of the space
                 points = (line * mirror) @ (rotation if side < 0 else rotation.T).T
                 x, y = (points - shift).T / mm
                 name = label if side > 0 else None
@@ -48,8 +52,8 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
                 if k == 0:
                     x, y = (marks * mirror - shift).T / mm
                     ax.plot(x, y, ".", color=colour, ms=5)
-    axes[0].set_title("one tooth of each, dots at the junctions")
-    axes[1].set_title("tooth in the gap, pitch circles touching")
+    axes[0].set_title("one tooth of each member, dots at the junctions")
+    axes[1].set_title("tooth in a tooth space, pitch circles touching")
     for ax in axes:
         ax.set_aspect("equal")
         ax.axhline(0.0, color="0.7", lw=0.8, ls="--")

@@ -1,4 +1,4 @@
-"""One picture that compares runs of the same motion."""
+"""Picture that compares runs of the same motion."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def comparison_png(
     Args:
         runs: Runs by name.
         path: PNG file to write.
-        rigid: The run that tool errors refer to; None for the commanded path.
+        rigid: Run to which tool errors refer; None for the commanded path.
 
     Returns:
         The path.
@@ -44,14 +44,14 @@ def comparison_png(
 
 
 def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> Figure:
-    """Torsion, transmission error, ripple with its orders, and tool error of runs.
+    """Draw torsion, transmission error, ripple with its orders, and tool error of runs.
 
-    The time plots show the joint with the largest ripple among those whose strongest
-    order is resolved; the bars show all joints.
+    The plots over time show the joint with the largest ripple among those whose
+    strongest order is resolved. The bars show all joints.
 
     Args:
         runs: Runs by name.
-        rigid: The run that tool errors refer to; None for the commanded path.
+        rigid: Run to which tool errors refer; None for the commanded path.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -85,9 +85,13 @@ def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> F
     _label(axes[0, 0], f"{name}: torsion", "torsion [arcmin]")
     _label(axes[0, 1], f"{name}: transmission error", "output − ideal output [arcmin]")
     _label(axes[1, 0], f"{name}: torque ripple", "ripple [% of rated torque]")
-    axes[1, 0].set_xlabel("turns of the input")
-    _label(axes[1, 1], f"{name}: orders of the ripple", "amplitude [% of rated torque]")
-    axes[1, 1].set_xlabel("order [cycles per turn of the input]")
+    axes[1, 0].set_xlabel("input turns")
+    _label(
+        axes[1, 1],
+        f"{name}: order spectrum of the ripple",
+        "amplitude [% of rated torque]",
+    )
+    axes[1, 1].set_xlabel("order [cycles per input turn]")
     against = "the rigid arm" if rigid is not None else "the commanded path"
     _label(axes[2, 0], f"tool: distance from {against}", "distance [mm]")
     _label(axes[2, 1], "all joints: torque ripple", "peak to peak [% of rated torque]")
@@ -106,22 +110,22 @@ def draw_ripple(
     *,
     line: Callable[..., Any] | None = None,
 ) -> None:
-    """Ripple over the last half turn of the input, and its order spectrum.
+    """Draw the ripple over the last half turn of the input, and its order spectrum.
 
     Args:
         over_turns: Axes of the ripple.
         over_order: Axes of the spectrum.
         run: The run.
-        j: Number of the joint.
-        style: Of the lines.
-        line: What draws the spectrum, given its axes; their own plot if None.
+        j: Index of the joint.
+        style: Keyword arguments of the lines.
+        line: Function that draws the spectrum on given axes; None for their ``plot``.
     """
     transmission = run.assembly.transmissions[j]
     scale = 100.0 / transmission.drive.ratings.rated_torque
     angle = run.motor_position[run.steady, j]
     ripple = scale * torque_ripple(run, j)
     turns = np.abs(angle - angle[0]) / (2.0 * np.pi)
-    part = turns >= turns[-1] - 0.5  # half a turn: the tooth order stays readable
+    part = turns >= turns[-1] - 0.5  # in half a turn the tooth order is visible
     over_turns.plot(turns[part], ripple[part], **style)
     over_turns.margins(x=0)
     spectrum, highest = order_spectrum(angle, ripple), highest_resolved_order(run, j)

@@ -1,4 +1,4 @@
-"""The picture of ``swgjoint bench scaling``."""
+"""Picture of ``swgjoint bench scaling``."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from swgjoint.pictures import png
 
 
 def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> bytes:
-    """PNG: time over size, one panel a sweep, with the fitted power.
+    """Draw the time over the size with the fitted power law as PNG.
 
     Args:
-        result: Rows and fits.
-        labels: Of the axes by sweep, in the order of the panels.
+        result: JSON object of the benchmark, with ``rows`` and ``fits``.
+        labels: Label of the size axis by sweep; one panel each, in this order.
     """
     from matplotlib.figure import Figure
 
@@ -32,9 +32,9 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
             y = fit["coefficient"] * x ** fit["exponent"]
             ax.loglog(x, y, "k--", lw=1.0, label=f"power {fit['exponent']:.2f}")
             ax.legend(fontsize="small")
-        ax.set(xlabel=label, ylabel="seconds of one core")
+        ax.set(xlabel=label, ylabel="CPU time [s]")
         if rows:
-            ax.set_title(f"{sweep}: one {rows[0]['per']}", fontsize=9)
+            ax.set_title(f"{sweep}: time per {rows[0]['per']}", fontsize=9)
             sizes = [row["size"] for row in rows]
             ax.set_xticks(sizes, [f"{size:.3g}" for size in sizes], fontsize=7)
         ax.xaxis.minorticks_off()

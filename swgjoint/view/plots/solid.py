@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 
 SHOWN = 0.2
-"""Largest drawn deflection over the size of the section, at most."""
+"""Upper bound of the drawn deflection, relative to the size of the section [-]."""
 STATES = {
     "wave_generator": "wave generator alone",
     "meshed": "meshed",
     "torque": "torque",
 }
-"""Of the set-up, as the legend has them."""
+"""Labels of the set-up states in the legend."""
 
 
 def solid_pictures(run: SolidRun) -> dict[str, bytes]:
-    """PNG by name: the cup at torque, its coning, contacts of the last position."""
+    """PNG files by name: the loaded cup, its coning, contacts of the last position."""
     pictures = {
         "cup_section": section_picture(run, run.setup[-1].state),
         "coning": coning_picture(run),
@@ -39,7 +39,12 @@ def solid_pictures(run: SolidRun) -> dict[str, bytes]:
 
 
 def contact_picture(run: SolidRun, state: SolidState) -> bytes:
-    """Where over the face width teeth and wave generator carry, over the lobe angle."""
+    """Draw the contact forces over face width and angle from the lobe as PNG.
+
+    Args:
+        run: The simulation.
+        state: Equilibrium to draw.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 6.5), layout="constrained")
@@ -66,11 +71,16 @@ def contact_picture(run: SolidRun, state: SolidState) -> bytes:
 def contact_forces(
     model: SolidSectorModel, state: SolidState
 ) -> tuple[Array, Array, Array]:
-    """Forces over the face width, tooth by tooth.
+    """Contact forces over the face width, tooth by tooth.
+
+    Args:
+        model: The 3D model.
+        state: The equilibrium.
 
     Returns:
-        Angle of every tooth of the model from the nearer of two lobes [rad] (N,);
-        forces of the circular spline and of the wave generator (N, n_planes) [N].
+        Angles of the teeth from the closer of two lobes (N,) [rad]; forces of the
+        circular spline, summed over both flanks, and forces of the wave generator, both
+        (N, n_planes) [N].
     """
     sectors, planes = model.sectors, model.strip.planes
     x = model.masters(state).mean(axis=1)
@@ -85,7 +95,12 @@ def contact_forces(
 
 
 def section_picture(run: SolidRun, state: SolidState) -> bytes:
-    """The cup along its major and its minor axis at rest and deflected, enlarged."""
+    """Draw sections of the cup at both axes, at rest and deflected, as PNG.
+
+    Args:
+        run: The simulation.
+        state: Equilibrium to draw.
+    """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
 
@@ -95,13 +110,13 @@ def section_picture(run: SolidRun, state: SolidState) -> bytes:
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
     both = [axial_sections(run.model, state, k) for k in axis_sectors(run.model, state)]
     rest, moved = (
-        np.concatenate([getattr(part, name) for found in both for part in found])
+        np.concatenate([getattr(part, name) for parts in both for part in parts])
         for name in ("rest", "moved")
     )
     most, size = float(np.abs(moved - rest).max()), float(np.ptp(rest, axis=0).max())
     larger = magnification(most, size)
-    for ax, title, found in zip(axes, ("major", "minor"), both, strict=True):
-        for part in found:
+    for ax, title, parts in zip(axes, ("major", "minor"), both, strict=True):
+        for part in parts:
             drawn = part.rest + larger * (part.moved - part.rest)
             mesh = PolyCollection(
                 list(drawn[part.cells] / mm),
@@ -122,11 +137,15 @@ def section_picture(run: SolidRun, state: SolidState) -> bytes:
 
 
 def magnification(most: float, size: float) -> float:
-    """Factor 1, 2 or 5 times a power of ten that shows a deflection clearly.
+    """Magnification of a deflection: 1, 2 or 5 times a power of ten.
 
     Args:
         most: Largest deflection [m].
-        size: Of the picture [m].
+        size: Size of the picture [m].
+
+    Returns:
+        Largest such factor with a drawn deflection of at most :data:`SHOWN` times the
+        size [-].
     """
     wanted = SHOWN * size / max(most, 1e-12)
     power = 10.0 ** np.floor(np.log10(wanted))
@@ -134,14 +153,17 @@ def magnification(most: float, size: float) -> float:
 
 
 def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Edges of one quadrilateral alone (n, 2)."""
+    """Edges that belong to one quadrilateral only, as pairs of point numbers (n, 2)."""
     edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    found, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    return np.asarray(found[count == 1])
+    unique, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return np.asarray(unique[count == 1])
 
 
 def coning_picture(run: SolidRun) -> bytes:
-    """Radial displacement under the teeth over the face width, state by state."""
+    """Draw the radial displacement under the teeth over the face width as PNG.
+
+    The lines are the states of the set-up.
+    """
     from matplotlib.figure import Figure
 
     from swgjoint.fe.solid.figures.axial_section import coning
@@ -150,17 +172,18 @@ def coning_picture(run: SolidRun) -> bytes:
     axes = figure.subplots(1, 2)
     lines = dict(zip(STATES, ("--", ":", "-"), strict=True))
     for state in run.setup:
-        found = coning(run.model, state.state)
+        displacement = coning(run.model, state.state)
         label = STATES[state.name]
         if state.name == "torque":
             label = f"{run.torque:g} N·m"
-        for ax, radial in zip(axes, (found.major, found.minor), strict=True):
-            ax.plot(found.z / mm, radial / mm, lines[state.name], lw=1.5, label=label)
+        z, radials = displacement.z, (displacement.major, displacement.minor)
+        for ax, radial in zip(axes, radials, strict=True):
+            ax.plot(z / mm, radial / mm, lines[state.name], lw=1.5, label=label)
     for ax, title in zip(axes, ("major", "minor"), strict=True):
         ax.set_title(f"{title} axis: radial displacement of the bore")
-        ax.set_xlabel("z [mm], open edge on the left")
+        ax.set_xlabel("z [mm], open end on the left")
         ax.grid(alpha=0.3)
-    axes[0].set_ylabel("outward [mm]")
+    axes[0].set_ylabel("outward displacement [mm]")
     axes[0].legend()
     return _png(figure)
 

@@ -14,14 +14,18 @@ if TYPE_CHECKING:
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 _AT_MOST = 20_000
+"""Approximate largest number of drawn samples of a line."""
 _MANY = 200
+"""Number of periods per output turn above which only two periods are drawn."""
 _FEW = 5
-"""Orders that have a tick each."""
+"""Largest number of orders that get one tick each."""
 _ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab:red")}
 
 
 def spec_picture(name: str, sheet: SpecSheet) -> bytes:
-    """PNG of the curves behind the figures; what was not measured is said so.
+    """Draw the curves from which the figures were read as PNG.
+
+    A panel without a curve shows the reason.
 
     Args:
         name: Name of the drive.
@@ -42,7 +46,7 @@ def _loop(ax: Any, sheet: SpecSheet) -> None:
     ax.set_xlabel("torque [N·m]")
     ax.set_ylabel("torsion [arcmin]")
     if sheet.loop is None:
-        _absent(ax, "not asked for")
+        _absent(ax, "not computed")
         return
     loop, figures = sheet.loop, sheet.figures
     ax.plot(loop.torque, loop.torsion / arcmin, color="0.6", lw=2.5, label="loop")
@@ -65,20 +69,20 @@ def _loop(ax: Any, sheet: SpecSheet) -> None:
 def _turn(ax: Any, sheet: SpecSheet) -> None:
     ax.set_title("transmission error over one output turn")
     ax.set_xlabel("output angle [deg]")
-    ax.set_ylabel("deviation from its mean [arcmin]")
+    ax.set_ylabel("deviation from the mean [arcmin]")
     shown = [key for key in _ERRORS if key in sheet.turns]
     if not shown:
-        _absent(ax, sheet.missing.get("transmission_accuracy_arcmin", "not asked for"))
+        _absent(ax, sheet.missing.get("transmission_accuracy_arcmin", "not computed"))
         return
     for key in reversed(shown):
         label, colour = _ERRORS[key]
         turn = sheet.turns[key]
         periods = turn.turns / float(turn.period_turns)
         angle, error = turn.output_turn()
-        if periods > _MANY:  # a whole turn would be a solid block
+        if periods > _MANY:  # a whole turn would be drawn as a solid area
             part = slice(0, 2 * turn.signal.size + 1)
             angle, error = angle[part], error[part]
-            ax.set_title(f"transmission error, 2 of {periods:.0f} equal periods a turn")
+            ax.set_title(f"transmission error, 2 of {periods:.0f} periods per turn")
         else:
             stride = -(-angle.size // _AT_MOST)
             angle, error = angle[::stride], error[::stride]
@@ -95,7 +99,7 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
     ax.set_ylabel("amplitude [arcmin]")
     shown = [key for key in _ERRORS if key in sheet.turns]
     if not shown:
-        _absent(ax, sheet.missing.get("orders", "not asked for"))
+        _absent(ax, sheet.missing.get("orders", "not computed"))
         return
     from matplotlib.ticker import NullFormatter
 
@@ -111,7 +115,7 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
         ax.vlines(order[keep] * shift, 0.0, amplitude[keep], color=colour, label=label)
     ax.set_xscale("log")
     ax.xaxis.set_minor_formatter(NullFormatter())
-    if len(drawn) <= _FEW:  # they may lie between two powers of ten
+    if len(drawn) <= _FEW:  # all of them may be between two labelled powers of ten
         ax.set_xticks(sorted(drawn), [f"{order:.4g}" for order in sorted(drawn)])
     if largest > 0.0:
         ax.set_yscale("log")
@@ -121,12 +125,12 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
 
 
 def _losses(ax: Any, sheet: SpecSheet) -> None:
-    ax.set_title("efficiency against the load")
+    ax.set_title("efficiency over the load")
     ax.set_xlabel("output torque [N·m]")
     ax.set_ylabel("efficiency [%]")
     assert sheet.losses is not None
     for speed, values in sheet.losses.efficiency.items():
-        label = f"{speed / rpm:.0f} rpm at the input"
+        label = f"input at {speed / rpm:.0f} rpm"
         ax.plot(sheet.losses.load, 100.0 * values, label=label)
     rated = sheet.figures.get("rated_torque_Nm")
     if rated:

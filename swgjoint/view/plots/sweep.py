@@ -1,4 +1,4 @@
-"""Every figure of a sweep over every parameter."""
+"""Picture of a sweep: every figure over every parameter."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ if TYPE_CHECKING:
     from swgjoint.explore.sweep.sweep import SweepResult
 
 MOST = 6
-"""Parameters and figures in a picture: the first ones."""
+"""Largest number of parameters and of figures in a picture; the first are drawn."""
 
 
 def sweep_picture(found: SweepResult) -> bytes:
-    """PNG: a row of axes a figure, a column a parameter, a point a design.
+    """Draw one row of panels per figure and one column per parameter as PNG.
 
-    The colour is the first figure in all of them, so that a design that is good in one
-    can be followed through the others; designs without figures are crosses below.
+    Every design is a point. Its colour shows the first figure in all panels, so that a
+    design can be recognised across them. Designs without figures are crosses at the
+    bottom.
     """
     from matplotlib.figure import Figure
 
@@ -64,7 +65,7 @@ def sweep_picture(found: SweepResult) -> bytes:
     if shown is not None:
         canvas.colorbar(shown, ax=axes, label=label_of(figures[0]), aspect=40)
     ok = sum(record.ok for record in found.records)
-    text = f"{ok} designs, {len(rows) - ok} without figures (crosses)"
+    text = f"{ok} designs with figures, {len(rows) - ok} without (crosses)"
     canvas.suptitle(f"{found.file.description or 'sweep'}\n{text}", fontsize=10)
     return png(canvas, dpi=100)
 
@@ -74,7 +75,7 @@ def _numbers(values: Sequence[Any]) -> Any:
 
 
 def _places(values: Sequence[Any]) -> tuple[Any, list[str] | None]:
-    """Positions on the axis, and labels where the values are no numbers."""
+    """Positions on the axis, and labels if the values are not numbers."""
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         return np.array(values, dtype=float), None
     labels = list(dict.fromkeys(str(value) for value in values))
@@ -83,7 +84,7 @@ def _places(values: Sequence[Any]) -> tuple[Any, list[str] | None]:
 
 
 def label_of(key: str) -> str:
-    """Last part of a key in words, with its unit; a joint after what it has."""
+    """Last part of a key in words with its unit, followed by the joint, if any."""
     *above, last = key.split(".")
     name, unit = split_unit(last)
     joint = ""

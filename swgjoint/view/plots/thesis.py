@@ -1,4 +1,4 @@
-"""Plots that answer the figures of the thesis: one picture a part."""
+"""Plots of the recomputed figures of the thesis, one picture per part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ _NOMINAL, _TENTH, _SOURCE = "tab:red", "tab:blue", "black"
 
 
 def group_picture(results: Sequence[CaseRecords]) -> bytes:
-    """PNG of one part: stresses against the parameter or as bars, and over the turn.
+    """Draw the stresses of one part as PNG.
+
+    The upper panels show the largest stresses over the parameter, or as bars if the
+    part has no parameter. The lower panels show the stresses over the turn.
 
     Args:
         results: Cases of one group.
@@ -56,7 +59,10 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
 
 
 def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Stress against the parameter at both torques and meshes, printed ones crossed."""
+    """Draw the stress over the parameter at both torques on all meshes.
+
+    Crosses are the values printed in the thesis.
+    """
     values = [result.case.entry.value for result in results]
     for tenth, colour, label in ((False, _NOMINAL, "T"), (True, _TENTH, "T/10")):
         for refinement in dict.fromkeys((1, max(results[0].nominal))):
@@ -71,7 +77,7 @@ def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
 
 
 def _bars(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Thesis, T/10 and T side by side, the finest mesh as a dash above its bar."""
+    """Draw bars of the thesis, T/10 and T; dashes are results of the finest mesh."""
     names = [result.case.group.name_of(result.case.entry) for result in results]
     series = (
         ("thesis", _SOURCE, [r.case.entry.printed[kind] for r in results], None),
@@ -98,7 +104,7 @@ def _bars(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
 
 
 def _turn(axis: Any, results: Sequence[CaseRecords], *, tenth: bool) -> None:
-    """Von Mises stress over the turn, one line a case, as the figures of the thesis."""
+    """Draw the von Mises stress over the turn, one line per case, as in the thesis."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"]
@@ -123,5 +129,5 @@ def _turn(axis: Any, results: Sequence[CaseRecords], *, tenth: bool) -> None:
 
 
 def _number(value: float | None) -> float:
-    """What is missing leaves a gap."""
+    """A number, or NaN for a missing value, which leaves a gap."""
     return float("nan") if value is None else value

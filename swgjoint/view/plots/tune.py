@@ -212,8 +212,8 @@ def _summary(found: Tuned) -> Table:
             f" {found.error_scale / arcmin:g} arcmin, w = {found.effort_weight:g}; at"
             f" most {found.worst / arcmin:.0f} arcmin.",
             "Textbook rule: the natural frequency is a third of the anti-resonance of"
-            f" the nominal link on its drive, {found.anti_resonance:.3g} Hz; the damping"
-            " ratio is 0.7.",
+            f" the nominal link on its drive, {found.anti_resonance:.3g} Hz; the"
+            " damping ratio is 0.7.",
             f"Environment: {plant}. Optimiser {s.optimiser}, seed {s.seed},"
             f" {sum(x.evaluations for x in found.searches.values())} candidates,"
             f" {found.wall:.0f} s.",
