@@ -192,8 +192,8 @@ def omissions_of(run: Run) -> list[str]:
     for item in run.contains["left_out"]:
         joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
     return [
-        f"left out: {part}, {reason}"
-        + ("" if len(names) == len(run.joints) else f" ({', '.join(names)})")
+        f"left out: {part} ({reason})"
+        + ("" if len(names) == len(run.joints) else f" in {', '.join(names)}")
         for (part, reason), names in joints.items()
     ]
 

@@ -97,21 +97,21 @@ def comparison_table(
             mark = "bad" if key in row.missed else "good" if key in (spec or {}) else ""
             cells.append(Cell(cell(row.to_json(), key), mark))
         if spec:
-            kept = not row.missed
-            cells.append(Cell("kept" if kept else "missed", "good" if kept else "bad"))
+            met = not row.missed
+            cells.append(Cell("kept" if met else "missed", "good" if met else "bad"))
         lines.append(cells)
     limits = [
         f"{key} at {'least' if key in LOWER else 'most'} {limit:g}"
         for key, limit in (spec or {}).items()
     ]
     return Table(
-        header=[("", ""), ("level", ""), *shown_keys.values(), *verdict],
+        header=[("argument", ""), ("level", ""), *shown_keys.values(), *verdict],
         rows=lines,
         notes=[
             "Figures are those of the worst joint of the scene. K1 and the von Mises"
             " stress (largest stress at rated torque, averaged over a pitch) are those"
             " of the drive. Levels without compliance have no K1.",
-            *([f"Spec: {', '.join(limits)}."] if limits else []),
+            *([f"Limits of the spec: {', '.join(limits)}."] if limits else []),
             *left_out_notes(rows),
         ],
     )
@@ -123,7 +123,8 @@ def left_out_notes(rows: Sequence[Compared]) -> list[str]:
     for row in rows:
         by_joints.setdefault(row.strongest_order_left_out, []).append(row.argument)
     notes = [
-        f"too fast for the step, strongest order left out: {', '.join(joints)}"
+        "strongest order left out, because the joint turns too fast for the step:"
+        f" {', '.join(joints)}"
         + ("" if len(names) == len(rows) else f" ({', '.join(names)})")
         for joints, names in by_joints.items()
         if joints

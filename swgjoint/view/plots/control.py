@@ -83,6 +83,6 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
         ax.grid(alpha=0.3, axis="y")
     count = next(iter(found.figures.values()))[bars[0]].size
     figure.suptitle(
-        f"{name}: one specimen (top), mean of {count} specimens (bottom, dots)"
+        f"{name}: one specimen (top); {count} specimens as dots and mean (bottom)"
     )
     return png(figure, dpi=100)

@@ -30,9 +30,9 @@ KINDS = ("tensile", "|compressive|", "von Mises")
 SHOWN_TEETH = 6.0
 """Number of teeth drawn on either side of an axis."""
 LEVELS = 12
-"""Number of contour levels."""
+"""Number of contour bands."""
 PALE = (0.9, 0.92, 0.97, 1.0)
-"""Colour of the lowest level."""
+"""Colour of the lowest band."""
 SNAPSHOTS = 4
 """Largest number of positions that are drawn individually."""
 MPa, N_mm = 1e6, 1e3
@@ -108,7 +108,7 @@ def _contour(
     cells = (triangles + nodes * np.arange(len(near))[:, None, None]).reshape(-1, 3)
     ax.plot(*(points[near][:, member.outline] / mm).T, "k", lw=0.6)
     values = np.clip(member.maxima[row][near].ravel() / MPa, levels[0], levels[-1])
-    # the lowest level is pale, so that single teeth remain distinguishable
+    # the lowest band is pale, so that single teeth remain distinguishable
     colours = [PALE, *colormaps["turbo"](np.linspace(0.1, 1.0, len(levels) - 2))]
     return ax.tricontourf(x, y, cells, values, levels=levels, colors=colours)
 

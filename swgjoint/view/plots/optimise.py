@@ -146,7 +146,7 @@ def _values(axis: Axes, found: Optimum) -> None:
             labels.append(label_of(parameter.column))
     axis.set_yticks(range(len(labels)), labels, fontsize=8)
     axis.set_xlim(-0.05, 1.05)
-    axis.set_xlabel("position in the range (dark: best value of the first objective)")
+    axis.set_xlabel("position in the range (dark: best first objective)")
     axis.grid(alpha=0.3)
 
 

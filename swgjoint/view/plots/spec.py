@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 _AT_MOST = 20_000
-"""Approximate largest number of drawn samples of a line."""
+"""Largest number of drawn samples of an output turn."""
 _MANY = 200
 """Number of periods per output turn above which only two periods are drawn."""
 _FEW = 5
@@ -95,7 +95,7 @@ def _turn(ax: Any, sheet: SpecSheet) -> None:
 
 def _orders(ax: Any, sheet: SpecSheet) -> None:
     ax.set_title("order spectrum of the transmission error")
-    ax.set_xlabel("cycles per input turn")
+    ax.set_xlabel("order [cycles per input turn]")
     ax.set_ylabel("amplitude [arcmin]")
     shown = [key for key in _ERRORS if key in sheet.turns]
     if not shown:

@@ -59,9 +59,10 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
 
 
 def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Draw the stress over the parameter at both torques on all meshes.
+    """Draw the stress over the parameter at both torques on two meshes.
 
-    Crosses are the values printed in the thesis.
+    The meshes are refinement 1 and the finest one. Crosses are the values printed in
+    the thesis.
     """
     values = [result.case.entry.value for result in results]
     for tenth, colour, label in ((False, _NOMINAL, "T"), (True, _TENTH, "T/10")):

@@ -198,7 +198,7 @@ def _summary(found: Tuned) -> Table:
     plant = ", ".join(f"{k} {v}" for k, v in found.to_json()["arguments"].items())
     return Table(
         header=[
-            ("", ""),
+            ("controller", ""),
             ("cost, held-out seeds", "arcmin"),
             ("standard deviation", "arcmin"),
             ("cost, seeds of the search", "arcmin"),
@@ -240,7 +240,7 @@ def _gains(found: Tuned) -> Table:
     return Table(
         title="Gains",
         header=[
-            ("", ""),
+            ("gain", ""),
             *((one.name, "") for one in found.candidates),
             ("bounds", ""),
         ],

@@ -103,7 +103,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
         )
     return Table(
         header=[
-            ("", ""),
+            ("run", ""),
             ("verdict", ""),
             ("ripple rms", "% of rated"),
             ("ripple", "% of rated, pp"),
@@ -225,7 +225,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
             ("highest resolved order", "per input turn"),
             ("orders left out", "per input turn"),
             ("torque of these orders", "N·m, at rated torque"),
-            ("ripple rms ±", "%"),
+            ("ripple rms ±", "% of rated"),
             ("transm. error ±", "arcmin"),
             ("torsion ±", "arcmin"),
         ],
@@ -272,7 +272,7 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
         )
     return Table(
         header=[
-            ("", ""),
+            ("run", ""),
             ("torsion, mean", "arcmin"),
             ("torsion, pp", "arcmin"),
             ("transm. error, mean", "arcmin"),
@@ -332,11 +332,11 @@ def sheet_table(drive: DriveMap) -> dict[str, Any]:
         "picture": inline_picture(spec_picture(drive.name, sheet)),
         "table": Table(
             header=[
-                ("", ""),
+                ("figure", ""),
                 ("map", ""),
                 *([("manufacturer", "")] if stated else []),
-                ("", ""),
-                ("", ""),
+                ("unit", ""),
+                ("remark", ""),
             ],
             rows=rows,
         ),
