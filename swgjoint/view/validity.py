@@ -35,7 +35,7 @@ OFF_COMMAND, LAG = 0.1, 3.0
 """A warning is given if a link deviates from its command by more than ``OFF_COMMAND``
 [deg] and by more than ``LAG`` times the transmission error of its drive [-]."""
 MAX_STEPS = 400_000
-"""Largest number of steps of the finer run, which takes a few seconds."""
+"""Largest number of steps of the finer run, for a few seconds of computing time."""
 
 
 def step_error(run: Run) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
     scene = run.assembly.scene
     sections, drives = {}, {}
     for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
-        name = f"the drive of {joint} as it was run"
+        name = f"simulated drive of {joint}"
         section = scene.joint_settings(joint)
         sections[joint] = section.model_copy(update={"drive": name, "linear": None})
         drives[name] = transmission.attached.drive
@@ -96,7 +96,7 @@ def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
 
 
 def map_error(drive: DriveMap) -> list[str]:
-    """Known errors of a map, one line each; empty if none is known."""
+    """Validation and known errors of a map, one line each."""
     info = drive.info
     validation, reason = map_validation(drive)
     lines = [reason or ""] if validation is None else [validation_summary(validation)]

@@ -13,12 +13,14 @@ if TYPE_CHECKING:
     from swgjoint.validation.articles.runs import Found
 
 
-def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes | None:
+def articles_picture(
+    parts: Sequence[str], results: Mapping[str, Found]
+) -> bytes | None:
     """Draw radial stiffnesses, lobe forces, stress amplitudes and safety as PNG.
 
     Args:
         parts: Names of the computed parts.
-        found: Results by task.
+        results: Results by task.
 
     Returns:
         The PNG file; None if no computed part has a panel.
@@ -35,15 +37,15 @@ def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes 
     figure = Figure(figsize=(1 + 4.6 * len(panels), 4.6), layout="constrained")
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, draw in zip(axes, panels, strict=True):
-        draw(ax, found)
+        draw(ax, results)
     return png(figure, dpi=110)
 
 
-def _force(ax: Any, found: Mapping[str, Found]) -> None:
+def _force(ax: Any, results: Mapping[str, Found]) -> None:
     """Draw the radial stiffness of every variant at three places of the load."""
     named = {
         name.removeprefix("force, ").replace("force", "as bundled"): result
-        for name, result in found.items()
+        for name, result in results.items()
         if name.startswith("force") and "mid_face" in result
     }
     order = sorted(named, key=lambda name: named[name]["mid_face"])
@@ -59,9 +61,9 @@ def _force(ax: Any, found: Mapping[str, Found]) -> None:
     ax.grid(alpha=0.3)
 
 
-def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
+def _lobes(ax: Any, results: Mapping[str, Found]) -> None:
     """Draw the lobe force and the play of the output over the lobe deflection."""
-    result = found.get("force, lobes", {})
+    result = results.get("force, lobes", {})
     ax.set_title("between two lobes, large rotations", fontsize="medium")
     ax.set_xlabel("deflection of a lobe [mm]")
     ax.set_ylabel("force on a lobe [N]")
@@ -92,16 +94,16 @@ _LINES = (
 )
 
 
-def _amplitude(ax: Any, found: Mapping[str, Found]) -> None:
+def _amplitude(ax: Any, results: Mapping[str, Found]) -> None:
     """Draw the amplitude of the circumferential normal stress at the roots."""
-    _over_torque(ax, found, "normal_amplitude_MPa")
+    _over_torque(ax, results, "normal_amplitude_MPa")
     ax.set_ylabel("normal stress amplitude at the roots [MPa]")
 
 
-def _safety(ax: Any, found: Mapping[str, Found]) -> None:
+def _safety(ax: Any, results: Mapping[str, Found]) -> None:
     """Draw the safety factors, with those of shell theory."""
-    _over_torque(ax, found, "S")
-    known = [f["by_torque"] for f in found.values() if "by_torque" in f]
+    _over_torque(ax, results, "S")
+    known = [f["by_torque"] for f in results.values() if "by_torque" in f]
     rows = known[0] if known else []
     torque = [row["torque_Nm"] for row in rows]
     theory = [row["shell_theory"]["S"] for row in rows]
@@ -112,9 +114,9 @@ def _safety(ax: Any, found: Mapping[str, Found]) -> None:
     ax.legend(fontsize="small")
 
 
-def _over_torque(ax: Any, found: Mapping[str, Found], key: str) -> None:
+def _over_torque(ax: Any, results: Mapping[str, Found], key: str) -> None:
     for name, section, label, colour, style in _LINES:
-        rows = found.get(name, {}).get("by_torque", [])
+        rows = results.get(name, {}).get("by_torque", [])
         torque = [row["torque_Nm"] for row in rows]
         values = [row[section][key] for row in rows]
         ax.plot(torque, values, color=colour, ls=style, marker=".", label=label)

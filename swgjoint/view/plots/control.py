@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
 
 
-def ladder_table(found: Ladder) -> list[str]:
+def ladder_table(ladder: Ladder) -> list[str]:
     """Lines of a text table: mean ± standard deviation, one row per controller."""
-    header = ["", *found.units]
-    rows = [["", *found.units.values()]]
-    for rung, figures in found.figures.items():
+    header = ["", *ladder.units]
+    rows = [["", *ladder.units.values()]]
+    for rung, figures in ladder.figures.items():
         cells = [
             f"{values.mean():.3g} ± {values.std(ddof=min(1, values.size - 1)):.2g}"
-            + ("*" if found.made_for[rung] == key else " ")
+            + ("*" if ladder.made_for[rung] == key else " ")
             for key, values in figures.items()
         ]
         rows.append([rung, *cells])
@@ -33,12 +33,12 @@ def ladder_table(found: Ladder) -> list[str]:
     return [*lines, "* figure that this controller is designed for"]
 
 
-def ladder_picture(name: str, found: Ladder) -> bytes:
+def ladder_picture(name: str, ladder: Ladder) -> bytes:
     """Draw the signals of the first specimen, and the figures of all, as PNG.
 
     Args:
         name: Name of the drive.
-        found: Results of the controllers.
+        ladder: Results of the controllers.
     """
     from matplotlib.figure import Figure
 
@@ -61,9 +61,9 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
         ),
         (axes[0, 2], "even_time", "ripple", "time [s]", "output torque - mean [N·m]"),
     )
-    rungs = dict(zip(found.made_for, COLORS, strict=True))
+    rungs = dict(zip(ladder.made_for, COLORS, strict=True))
     for ax, x, y, along, label in signals:
-        for rung, shown in found.shown.items():
+        for rung, shown in ladder.shown.items():
             off = shown[y].mean() if y == "positioning" else 0.0
             ax.plot(shown[x], shown[y] - off, lw=0.9, color=rungs[rung], label=rung)
         ax.set(xlabel=along, ylabel=label)
@@ -71,17 +71,17 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
     axes[0, 0].legend(fontsize="x-small")
     bars = ("tracking_rms", "positioning_pp", "ripple_rms")
     for ax, key in zip(axes[1], bars, strict=True):
-        names = list(found.figures)
-        values = np.array([found.figures[rung][key] for rung in names])
+        names = list(ladder.figures)
+        values = np.array([ladder.figures[rung][key] for rung in names])
         place = np.arange(len(names))
         ax.bar(place, values.mean(axis=1), color=[rungs[rung] for rung in names])
         for k, row in enumerate(values):
             ax.plot(np.full(row.size, k), row, "k.", ms=2)
         ax.set_yscale("log")
         ax.set_xticks(place, names, rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{key} [{found.units[key]}]")
+        ax.set(title=f"{key} [{ladder.units[key]}]")
         ax.grid(alpha=0.3, axis="y")
-    count = next(iter(found.figures.values()))[bars[0]].size
+    count = next(iter(ladder.figures.values()))[bars[0]].size
     figure.suptitle(
         f"{name}: one specimen (top); {count} specimens as dots and mean (bottom)"
     )

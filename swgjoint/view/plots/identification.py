@@ -19,23 +19,23 @@ _TURNS = 4
 _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 
 
-def png(found: Identified) -> bytes:
+def png(identified: Identified) -> bytes:
     """The picture as a PNG file."""
     out = io.BytesIO()
-    save_png(picture(found), out, dpi=120)
+    save_png(picture(identified), out, dpi=120)
     return out.getvalue()
 
 
-def picture(found: Identified) -> Figure:
+def picture(identified: Identified) -> Figure:
     """Draw every channel with its residual, the torsion loop and kinematic error."""
     from matplotlib.figure import Figure
 
-    measured = found.model.measured_torques()
+    measured = identified.model.measured_torques()
     figure = Figure(figsize=(12.0, 3.2 * (len(measured) + 1)), layout="constrained")
     axes = figure.subplots(len(measured) + 1, 2)
-    time = found.samples.time[found.model.kept]
+    time = identified.samples.time[identified.model.kept]
     for row, (key, torque) in zip(axes, measured.items(), strict=False):
-        left = found.residuals[key]
+        left = identified.residuals[key]
         _line(row[0], time, torque, "measured", color="0.6", lw=2.0)
         _line(row[0], time, torque - left, "model", color="tab:blue", lw=0.8)
         row[0].set_ylabel(f"{_LABELS[key]} [N·m]")
@@ -46,9 +46,9 @@ def picture(found: Identified) -> Figure:
         )
         for ax in row:
             ax.set_xlabel("time [s]")
-    _loop(axes[-1, 0], found)
-    _error(axes[-1, 1], found)
-    figure.suptitle(found.drive.info["source"])
+    _loop(axes[-1, 0], identified)
+    _error(axes[-1, 1], identified)
+    figure.suptitle(identified.drive.info["source"])
     return figure
 
 
@@ -59,12 +59,12 @@ def _line(ax: Any, x: Any, y: Any, label: str, **style: Any) -> None:
     ax.plot(np.insert(np.asarray(x, float), gaps, np.nan), broken, label=label, **style)
 
 
-def _loop(ax: Any, found: Identified) -> None:
+def _loop(ax: Any, identified: Identified) -> None:
     """Draw the torque over the torsion of the log, and the spring of the map."""
-    drive, model = found.drive, found.model
-    values = np.array([e.value for e in found.estimates.values()])
+    drive, model = identified.drive, identified.model
+    values = np.array([e.value for e in identified.estimates.values()])
     a, b = model.amplitudes(values).T
-    error = found.estimates["zero"].value + model.cos @ a + model.sin @ b
+    error = identified.estimates["zero"].value + model.cos @ a + model.sin @ b
     torque = model.measured_torques().get("output_torque")
     if torque is None:
         torque = model.ratio * model.measured_torques()["motor_torque"]
@@ -82,14 +82,14 @@ def _loop(ax: Any, found: Identified) -> None:
     ax.legend(loc="upper left")
 
 
-def _error(ax: Any, found: Identified) -> None:
+def _error(ax: Any, identified: Identified) -> None:
     """Draw the kinematic error of the map over the first input turns."""
     ax.set_xlabel("input turns")
     ax.set_ylabel("kinematic error [arcmin]")
-    if not len(found.model.orders):
+    if not len(identified.model.orders):
         ax.text(0.5, 0.5, "no orders fitted", ha="center", transform=ax.transAxes)
         return
-    drive = found.drive
+    drive = identified.drive
     turns = np.linspace(0.0, _TURNS, 200 * _TURNS)
     theta = 2.0 * np.pi * turns
     error = drive.error_at(drive.phases(theta, theta / drive.ratio))[0]

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 Axes = Any  # matplotlib is imported only when a picture is drawn
 
 
-def optimum_picture(found: Optimum) -> bytes:
+def optimum_picture(optimum: Optimum) -> bytes:
     """Draw the front, the best value so far, and the parameters of the front as PNG."""
     from matplotlib.figure import Figure
 
     canvas = Figure(figsize=(16.0, 5.4), layout="constrained")
     front, course, values = canvas.subplots(1, 3)
-    _front(front, found)
-    _course(course, found)
-    _values(values, found)
-    canvas.suptitle(found.file.description or "search", fontsize=11)
+    _front(front, optimum)
+    _course(course, optimum)
+    _values(values, optimum)
+    canvas.suptitle(optimum.file.description or "search", fontsize=11)
     return png(canvas, dpi=100)
 
 
@@ -42,9 +42,9 @@ def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> 
     return np.array(values)
 
 
-def _front(axis: Axes, found: Optimum) -> None:
+def _front(axis: Axes, optimum: Optimum) -> None:
     """Draw the first two objectives, or a single one over the sequence of designs."""
-    names = [o.figure for o in found.file.objectives]
+    names = [o.figure for o in optimum.file.objectives]
 
     def places(candidates: Sequence[Candidate], *, confirmed: bool) -> tuple[Any, Any]:
         first = _figures(candidates, names[0], confirmed=confirmed)
@@ -52,38 +52,40 @@ def _front(axis: Axes, found: Optimum) -> None:
             return np.arange(len(candidates)), first
         return first, _figures(candidates, names[1], confirmed=confirmed)
 
-    x, y = places(found.tried, confirmed=False)
+    x, y = places(optimum.tried, confirmed=False)
     axis.plot(x, y, ".", color="0.75", ms=4, label="tried")
     if len(names) > 1:
-        x, y = places(found.front, confirmed=False)
+        x, y = places(optimum.front, confirmed=False)
         axis.plot(x, y, "o-", color="tab:blue", ms=5, lw=1.0, label="front")
         axis.plot(
-            *places(found.front, confirmed=True),
+            *places(optimum.front, confirmed=True),
             "o",
             mfc="none",
             color="tab:red",
             ms=9,
             label="front, confirmed",
         )
-        rivals = (found.start, *found.beside)
+        rivals = (optimum.start, *optimum.beside)
         for rival, mark in zip(rivals, cycle("sD^vP*X"), strict=False):
             name = rival.values["design"]
             there = places([rival], confirmed=False)
             axis.plot(*there, mark, color="black", ms=8, label=name)
             there = places([rival], confirmed=True)
             axis.plot(*there, mark, mfc="none", color="tab:red", ms=11)
-        _view(axis, found, names)
+        _view(axis, optimum, names)
     axis.set_xlabel(label_of(names[0]) if len(names) > 1 else "designs tried")
     axis.set_ylabel(label_of(names[min(1, len(names) - 1)]))
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
-    goals = ", ".join(f"{label_of(o.figure)}: {o.goal}" for o in found.file.objectives)
+    goals = ", ".join(
+        f"{label_of(o.figure)}: {o.goal}" for o in optimum.file.objectives
+    )
     axis.set_title(goals, fontsize=9)
 
 
-def _view(axis: Axes, found: Optimum, names: Sequence[str]) -> None:
+def _view(axis: Axes, optimum: Optimum, names: Sequence[str]) -> None:
     """Crop the axes to the front and the compared designs."""
-    near = [*found.front, found.start, *found.beside]
+    near = [*optimum.front, optimum.start, *optimum.beside]
     for name, limit in zip(names[:2], (axis.set_xlim, axis.set_ylim), strict=True):
         values = np.concatenate(
             [_figures(near, name, confirmed=c) for c in (False, True)]
@@ -93,17 +95,17 @@ def _view(axis: Axes, found: Optimum, names: Sequence[str]) -> None:
         limit(low - margin, high + margin)
 
 
-def _course(axis: Axes, found: Optimum) -> None:
+def _course(axis: Axes, optimum: Optimum) -> None:
     """Draw the best value so far of every objective, relative to the start design."""
-    for objective in found.file.objectives:
-        values = _figures(found.tried, objective.figure, confirmed=False)
+    for objective in optimum.file.objectives:
+        values = _figures(optimum.tried, objective.figure, confirmed=False)
         kept = [
-            c.record.ok and not any(found.file.violations(c.record.figures).values())
-            for c in found.tried
+            c.record.ok and not any(optimum.file.violations(c.record.figures).values())
+            for c in optimum.tried
         ]
         signed = np.where(kept, objective.sign * values, np.inf)
         best = objective.sign * np.fmin.accumulate(signed)
-        first = found.start.record.figures.get(objective.figure)
+        first = optimum.start.record.figures.get(objective.figure)
         there = np.isfinite(best)
         if first:
             best = best / first
@@ -120,20 +122,20 @@ def _course(axis: Axes, found: Optimum) -> None:
     axis.grid(alpha=0.3)
 
 
-def _values(axis: Axes, found: Optimum) -> None:
+def _values(axis: Axes, optimum: Optimum) -> None:
     """Draw the parameters of the front over their ranges.
 
     The colour shows the first objective.
     """
     import matplotlib
 
-    parameters = found.file.plan.parameters
-    first = found.file.objectives[0]
-    height = first.sign * _figures(found.front, first.figure, confirmed=False)
+    parameters = optimum.file.plan.parameters
+    first = optimum.file.objectives[0]
+    height = first.sign * _figures(optimum.front, first.figure, confirmed=False)
     scale = matplotlib.colors.Normalize(height.min(), height.max())
     colours = matplotlib.colormaps["viridis"]
     places = range(len(parameters))
-    for candidate, value in zip(found.front, height, strict=True):
+    for candidate, value in zip(optimum.front, height, strict=True):
         parts = [_part(p, candidate.values[p.column]) for p in parameters]
         axis.plot(parts, places, "o-", color=colours(scale(value)), lw=0.9, ms=4)
     labels = []

@@ -17,7 +17,7 @@ MOST = 6
 """Largest number of parameters and of figures in a picture; the first are drawn."""
 
 
-def sweep_picture(found: SweepResult) -> bytes:
+def sweep_picture(result: SweepResult) -> bytes:
     """Draw one row of panels per figure and one column per parameter as PNG.
 
     Every design is a point. Its colour shows the first figure in all panels, so that a
@@ -26,8 +26,8 @@ def sweep_picture(found: SweepResult) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    rows = found.rows()
-    columns, figures = found.columns[:MOST], found.file.figures[:MOST]
+    rows = result.rows()
+    columns, figures = result.columns[:MOST], result.file.figures[:MOST]
     canvas = Figure(
         figsize=(2.0 + 3.2 * len(columns), 1.2 + 2.6 * len(figures)),
         layout="constrained",
@@ -64,9 +64,9 @@ def sweep_picture(found: SweepResult) -> bytes:
                 axis.set_ylabel(label_of(figure))
     if shown is not None:
         canvas.colorbar(shown, ax=axes, label=label_of(figures[0]), aspect=40)
-    ok = sum(record.ok for record in found.records)
+    ok = sum(record.ok for record in result.records)
     text = f"{ok} designs with figures, {len(rows) - ok} without (crosses)"
-    canvas.suptitle(f"{found.file.description or 'sweep'}\n{text}", fontsize=10)
+    canvas.suptitle(f"{result.file.description or 'sweep'}\n{text}", fontsize=10)
     return png(canvas, dpi=100)
 
 

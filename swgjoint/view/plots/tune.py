@@ -22,33 +22,33 @@ COLORS = ("0.45", "C1", "C2", "C0")
 """Colours of the candidates; the tuned controller has the last one."""
 
 
-def claims(found: Tuned) -> list[str]:
+def claims(tuned: Tuned) -> list[str]:
     """Findings of a tuning run in sentences, one line each."""
-    baseline, best = found.baseline, found.best
+    baseline, best = tuned.baseline, tuned.best
     better = int((best.held_out < baseline.held_out).sum())
     count = best.held_out.size
     lines = [
         f"{best.name}: cost {_cost(best)} on {count} held-out seeds,"
-        f" {_less(found, best)} than PD by the textbook rule ({_cost(baseline)}),"
+        f" {_less(tuned, best)} than PD by the textbook rule ({_cost(baseline)}),"
         f" lower on {better} of them"
     ]
-    if len(found.candidates) > 2:
-        _, pd, ruled, _ = found.candidates
+    if len(tuned.candidates) > 2:
+        _, pd, ruled, _ = tuned.candidates
         lines += [
-            f"tuning the two gains of PD alone: {_cost(pd)}, {_less(found, pd)}",
+            f"tuning the two gains of PD alone: {_cost(pd)}, {_less(tuned, pd)}",
             f"feed-forward alone, gains by the rule: {_cost(ruled)},"
-            f" {_less(found, ruled)}; tuning changes this cost by"
+            f" {_less(tuned, ruled)}; tuning changes this cost by"
             f" {100.0 * (best.held_out.mean() / ruled.held_out.mean() - 1.0):+.0f} %",
         ]
     wide = best.held_out.mean() / best.training.mean() - 1.0
     lines.append(
-        f"its cost on the seeds of the search is {best.training.mean() / arcmin:.3g}"
-        f" arcmin; on the held-out seeds it is {abs(100 * wide):.0f} %"
-        f" {'higher' if wide > 0 else 'lower'}"
+        f"{best.name}: cost {best.training.mean() / arcmin:.3g} arcmin on the seeds of"
+        f" the search, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'} on"
+        " the held-out seeds"
     )
     at_bound = [
         p.key
-        for p, place in zip(found.parameters, _best_place(found), strict=True)
+        for p, place in zip(tuned.parameters, _best_place(tuned), strict=True)
         if not 0.01 < place < 0.99
     ]
     if at_bound:
@@ -56,11 +56,11 @@ def claims(found: Tuned) -> list[str]:
     return lines
 
 
-def write_files(found: Tuned, folder: Path) -> list[str]:
+def write_files(tuned: Tuned, folder: Path) -> list[str]:
     """Write ``tune.png``, ``tune.json`` and ``report.html``.
 
     Args:
-        found: Result of the tuning run.
+        tuned: Result of the tuning run.
         folder: Folder of the files.
 
     Returns:
@@ -69,23 +69,23 @@ def write_files(found: Tuned, folder: Path) -> list[str]:
     outputs, pictures = Outputs(folder), {}
 
     def drawn() -> bytes:
-        png = picture(found)
+        png = picture(tuned)
         pictures["Search, held-out seeds and one episode"] = png
         return png
 
     outputs.write("tune.png", drawn)
-    outputs.write("tune.json", lambda: json_text(found.to_json()) + "\n")
+    outputs.write("tune.json", lambda: json_text(tuned.to_json()) + "\n")
     outputs.hand_over(
         "report.html",
         lambda path: write_tables(
             path,
-            title=f"Tuning of {found.settings.controller} in {found.environment}",
-            description="; ".join(claims(found)) + ".",
-            tables=[_summary(found), _gains(found), _by_seed(found)],
+            title=f"Tuning of {tuned.settings.controller} in {tuned.environment}",
+            description="; ".join(claims(tuned)) + ".",
+            tables=[_summary(tuned), _gains(tuned), _by_seed(tuned)],
             pictures=pictures,
             settings={
                 "Run": json_text(
-                    {k: v for k, v in found.to_json().items() if k != "candidates"}
+                    {k: v for k, v in tuned.to_json().items() if k != "candidates"}
                 )
             },
         ),
@@ -93,41 +93,41 @@ def write_files(found: Tuned, folder: Path) -> list[str]:
     return outputs.files
 
 
-def picture(found: Tuned) -> bytes:
+def picture(tuned: Tuned) -> bytes:
     """Draw the searches, the costs by held-out seed and one episode as PNG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 7.5), layout="constrained")
     axes = figure.subplots(2, 2)
-    _draw_search(axes[0, 0], found)
-    _draw_seeds(axes[0, 1], found)
-    _draw_episode(axes[1], found)
+    _draw_search(axes[0, 0], tuned)
+    _draw_seeds(axes[0, 1], tuned)
+    _draw_episode(axes[1], tuned)
     return png(figure, dpi=110)
 
 
-def _draw_search(ax: Any, found: Tuned) -> None:
-    names = [one.controller for one in found.candidates[1::2]]
+def _draw_search(ax: Any, tuned: Tuned) -> None:
+    names = [one.controller for one in tuned.candidates[1::2]]
     colors = (COLORS[1], COLORS[3]) if len(names) > 1 else (COLORS[3],)
-    for name, color, search in zip(names, colors, found.searches.values(), strict=True):
+    for name, color, search in zip(names, colors, tuned.searches.values(), strict=True):
         best = search.progress() / arcmin
         ax.step(np.arange(1, best.size + 1), best, where="post", color=color)
         ax.plot([], [], color=color, label=f"{name}, best so far")
-    for one, color in zip(found.candidates[::2], (COLORS[0], COLORS[2]), strict=False):
+    for one, color in zip(tuned.candidates[::2], (COLORS[0], COLORS[2]), strict=False):
         level = one.training.mean() / arcmin
         ax.axhline(level, color=color, ls="--", lw=1.0, label=one.name)
     ax.set(
         yscale="log",
         xlabel="candidates",
         ylabel="mean cost [arcmin]",
-        title=f"search on {found.settings.training} seeds",
+        title=f"search on {tuned.settings.training} seeds",
     )
     _plain_ticks(ax)
     ax.legend()
 
 
-def _draw_seeds(ax: Any, found: Tuned) -> None:
-    seeds = found.settings.seeds[1]
-    for one, color in _colored(found):
+def _draw_seeds(ax: Any, tuned: Tuned) -> None:
+    seeds = tuned.settings.seeds[1]
+    for one, color in _colored(tuned):
         cost = one.held_out / arcmin
         ax.plot(seeds, cost, "o", ms=5, color=color, label=one.name)
         ax.axhline(cost.mean(), color=color, lw=1.0)
@@ -138,18 +138,18 @@ def _draw_seeds(ax: Any, found: Tuned) -> None:
         title="held-out seeds, and their means",
     )
     # leave room for the legend above the points
-    ax.set_ylim(top=4.0 * found.baseline.held_out.max() / arcmin)
+    ax.set_ylim(top=4.0 * tuned.baseline.held_out.max() / arcmin)
     ax.ticklabel_format(axis="x", useOffset=False)
     _plain_ticks(ax)
     ax.legend(loc="upper center", ncols=2)
 
 
-def _draw_episode(axes: Any, found: Tuned) -> None:
+def _draw_episode(axes: Any, tuned: Tuned) -> None:
     """Draw the held-out episode in which the baseline has its median cost."""
-    order = np.argsort(found.baseline.held_out)
+    order = np.argsort(tuned.baseline.held_out)
     k = int(order[order.size // 2])
-    seed = found.settings.seeds[1][k]
-    for one, color in ((found.baseline, COLORS[0]), (found.best, COLORS[3])):
+    seed = tuned.settings.seeds[1][k]
+    for one, color in ((tuned.baseline, COLORS[0]), (tuned.best, COLORS[3])):
         trace = one.trace
         style = {"color": color, "lw": 1.0, "label": one.name}
         axes[0].plot(trace.time, trace.error[:, k] / arcmin, **style)
@@ -157,7 +157,7 @@ def _draw_episode(axes: Any, found: Tuned) -> None:
     axes[0].set(ylabel="link minus reference [arcmin]", title=f"seed {seed}: error")
     axes[1].set(ylabel="motor torque [N·m]", title=f"seed {seed}: torque, reference")
     other = axes[1].twinx()
-    trace = found.best.trace
+    trace = tuned.best.trace
     other.plot(trace.time, np.degrees(trace.reference[:, k]), color="0.75", lw=1.0)
     other.set_ylabel("reference of the link [deg] (grey)")
     for ax in axes:
@@ -176,26 +176,26 @@ def _plain_ticks(ax: Any) -> None:
     ax.grid(axis="y", color="0.92")
 
 
-def _colored(found: Tuned) -> list[tuple[GainCandidate, str]]:
-    colors = COLORS if len(found.candidates) > 2 else (COLORS[0], COLORS[3])
-    return list(zip(found.candidates, colors, strict=True))
+def _colored(tuned: Tuned) -> list[tuple[GainCandidate, str]]:
+    colors = COLORS if len(tuned.candidates) > 2 else (COLORS[0], COLORS[3])
+    return list(zip(tuned.candidates, colors, strict=True))
 
 
-def _summary(found: Tuned) -> Table:
+def _summary(tuned: Tuned) -> Table:
     rows = []
-    for one in found.candidates:
+    for one in tuned.candidates:
         costs = [one.held_out.mean(), one.held_out.std(ddof=1), one.training.mean()]
-        saved = 100.0 * found.improvement(one)
+        saved = 100.0 * tuned.improvement(one)
         rows.append(
             [
                 Cell(one.name, "text"),
                 *[Cell(format_figure(float(x / arcmin))) for x in costs],
-                Cell("-" if one is found.baseline else f"{saved:.1f}"),
+                Cell("-" if one is tuned.baseline else f"{saved:.1f}"),
                 Cell(str(one.to_json()["broken_limits"])),
             ]
         )
-    s = found.settings
-    plant = ", ".join(f"{k} {v}" for k, v in found.to_json()["arguments"].items())
+    s = tuned.settings
+    plant = ", ".join(f"{k} {v}" for k, v in tuned.to_json()["arguments"].items())
     return Table(
         header=[
             ("controller", ""),
@@ -209,28 +209,28 @@ def _summary(found: Tuned) -> Table:
         notes=[
             "Cost of an episode: square root of the mean of e² + s² w u², with the"
             " error e of the link, the motor torque u over its limit, s ="
-            f" {found.error_scale / arcmin:g} arcmin, w = {found.effort_weight:g}; at"
-            f" most {found.worst / arcmin:.0f} arcmin.",
+            f" {tuned.error_scale / arcmin:g} arcmin, w = {tuned.effort_weight:g}; at"
+            f" most {tuned.worst / arcmin:.0f} arcmin.",
             "Textbook rule: the natural frequency is a third of the anti-resonance of"
-            f" the nominal link on its drive, {found.anti_resonance:.3g} Hz; the"
+            f" the nominal link on its drive, {tuned.anti_resonance:.3g} Hz; the"
             " damping ratio is 0.7.",
             f"Environment: {plant}. Optimiser {s.optimiser}, seed {s.seed},"
-            f" {sum(x.evaluations for x in found.searches.values())} candidates,"
-            f" {found.wall:.0f} s.",
+            f" {sum(x.evaluations for x in tuned.searches.values())} candidates,"
+            f" {tuned.wall:.0f} s.",
         ],
     )
 
 
-def _gains(found: Tuned) -> Table:
-    keys = [*found.best.values, *found.best.gains]
-    bounds = {p.key: (p.low, p.high) for p in found.parameters}
+def _gains(tuned: Tuned) -> Table:
+    keys = [*tuned.best.values, *tuned.best.gains]
+    bounds = {p.key: (p.low, p.high) for p in tuned.parameters}
     rows = []
     for key in keys:
         cells = [
             Cell(format_figure(value) if np.isfinite(value) else "none")
             if (value := (one.values | one.gains).get(key)) is not None
             else Cell("-")
-            for one in found.candidates
+            for one in tuned.candidates
         ]
         low, high = bounds.get(key, (None, None))
         searched = (
@@ -241,17 +241,17 @@ def _gains(found: Tuned) -> Table:
         title="Gains",
         header=[
             ("gain", ""),
-            *((one.name, "") for one in found.candidates),
+            *((one.name, "") for one in tuned.candidates),
             ("bounds", ""),
         ],
         rows=rows,
     )
 
 
-def _by_seed(found: Tuned) -> Table:
+def _by_seed(tuned: Tuned) -> Table:
     rows = []
-    for k, seed in enumerate(found.settings.seeds[1]):
-        costs = [float(one.held_out[k] / arcmin) for one in found.candidates]
+    for k, seed in enumerate(tuned.settings.seeds[1]):
+        costs = [float(one.held_out[k] / arcmin) for one in tuned.candidates]
         better = costs[-1] < costs[0]
         rows.append(
             [
@@ -263,7 +263,7 @@ def _by_seed(found: Tuned) -> Table:
                 ),
             ]
         )
-    names = [(one.name, "arcmin") for one in found.candidates]
+    names = [(one.name, "arcmin") for one in tuned.candidates]
     return Table(
         title="Cost by held-out seed",
         header=[("seed", ""), *names, ("reduction against the textbook rule", "%")],
@@ -271,11 +271,11 @@ def _by_seed(found: Tuned) -> Table:
     )
 
 
-def _best_place(found: Tuned) -> list[float]:
-    values = found.best.values
+def _best_place(tuned: Tuned) -> list[float]:
+    values = tuned.best.values
     return [
         float(np.log(values[p.key] / p.low) / np.log(p.high / p.low))
-        for p in found.parameters
+        for p in tuned.parameters
     ]
 
 
@@ -284,6 +284,6 @@ def _cost(one: GainCandidate) -> str:
     return f"{mean:.3g} ± {spread:.2g} arcmin"
 
 
-def _less(found: Tuned, one: GainCandidate) -> str:
-    saved = 100.0 * found.improvement(one)
+def _less(tuned: Tuned, one: GainCandidate) -> str:
+    saved = 100.0 * tuned.improvement(one)
     return f"{abs(saved):.1f} % {'less' if saved >= 0 else 'more'}"
