@@ -1,1 +1,1 @@
-"""Pictures and recordings."""
+"""Pictures, reports and recordings of results."""

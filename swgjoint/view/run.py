@@ -67,7 +67,7 @@ def run_scene(
         recording: File for the viewer recording, which is written during the
             simulation; :meth:`SceneRun.to_rerun` writes it afterwards. If it cannot be
             written, an ``OutputWarning`` is given and the run is still returned.
-        progress: Called with the number of completed steps.
+        progress: Called with the stage, the number of completed steps and their total.
 
     Returns:
         The recorded run.

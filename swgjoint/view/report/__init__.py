@@ -1,1 +1,1 @@
-"""Runs as one self-contained HTML file."""
+"""Runs and other results as one self-contained HTML file."""

@@ -54,7 +54,7 @@ def write_report(
         summary: Table at the top; None for :func:`summary_table` of the runs.
         pictures: PNG images below that table, by title.
         check_step: Whether to repeat every run at half its step.
-        progress: Called with the number of completed sections.
+        progress: Called after every section with their number and total.
 
     Returns:
         The path.
