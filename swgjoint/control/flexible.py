@@ -1,18 +1,18 @@
-r"""Feed-forward through the elastic drive: the motor's motion from the link's.
+r"""Feed-forward through the elastic drive: motor motion and torque from link motion.
 
-The link shall follow :math:`\psi(t)`, for which the arm asks the torque T(t) of its
-drive. Behind a map the motor then stands where
+To follow :math:`\psi(t)`, the link needs the drive torque T(t). The drive map then
+determines the motor angle by
 
-.. math:: F_\psi(\theta, \psi) - C\,\dot\Delta\,\partial_\psi\Delta = T,
+.. math:: F_\psi(\theta, \psi) - C\,\dot\Delta\,\partial_\psi\Delta = T.
 
-its speed and acceleration follow from that motion, and its torque is
+Motor speed and acceleration follow by differentiation, and the motor torque is
 
 .. math:: \tau = J_m \ddot\theta - F_\theta(\theta, \psi)
     + C\,\dot\Delta\,\partial_\theta\Delta + f(\dot\theta, T/i).
 
-Torsion, its stiffness curve and the kinematic error of the map are all inside; with a
-constant stiffness and without error it is the feed-forward of Spong (1987), with T and
-its derivatives written out.
+This includes torsion, stiffness curve and kinematic error of the map. With constant
+stiffness and without kinematic error it reduces to the feed-forward of Spong (1987)
+with T and its derivatives written out.
 
 Source:
     Spong (1987), "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
@@ -33,27 +33,29 @@ from swgjoint.sim.controller import Task
 from swgjoint.typing import Array
 
 RTOL = 1e-9
-"""Torque left over rated torque at which a motor angle is accepted."""
+"""Tolerance of the torque residual relative to rated torque [-]."""
 ROUNDS = 3
-"""Passes that settle the damping, whose torque is a few percent of a change of T."""
-_CHUNK = 2048  # samples at once: the coefficient table of a chunk stays in the cache
+"""Number of fixed-point iterations for the damping torque, which is a few percent of a
+change of T."""
+_CHUNK = 2048  # samples per call, so that the coefficient table fits in the CPU cache
 _DEGREE = 5
 
 
 def flexible_plan(task: Task) -> MotorPlan:
     """Motor motion and torque that make the known drives move the link as commanded.
 
-    Derivatives along the motion are those of a quintic spline through the samples of
-    the torsion and error; the ideal part of the motion is differentiated exactly. The
-    speed that the plan asks for is the change of the angle over the last period, as an
-    encoder tells it and as the integrator ``discrete`` has it: half a period old, which
-    would be an error of first order in the period. A motion whose torque jumps needs
-    an impulse of the motor: ramps of scenes are smooth enough, steps and trapezoids
-    are not. A drive of level ``rigid`` has no torsion, its output moves by its
-    kinematic error alone.
+    A quintic spline through the samples differentiates torsion and kinematic error; the
+    ideal part of the motion is differentiated exactly. The planned speed is the change
+    of the angle over the last period, as an encoder and the integrator ``discrete``
+    measure it. It is therefore half a period old; the exact speed would differ from the
+    reading by a term of first order in the period.
+
+    A motion whose torque jumps requires a torque impulse of the motor. The ramps of
+    scenes are smooth enough; steps and trapezoids are not. A drive of level ``rigid``
+    has no torsion, so that its output deviates by its kinematic error only.
 
     Raises:
-        ComputationError: If a torque of the motion is not reached by the map.
+        ComputationError: If the map does not reach a torque of the motion.
     """
     joints, i = task.joints, task.joints.ratio
     damping = np.broadcast_to(joints.damping, task.position.shape[1:])
@@ -88,18 +90,18 @@ def flexible_plan(task: Task) -> MotorPlan:
 
 
 def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
-    """Motor angles at which the potential of a drive exerts torques on the output.
+    """Motor angles at which the elastic torque on the output has given values.
 
     Args:
-        drive: Map.
+        drive: Map of the drive.
         psi: Output angles [rad].
-        torque: [N·m]. Same shape.
+        torque: Torques on the output [N·m]. Same shape.
 
     Returns:
-        [rad]. Same shape.
+        Motor angles [rad]. Same shape.
 
     Raises:
-        ComputationError: If the angles are not found.
+        ComputationError: If the iteration does not converge.
     """
     at, wanted = psi.reshape(-1), torque.reshape(-1)
     try:
@@ -115,7 +117,7 @@ def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
 
 
 def _solve(drive: DriveMap, psi: Array, torque: Array, mean: Array) -> Array:
-    """Newton iterations from torsions of the mean curve, all samples together."""
+    """Newton iteration for all samples, started from torsions of the mean curve."""
     i, rated = drive.ratio, drive.ratings.rated_torque
     theta = i * (psi + mean - drive.error_at(drive.phases(i * psi, psi))[0])
     softest = 1e-3 * drive.mean_stiffness / i**2
@@ -126,13 +128,13 @@ def _solve(drive: DriveMap, psi: Array, torque: Array, mean: Array) -> Array:
             return np.asarray(theta)
         ahead = drive.law(theta + nudge, psi).output_force
         behind = drive.law(theta - nudge, psi).output_force
-        # of the torque by the output-side angle, times i: never of the wrong sign
+        # derivative of the torque by theta times the sign of i: never negative
         slope = (ahead - behind) / (2.0 * nudge) * np.sign(i)
         theta = theta - np.sign(i) * residual / np.maximum(slope, softest * abs(i))
     worst = int(np.abs(residual).argmax())
     raise ComputationError(
         f"drive {drive.name!r}: no motor angle for {torque[worst]:.4g} N·m at the"
-        f" output (left: {residual[worst]:.2g} N·m); lower acceleration or load"
+        f" output (residual: {residual[worst]:.2g} N·m); lower acceleration or load"
     )
 
 
@@ -145,7 +147,7 @@ def _motor_angle(
     damping: Array,
     period: float,
 ) -> Array:
-    """Motor angles of one joint along motions, damping included. Shape (n, ...)."""
+    """Motor angles of one joint along motions, including damping. Shape (n, ...)."""
     if drive.level == "rigid":
         return motor_of_link(drive, psi)
     theta = motor_angle(drive, psi, torque)
@@ -168,7 +170,7 @@ def _input_torque(
     torque: Array,
     damping: Array,
 ) -> Array:
-    """What the drive asks of the motor, potential and damping [N·m]."""
+    """Motor torque against the elastic and damping torque of the drive [N·m]."""
     if drive.level == "rigid":
         return np.asarray(torque / drive.ratio)
     shape = theta.shape
@@ -187,14 +189,14 @@ def _input_torque(
 def _torsion_rate(
     drive: DriveMap, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
 ) -> tuple[Array, Array, Array]:
-    """Rate of the torsion [rad/s] and its derivatives by theta and psi [-]."""
+    """Torsion rate [rad/s], and derivatives of the torsion by theta and psi [-]."""
     _, e_theta, e_psi = drive.error_at(drive.phases(theta, psi))
     by_theta, by_psi = 1.0 / drive.ratio + e_theta, -1.0 + e_psi
     return by_theta * theta_rate + by_psi * psi_rate, by_theta, by_psi
 
 
 def _derivatives(values: Array, period: float) -> tuple[Array, Array, Array]:
-    """Values, first and second derivative in time of a quintic spline, along axis 0."""
+    """Values and first two time derivatives along axis 0, by a quintic spline."""
     count = len(values)
     if count <= _DEGREE:
         return values, np.zeros_like(values), np.zeros_like(values)

@@ -1,9 +1,11 @@
-r"""Kinematic error by look-up in the angles of the wave generator.
+r"""Identification and compensation of the kinematic error by a table of harmonics.
 
-The error of one drive is a sum over the angles of the wave generator against both
-toothed members, :math:`e_0 = \sum_k a_k \cos\varphi_k + b_k \sin\varphi_k` with
-:math:`\varphi_k = p_k \alpha + q_k \beta`, so that a record of one slow output turn
-tells it for all loads and motions; makers of drives compensate accuracy this way.
+The kinematic error of a drive is a sum of harmonics of the wave-generator angles alpha
+and beta relative to the two toothed members,
+:math:`e_0 = \sum_k a_k \cos\varphi_k + b_k \sin\varphi_k` with
+:math:`\varphi_k = p_k \alpha + q_k \beta`. A record of one slow output turn therefore
+determines it for all loads and motions. Manufacturers of drives compensate the
+transmission accuracy in this way.
 """
 
 from __future__ import annotations
@@ -27,36 +29,36 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 SEARCHED: tuple[tuple[int, int], ...] = (*ORDERS, (1, 1), (8, 0), (0, 8))
-"""(p, q) that a record is searched for: low orders of either member, the output turn,
-and what an eccentric wave generator makes of both."""
+"""Default orders (p, q) of the identification: low orders of either member, the output
+turn, and the combinations that an eccentric wave generator causes."""
 SURE = 4.0
-"""A harmonic is kept from this many of its standard errors: of a score that are not
-there, noise passes one in a hundred tables."""
-_TURN = 0.98  # of an output turn that a record must cover
-_PER_WAVE = 4.0  # samples that tell a wave
-_LEVERAGE = 1e4  # beyond, two orders of the record cannot be told apart
+"""Smallest amplitude of a harmonic that is kept, in standard errors [-]. If 20 searched
+harmonics are absent, noise passes this threshold in one of a hundred tables."""
+_TURN = 0.98  # fraction of an output turn that a record must cover
+_PER_WAVE = 4.0  # samples per period of the highest order
+_LEVERAGE = 1e4  # largest condition number at which the orders can be separated
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointRecord:
-    """What the encoders of one joint read; shapes (n,)."""
+    """Encoder readings of one joint."""
 
     motor_angle: Array
-    """[rad]."""
+    """Motor angle [rad]. Shape (n,)."""
     link_angle: Array
-    """[rad]."""
+    """Link angle [rad]. Shape (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KinematicErrorTable:
-    """Harmonics of e0 of one drive."""
+    """Harmonics of the kinematic error e0 of one drive."""
 
     orders: NDArray[np.int64]
-    """(p, q) of p alpha + q beta. Shape (n, 2)."""
+    """Orders (p, q) of the phases p alpha + q beta. Shape (n, 2)."""
     amplitudes: Array
-    """Cosine and sine [rad]. Shape (n, 2)."""
+    """Cosine and sine amplitudes [rad]. Shape (n, 2)."""
     deviation: float = 0.0
-    """Standard error of an amplitude, as if all that is left were noise [rad]."""
+    """Standard error of an amplitude if the residual of the fit is pure noise [rad]."""
 
     def __post_init__(self) -> None:
         orders = np.array(self.orders, dtype=np.int64).reshape(-1, 2)
@@ -66,11 +68,16 @@ class KinematicErrorTable:
         object.__setattr__(self, "amplitudes", pairs)
 
     def apply_to(self, drive: DriveMap) -> DriveMap:
-        """The drive with this kinematic error in place of its own."""
+        """Replace the kinematic error of a drive by this one."""
         return with_error(drive, self.orders, self.amplitudes)
 
     def scale_to(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
-        """The same in proportion: on a drive its peak to peak is that wanted [rad]."""
+        """Scale all amplitudes to a peak-to-peak kinematic error.
+
+        Args:
+            drive: Drive whose layout and teeth determine the peak-to-peak value.
+            wanted: Peak-to-peak kinematic error [rad].
+        """
         sized = self.amplitudes * wanted / peak_to_peak(self.apply_to(drive))
         return replace(self, amplitudes=sized)
 
@@ -81,19 +88,20 @@ def identify_kinematic_error(
     *,
     orders: Sequence[tuple[int, int]] = SEARCHED,
 ) -> KinematicErrorTable:
-    """Harmonics of alpha and beta in a slow record of one output turn, least squares.
+    """Fit harmonics of alpha and beta to a slow record of one output turn.
 
-    The load may be any that stays the same: its torsion goes into the constant, and a
-    straight line takes its slow change. The record may be noisy; of the orders searched
-    those are kept that stand out of it.
+    The least-squares fit includes a constant, which absorbs the torsion under a
+    constant load, and a linear trend, which absorbs its slow change. Only the orders
+    that exceed the noise of the record are kept, see :data:`SURE`.
 
     Args:
-        record: Readings along one direction, at least one turn of the output.
-        drive: Layout and teeth; its own error is not used.
-        orders: (p, q) to look for.
+        record: Readings in one direction of rotation, at least one output turn.
+        drive: Drive with layout and teeth; its kinematic error is not used.
+        orders: Orders (p, q) to search for.
 
     Raises:
-        InputError: If the record is too short, too coarse, or does not tell the orders.
+        InputError: If the record is too short or too coarse, or if it cannot separate
+            the orders.
     """
     theta, psi = (
         frozen_array(x, name, ndim=1)
@@ -109,13 +117,13 @@ def identify_kinematic_error(
     if theta.shape != psi.shape or span < _TURN * 2.0 * np.pi:
         raise InputError(
             f"record of {psi.size} link and {theta.size} motor angles over"
-            f" {span / deg:.4g} deg of the output; accepted: as many of both, over one"
-            " turn, 360 deg"
+            f" {span / deg:.4g} deg of the output; accepted: equal numbers of both,"
+            " over one turn, 360 deg"
         )
     if psi.size < _PER_WAVE * most:
         raise InputError(
             f"record of {psi.size} samples over {span / deg:.4g} deg of the output;"
-            f" accepted: at least {_PER_WAVE * most:.0f} for the orders asked for"
+            f" accepted: at least {_PER_WAVE * most:.0f} for the requested orders"
         )
     phases = np.stack([theta, psi], axis=-1) @ by.T.astype(float)
     error = psi - theta / drive.ratio
@@ -134,15 +142,15 @@ def _basis(phases: Array, psi: Array) -> Array:
 
 
 def _fit(basis: Array, error: Array, count: int) -> tuple[Array, float]:
-    """Pairs of amplitudes and their standard error."""
+    """Cosine and sine amplitudes, and their standard error."""
     weights, _, rank, sizes = np.linalg.lstsq(basis, error, rcond=None)
     if rank < basis.shape[1] or sizes[0] > _LEVERAGE * sizes[-1]:
         raise InputError(
-            "record whose orders cannot be told apart; accepted: fewer orders, or a"
-            " record at even speed"
+            "the record cannot separate the orders; accepted: fewer orders, or a"
+            " record at constant speed"
         )
-    left = error - basis @ weights
-    spread = float(np.sqrt(left @ left / max(error.size - basis.shape[1], 1)))
+    residual = error - basis @ weights
+    spread = float(np.sqrt(residual @ residual / max(error.size - basis.shape[1], 1)))
     pairs = np.stack([weights[2 : 2 + count], weights[2 + count :]], axis=-1)
     return pairs, spread * float(np.sqrt(2.0 / error.size))
 
@@ -150,11 +158,14 @@ def _fit(basis: Array, error: Array, count: int) -> tuple[Array, float]:
 def compensate(
     tables: Sequence[KinematicErrorTable], plan: Planner = flexible_plan
 ) -> Planner:
-    """A plan whose drives have the kinematic error of tables.
+    """Make a planner that uses identified kinematic errors.
 
     Args:
-        tables: One for every joint.
-        plan: One that uses the map of the drives.
+        tables: Kinematic errors, one per joint.
+        plan: Planner that uses the drive maps of the task.
+
+    Returns:
+        Planner that calls ``plan`` with the tables as kinematic errors of the drives.
     """
 
     def planned(task: Task) -> MotorPlan:
@@ -168,22 +179,30 @@ def compensate(
 
 
 class TurnRecorder:
-    """Keeps what another controller reads; needs a link encoder."""
+    """Controller that records the readings of another one; needs a link encoder."""
 
     def __init__(self, inner: Controller) -> None:
-        """Record the readings that ``inner`` acts on."""
+        """Record the readings that ``inner`` receives."""
         self.inner = inner
 
     def start(self, task: Task) -> None:
-        """Forget the last record."""
+        """Discard the last record and start the inner controller."""
         self._read: list[tuple[Array, Array]] = []
         self.inner.start(task)
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """That of the controller whose readings are kept."""
+        """Record the readings and return the torque of the inner controller [N·m].
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+
+        Raises:
+            InputError: If there is no link encoder.
+        """
         if measured.link_angle is None:
             raise InputError(
-                "a record of the link without link encoder; accepted: a scene with"
+                "recording the link angle needs a link encoder; accepted: a scene with"
                 " controller.feedback = 'link'"
             )
         self._read.append((measured.motor_angle, measured.link_angle))
@@ -193,8 +212,8 @@ class TurnRecorder:
         """Readings of one joint.
 
         Args:
-            joint: Its number.
-            skip: Instants at the start that are left out.
+            joint: Index of the joint.
+            skip: Number of instants omitted at the start.
         """
         motor, link = np.moveaxis(np.array(self._read[skip:]), 1, 0)
         return JointRecord(motor_angle=motor[..., joint], link_angle=link[..., joint])

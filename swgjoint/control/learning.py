@@ -1,31 +1,35 @@
-r"""Learning compensation in the angles of the wave generator.
+r"""Learning compensation of periodic errors in harmonics of the wave-generator angles.
 
-At constant speed the errors of a drive move its link by :math:`\text{Re} \sum_k d_k
-e^{j\varphi_k}`, :math:`\varphi_k = p_k \alpha + q_k \beta`, turn after turn. The
-compensation adds a motion :math:`q = \text{Re} \sum_k c_k e^{j\varphi_k}` of the link
-to the command, by motor angle and torque through the nominal two masses,
+At constant speed the errors of a drive deflect its link periodically by
+:math:`\text{Re} \sum_k d_k e^{j\varphi_k}` with :math:`\varphi_k = p_k \alpha + q_k
+\beta`. The compensation adds a link motion :math:`q = \text{Re} \sum_k c_k
+e^{j\varphi_k}` to the command. The nominal two-mass model converts it to a motor angle
+and a motor torque,
 
 .. math:: \theta/i = \left(1 - \frac{\omega^2 J_l}{K + j\omega C}\right) q, \quad
     \tau = i J_m \ddot\theta/i + J_l \ddot q / i,
 
-and learns :math:`c_k` from blocks of a few turns: least squares finds the harmonics
-:math:`s_k` of what is left of the link's error (or of the output torque, over
-:math:`-\omega^2 J_l`),
+The coefficients :math:`c_k` are learned in blocks of several turns. At the end of a
+block, least squares determines the harmonics :math:`s_k` of the remaining link error
+(or of the output torque, divided by :math:`-\omega^2 J_l`), and
 
 .. math:: c_k \leftarrow (1 - \rho)\,c_k - \mu s_k .
 
-*Convergence.* The link answers to c with :math:`s = (1 + \epsilon) c + d`, where
-:math:`\epsilon(\omega)` is what the nominal masses, stiffness and gains miss. A block
-multiplies the distance from the fixed point by :math:`1 - \rho - \mu(1 + \epsilon)`: it
-contracts for :math:`|\epsilon| < 1` and every :math:`\mu (1 + |\epsilon|) + \rho < 1`,
-for a phase of the model below 90 degrees with small enough rates in any case, and
-leaves :math:`\rho/(\rho + \mu(1+\epsilon))` of d. Orders of alpha and beta that a block
-cannot tell apart (2 alpha and 2 beta differ by two waves in a turn of the output) share
-their sum by a ridge; blocks of other phases sort them (Kaczmarz), the faster the more
-the phases differ: hence blocks of a quarter turn of the output. The *robustness
-filter* is the short list of orders: nothing else is ever fed back, above all nothing
-near the resonance that is not asked for; blocks whose commanded speed changes are not
-learned from.
+*Convergence.* The link responds to c with :math:`s = (1 + \epsilon) c + d`, where
+:math:`\epsilon(\omega)` is the relative error of the nominal model. A block multiplies
+the distance from the fixed point by :math:`1 - \rho - \mu(1 + \epsilon)`. The iteration
+converges for :math:`|\epsilon| < 1` if :math:`\mu (1 + |\epsilon|) + \rho < 1`, and for
+any model whose phase error is below 90 degrees if the rates are small enough. It leaves
+the fraction :math:`\rho/(\rho + \mu(1+\epsilon))` of d.
+
+A block cannot separate orders of alpha and beta that differ by little: 2 alpha and
+2 beta differ by two periods per output turn. A ridge term distributes the sum among
+them, and later blocks at other phases separate them (Kaczmarz), the faster the more the
+phases differ. The default block is therefore a quarter turn of the output.
+
+The short list of orders acts as *robustness filter*: no other harmonics are fed back,
+in particular none near the resonance unless the list contains them. Blocks in which the
+commanded speed changes are ignored.
 
 Source:
     Bodson, Sacks, Khosla (1994), "Harmonic generation in adaptive feedforward
@@ -51,14 +55,14 @@ from swgjoint.typing import Array
 Complex = NDArray[np.complex128]
 
 LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))
-"""2 and 4 per turn against either member, and 2 per turn of an eccentric wave
-generator: what errors of pitch and roundness leave."""
+"""Default orders (p, q), which pitch and roundness errors excite: 2 and 4 per turn
+relative to either member, and 2 per turn of an eccentric wave generator."""
 RIDGE = 1e-2
-"""Against the mean square of a wave, 0.5."""
+"""Ridge term added to the mean square of each harmonic, which is 0.5 [-]."""
 
 
 class LearningCompensation:
-    """A controller whose command is extended by a learned motion of the link."""
+    """Controller that adds a learned link motion to the command of another one."""
 
     def __init__(
         self,
@@ -72,20 +76,23 @@ class LearningCompensation:
         delay: float | None = None,
         limit: float = 3e-3,
     ) -> None:
-        """Learn beside a controller; it sees the motor without the learned motion.
+        """Extend a controller; it receives readings without the learned motion.
 
         Args:
-            inner: Gives the torques without the compensation.
-            orders: (p, q) of p alpha + q beta, the robustness filter.
-            signal: Sensor that the harmonics are learned from.
-            rate: mu, share of what is left that a block takes off, in (0, 1].
-            forgetting: rho, share of what was learned that a block forgets, in [0, 1).
-            turns: Of the wave generator in a block; None: a quarter turn of the output.
-            delay: Age of the signal's readings [s]; None: that of the task.
+            inner: Controller that computes the torques without the compensation.
+            orders: Orders (p, q) of the learned harmonics, the robustness filter.
+            signal: Sensor signal from which the harmonics are learned.
+            rate: Learning rate mu, the fraction of the remaining error that a block
+                removes [-], in (0, 1].
+            forgetting: Fraction rho of the learned coefficients that a block forgets
+                [-], in [0, 1).
+            turns: Wave-generator turns in a block; None: a quarter turn of the output.
+            delay: Age of the readings of the signal [s]; None: the age that the task
+                states.
             limit: Largest amplitude of a learned harmonic [rad].
 
         Raises:
-            InputError: If a rate or the signal is not accepted.
+            InputError: If the signal, a rate or ``turns`` is not accepted.
         """
         if signal not in ("link_angle", "output_torque"):
             raise InputError(f"signal {signal!r}; accepted: link_angle, output_torque")
@@ -100,15 +107,16 @@ class LearningCompensation:
         self.turns, self.delay, self.limit = turns, delay, limit
 
     def start(self, task: Task, learned: Complex | None = None) -> None:
-        """Prepare a motion; start from what was learned on another one, if given.
+        """Prepare a motion, optionally with coefficients learned on another one.
 
         Args:
-            task: The motion.
-            learned: c of another motion at the same speed [rad].
+            task: The commanded motion.
+            learned: Coefficients c from another motion at the same speed [rad]; None
+                starts at zero. Complex, shape (..., n_joints, n_orders).
         """
         joints, i = task.joints, task.joints.ratio
         self._task = task
-        # waves per turn of the link, (n_joints, n_orders); below (n, ..., both of them)
+        # periods per link turn (n_joints, n_orders); below (n, ..., n_joints, n_orders)
         layouts = [np.array(angle_coefficients(d.layout)) for d in joints.drives]
         by = np.array([self.orders @ layout for layout in layouts])
         per_link = by[:, :, 0] * i[:, None] + by[:, :, 1]
@@ -117,8 +125,8 @@ class LearningCompensation:
         stiffness = _stiffness(task)
         inertia, omega = joints.link_inertia[..., None], self._omega
         spring = stiffness[:, None] + 1j * omega * joints.damping[..., None]
-        # unit waves of the link, of the motor at the output side, and of its speed,
-        # half a period old as encoders tell it
+        # unit harmonics of the link angle, of the motor angle at the output side, and
+        # of the motor speed, which encoders measure half a period late
         self._link = np.exp(1j * self._phase)
         self._motor = (1.0 - omega**2 * inertia / spring) * self._link
         late = np.exp(-0.5j * omega * task.period)
@@ -126,7 +134,7 @@ class LearningCompensation:
         rotor = i[:, None] * joints.rotor_inertia[..., None]
         on_motor = rotor * self._motor + inertia / i[:, None] * self._link
         self._torque = -(omega**2) * on_motor
-        # as they are read
+        # delayed by the age of the readings
         self._link = task.as_read(self._link, "link")
         self._motor = task.as_read(self._motor, "motor")
         self._speed = task.as_read(self._speed, "motor")
@@ -139,18 +147,26 @@ class LearningCompensation:
         self._age = age if self.delay is None else self.delay
         shape = (*task.position.shape[1:], len(self.orders))
         self.learned: Complex = np.zeros(shape, complex)
-        """c [rad]. Complex, shape (..., n_joints, n_orders)."""
+        """Coefficients c [rad]. Complex, shape (..., n_joints, n_orders)."""
         if learned is not None:
             self.learned = np.broadcast_to(learned, shape).astype(complex)
         self.blocks = 0
-        """That were learned from."""
+        """Number of blocks that were used for learning."""
         self._signal = np.zeros_like(task.position)
         self._ends = self._blocks(task)
         self._begin = 0
         self.inner.start(task)
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """See :class:`swgjoint.sim.controller.Controller`."""
+        """Torque of the inner controller plus that of the learned motion [N·m].
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+
+        Raises:
+            InputError: If the sensor of the signal is missing.
+        """
         self._read(k, measured)
         if k in self._ends:
             self._learn(slice(self._begin, k))
@@ -170,13 +186,13 @@ class LearningCompensation:
         reading = getattr(measured, self.signal)
         if reading is None:
             raise InputError(
-                f"learning from {self.signal} without its sensor; accepted: a scene"
-                " with controller.feedback = 'link' or sensors.torque"
+                f"learning from {self.signal} needs its sensor; accepted: a scene with"
+                " controller.feedback = 'link' or sensors.torque"
             )
         self._signal[k] = reading - self._known[k]
 
     def _blocks(self, task: Task) -> frozenset[int]:
-        """Instants that end a block: the slowest of the joints that move counts."""
+        """Instants at which a block ends; the slowest moving joint sets its length."""
         ratio = np.abs(task.joints.ratio)
         each = 0.25 * ratio if self.turns is None else np.full(ratio.size, self.turns)
         way = np.abs(task.velocity) * task.period * ratio / (2.0 * np.pi * each)
@@ -211,28 +227,28 @@ class LearningCompensation:
         square = np.einsum("n...a,n...b->...ab", basis, basis) / count
         right = np.einsum("n...a,n...->...a", basis, self._signal[block]) / count
         square += RIDGE * np.diag([0.0, 0.0, *np.ones(2 * orders)])
-        found = np.linalg.solve(square, right[..., None])[..., 0][..., 2:]
-        left = found[..., :orders] - 1j * found[..., orders:]
+        pairs = np.linalg.solve(square, right[..., None])[..., 0][..., 2:]
+        residual = pairs[..., :orders] - 1j * pairs[..., orders:]
         if self.signal == "output_torque":
             inertia = self._task.joints.link_inertia[..., None]
             with np.errstate(divide="ignore", invalid="ignore"):
-                left = left / (-(omega[0] ** 2) * inertia)
-        new = (1.0 - self.forgetting) * self.learned - self.rate * left
+                residual = residual / (-(omega[0] ** 2) * inertia)
+        new = (1.0 - self.forgetting) * self.learned - self.rate * residual
         new = new * np.minimum(1.0, self.limit / np.maximum(np.abs(new), 1e-300))
         self.learned = np.where(moving[..., None], new, self.learned)
         self.blocks += 1
 
 
 def _stiffness(task: Task) -> Array:
-    """Tangent of the known drives at the mean torque of the motion [N·m/rad]."""
-    found = []
+    """Tangent stiffness of the known drives at the mean torque [N·m/rad]."""
+    stiffness = []
     for j, drive in enumerate(task.joints.drives):
         torsion = drive.mean_torsion(float(task.link_torque[..., j].mean()))
-        found.append(float(drive.coefficients(torsion, 2)[0, 0]))
-    return np.array(found)
+        stiffness.append(float(drive.coefficients(torsion, 2)[0, 0]))
+    return np.array(stiffness)
 
 
 def _sum(amplitudes: Complex, waves: Complex) -> Array:
-    """Real part of amplitudes times unit waves, over the orders."""
-    # einsum costs a third of a product and a sum of these few numbers
+    """Real part of the sum of amplitudes times unit harmonics over the orders."""
+    # for these few numbers einsum takes a third of the time of a product and a sum
     return np.asarray(np.einsum("...k,...k->...", amplitudes, waves).real)

@@ -1,16 +1,17 @@
-r"""Position control on the motor's own encoder, with a plan made before the motion.
+r"""Position control of the motor angle about a plan that is made before the motion.
 
-A *plan* says where the motor shall be and what torque takes it there,
+A *plan* contains the reference angle :math:`\theta_r` of the motor and the feed-forward
+torque :math:`\tau_r`; the controller adds feedback,
 
 .. math:: \tau = \tau_r + k_p e + k_d \dot e + k_i \int e\,dt, \quad e = \theta_r -
-    \theta,
+    \theta.
 
-where a reading of the motor is held against the plan of the instant at which it was
-taken, which is what the age of the readings in the task is for.
+A motor reading is compared with the plan at the instant when it was taken; the task
+states the age of the readings.
 
-Plans know the link's motion and more or less of the drive: :func:`ideal_plan` a rigid
-gear, :func:`rigid_plan` its torque and friction, too, and
-:func:`swgjoint.control.flexible.flexible_plan` the map.
+All plans use the link motion; they differ in the model of the drive:
+:func:`ideal_plan` assumes an ideal gear without torque, :func:`rigid_plan` adds torque
+and friction, and :func:`swgjoint.control.flexible.flexible_plan` uses the map.
 """
 
 from __future__ import annotations
@@ -25,39 +26,39 @@ from swgjoint.sim.controller import KnownJoints, Measured, Task
 from swgjoint.typing import Array
 
 SLOW = 0.05
-"""Speed over which a friction feed-forward changes its sign [rad/s of the motor]."""
+"""Speed nu_0 over which the friction feed-forward changes sign [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotorPlan:
-    """Motion and torque of the motors at the instants; shapes (n, ..., n_joints)."""
+    """Planned motion and torque of the motors at the n control instants."""
 
     angle: Array
-    """[rad]."""
+    """Motor angle [rad]. Shape (n, ..., n_joints)."""
     speed: Array
-    """[rad/s]."""
+    """Motor speed [rad/s]. Shape (n, ..., n_joints)."""
     torque: Array
-    """[N·m]."""
+    """Motor torque [N·m]. Shape (n, ..., n_joints)."""
 
 
 Planner = Callable[[Task], MotorPlan]
 
 
 def ideal_plan(task: Task) -> MotorPlan:
-    """Motor angles that an ideal gear gives, without any torque."""
+    """Motor motion of an ideal gear, without feed-forward torque."""
     i = task.joints.ratio
     angle = i * task.position
     return MotorPlan(angle=angle, speed=i * task.velocity, torque=np.zeros_like(angle))
 
 
 def rigid_plan(task: Task) -> MotorPlan:
-    r"""Inverse dynamics of the arm behind ideal gears.
+    r"""Inverse dynamics of the arm on ideal gears.
 
     .. math:: \tau_r = T/i + i J_m \ddot q + f(i \dot q, T/i)
 
-    with T the known torque of the arm on the motion, weight and inertia included, from
-    the engine or from :mod:`swgjoint.control.pinocchio_arm`, and f the friction that
-    the known drives have.
+    T is the known link torque of the motion, including weight and inertia; MuJoCo or
+    :mod:`swgjoint.control.pinocchio_arm` computes it. f is the friction of the known
+    drives.
     """
     joints, i = task.joints, task.joints.ratio
     plan = ideal_plan(task)
@@ -69,19 +70,22 @@ def rigid_plan(task: Task) -> MotorPlan:
 def known_friction(
     joints: KnownJoints, motor_speed: Array, link_speed: Array, link_torque: Array
 ) -> Array:
-    r"""Motor torque against the friction of the known drives, slipping [N·m].
+    r"""Motor torque that overcomes the sliding friction of the known drives [N·m].
 
-    :math:`F = f\tanh(\nu/\nu_0) + \eta\nu` with :math:`\nu` the speed of the wave
-    generator against the flexspline, see :mod:`swgjoint.maps.friction`. Where the
-    flexspline is the output F also pushes that, which comes back through the gear:
-    :math:`F\,\partial\nu/\partial\dot\theta` with :math:`\dot\psi =
-    \dot\theta/i`.
+    The friction torque is :math:`F = f\tanh(\nu/\nu_0) + \eta\nu`, where :math:`\nu` is
+    the speed of the wave generator relative to the flexspline, see
+    :mod:`swgjoint.maps.friction`. If the flexspline is the output, F also acts on the
+    output, and the gear transmits this part back to the motor. The motor torque is
+    therefore :math:`F\,d\nu/d\dot\theta` with :math:`\dot\psi = \dot\theta/i`.
 
     Args:
-        joints: Drives, some of which have friction.
-        motor_speed: [rad/s]. Shape (n, ..., n_joints).
-        link_speed: [rad/s]. Same shape.
-        link_torque: [N·m]. Same shape.
+        joints: Nominal data of the joints; drives without friction contribute zero.
+        motor_speed: Motor speed [rad/s]. Shape (n, ..., n_joints).
+        link_speed: Link speed [rad/s]. Same shape.
+        link_torque: Torque of the drive on the link [N·m]. Same shape.
+
+    Returns:
+        Motor torque [N·m]. Same shape.
     """
     out = np.zeros_like(motor_speed)
     for j, drive in enumerate(joints.drives):
@@ -97,12 +101,12 @@ def known_friction(
 
 
 class MotorPID:
-    r"""PD or PID on the motor angle about a plan.
+    r"""PD or PID control of the motor angle about a plan.
 
-    Gains follow from the natural frequency and damping ratio of a rigid drive,
-    :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with :math:`J = J_m +
-    J_l/i^2`, as in scenes, or are given outright. The integral acts from the next
-    instant on and stops where its torque reaches the limit.
+    The gains are arguments, or they follow from natural frequency and damping ratio of
+    the joint with a rigid drive, as in scenes: :math:`k_p = J\omega^2` and
+    :math:`k_d = 2\zeta J\omega` with :math:`J = J_m + J_l/i^2`. The integral acts from
+    the next instant on; its torque is limited.
     """
 
     def __init__(
@@ -116,15 +120,16 @@ class MotorPID:
         integral_time: float | None = None,
         integral_limit: ArrayLike = np.inf,
     ) -> None:
-        """Gains of all joints; arrays broadcast against (..., n_joints).
+        """Set the gains; arrays are broadcast to shape (..., n_joints).
 
         Args:
-            plan: What the motor shall do, made at the start of every task.
+            plan: Planner that is called at the start of every task.
             frequency: Natural frequency of the loop [Hz].
-            damping_ratio: [-].
-            stiffness: Gain on the motor angle instead [N·m/rad].
-            damping: Gain on the motor speed instead [N·m·s/rad].
-            integral_time: k_p/k_i [s]; None: no integral.
+            damping_ratio: Damping ratio of the loop [-].
+            stiffness: Position gain k_p [N·m/rad]; None derives it from the frequency.
+            damping: Speed gain k_d [N·m·s/rad]; None derives it from frequency and
+                damping ratio.
+            integral_time: Integral time k_p/k_i [s]; None disables the integral.
             integral_limit: Largest torque of the integral [N·m].
         """
         self.plan = plan
@@ -135,16 +140,16 @@ class MotorPID:
         self._limit = np.asarray(integral_limit, float)
 
     def start(self, task: Task) -> None:
-        """Make the plan and forget the integral."""
+        """Make the plan, compute the gains and set the integral to zero."""
         joints = task.joints
         inertia = joints.rotor_inertia + joints.link_inertia / joints.ratio**2
         kp, kd = self._given
         self.stiffness = np.asarray(inertia * self._omega**2 if kp is None else kp)
-        """Gain on the motor angle [N·m/rad]."""
+        """Position gain k_p [N·m/rad]."""
         self.damping = np.asarray(
             2.0 * self._zeta * self._omega * inertia if kd is None else kd
         )
-        """Gain on the motor speed [N·m·s/rad]."""
+        """Speed gain k_d [N·m·s/rad]."""
         self.planned = self.plan(task)
         self._angle = task.as_read(self.planned.angle, "motor")
         self._speed = task.as_read(self.planned.speed, "motor")
@@ -152,7 +157,12 @@ class MotorPID:
         self._integral: Array = np.zeros(task.position.shape[1:])
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """See :class:`swgjoint.sim.controller.Controller`."""
+        """Motor torques about the plan [N·m]. Shape (..., n_joints).
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+        """
         error = self._angle[k] - measured.motor_angle
         wanted = (
             self.stiffness * error

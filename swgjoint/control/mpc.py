@@ -1,42 +1,44 @@
 r"""Model-predictive control of flexible joints with limits of motor and drive.
 
-About the plan of :func:`swgjoint.control.flexible.flexible_plan`, that carries the
-nonlinear map, every joint is two masses and a spring. With the motor on the output
-side, :math:`x = (\delta\theta/i, \delta\psi)` and their rates,
+The plan of :func:`swgjoint.control.flexible.flexible_plan` contains the nonlinear map.
+Deviations from the plan follow a linear two-mass model of every joint. With motor
+quantities referred to the output side, the state is :math:`x = (\delta\theta/i,
+\delta\psi)` with its rates, and
 
 .. math::
     i^2 J_m \ddot x_1 = i\,(u + d_m) - \delta T, \quad
     J_l \ddot x_2 = \delta T + d_l, \quad
     \delta T = k\,(x_1 - x_2) + C\,(\dot x_1 - \dot x_2),
 
-with k the stiffness of the map where the plan is at that instant. The disturbances
-:math:`d_m, d_l` (friction, load, whatever the known joint has not) are estimated with
-the state by a Kalman filter on the readings, and carried by the set-point, so that a
-constant one leaves no error of what is measured. At every instant
+where k is the stiffness of the map at the current point of the plan. A Kalman filter
+estimates the state and the disturbances :math:`d_m, d_l` (friction, load and other
+model errors) from the readings. The set-point compensates the disturbances, so that a
+constant disturbance causes no steady error of the measured quantity. At every instant
 
 .. math::
     \min_u \sum_{j<N} \left( \frac{x_{2,j}^2}{e^2} + \frac{u_j^2}{f^2} \right)
     + x_N^T P x_N, \quad |\tau_r + u_j| \le \tau_{max}, \quad
     |T_r + \delta T_j| \le T_{max}
 
-is solved with P of the endless horizon and :math:`|i| f/e = (i^2 J_m + J_l)\,\omega^2`,
-so that a rigid joint would answer with the bandwidth :math:`\omega`. While no limit is
-in reach within the horizon the optimum is a linear feedback, one product. Else the
-dense quadratic programme of the N torques is solved by ADMM, all joints and motions
-side by side at once.
+is solved, where P is the terminal cost of the infinite horizon and the weights satisfy
+:math:`|i| f/e = (i^2 J_m + J_l)\,\omega^2`, so that a rigid joint would respond with
+the bandwidth :math:`\omega`. If the unconstrained optimum satisfies all limits within
+the horizon, it is a linear feedback, one matrix product. Otherwise ADMM solves the
+dense quadratic programme of the N torques for all joints and motions at once.
 
-Readings that are old are held against the plan of then and correct the state of then,
-from which the model is taken to now with the torques that were given since; the oldest
-of the readings counts for all.
+Delayed readings are compared with the plan at the instant when they were taken and
+correct the state at that instant. The model then predicts the current state from the
+torques applied since. All readings are treated as old as the oldest one.
 
-Coupling of an arm's joints is in the plan; what is left of it is a disturbance to each,
-and a drive feels less than the inertia about its joint, as the others give way. With
-the defaults shoulder and elbow of a UR5e diverge. With :func:`free_inertia`, 10 Hz
-and a drift of 0.2 they do not.
+The plan contains the coupling of the joints of an arm. The controller treats the
+remaining coupling as a disturbance of each joint. A drive then acts on less than the
+inertia about its joint, because the other joints yield. With the defaults the shoulder
+and elbow of a UR5e diverge; with :func:`free_inertia`, a frequency of 10 Hz and a drift
+of 0.2 they are stable.
 
 Source:
-    Rawlings, Mayne, Diehl (2017), "Model predictive control", 2nd ed., ch. 1 and 2 (the
-    terminal cost, disturbance models without offset); Stellato et al. (2020), "OSQP: an
+    Rawlings, Mayne, Diehl (2017), "Model predictive control", 2nd ed., ch. 1 and 2
+    (terminal cost, offset-free disturbance models); Stellato et al. (2020), "OSQP: an
     operator splitting solver for quadratic programs", Math. Prog. Comp. 12, 637-672.
 """
 
@@ -59,18 +61,19 @@ from swgjoint.sim.controller import KnownJoints, Measured, Task
 from swgjoint.typing import Array
 
 HORIZON = 20
-"""Instants that are looked ahead."""
+"""Default prediction horizon [control instants]."""
 FREQUENCY = 20.0
-"""Bandwidth where none is asked for [Hz]."""
+"""Default bandwidth [Hz]."""
 UNIT = 0.1
-"""Unit of motor torques in the programme, parts of rated torque over the ratio."""
+"""Unit of the motor torques in the programme, relative to rated torque over ratio
+[-]."""
 LEVELS = 8
-"""Stiffnesses for which the feedback is made, between the softest and the stiffest of
-the plan."""
+"""Number of stiffness values for which feedback matrices are computed, between the
+smallest and the largest stiffness along the plan."""
 
 
 class PredictiveController:
-    """See the module; implements :class:`swgjoint.sim.controller.Controller`."""
+    """Model-predictive controller of all joints of a task; see the module docstring."""
 
     def __init__(
         self,
@@ -82,18 +85,22 @@ class PredictiveController:
         link_inertia: ArrayLike | None = None,
         drift: float = DRIFT,
     ) -> None:
-        """Choose the weights.
+        """Set horizon, weights and limits.
 
         Args:
-            plan: Motion and torque of the motors on the task.
-            horizon: N, instants.
-            frequency: Bandwidth at which the joint would answer without its spring and
-                limits [Hz]; it gives f/e.
-            peak: Largest torque of the drive, in parts of its momentary peak [-].
-            link_inertia: That every drive feels, for an arm :func:`free_inertia`; that
-                with the other joints locked, as the task has it, if None [kg·m²].
-                Shape (n_joints,).
-            drift: Change of a disturbance in a second, parts of rated torque [-].
+            plan: Planner that is called at the start of every task.
+            horizon: Prediction horizon N [control instants].
+            frequency: Bandwidth with which a rigid joint without limits would respond
+                [Hz]; it determines f/e.
+            peak: Torque limit of the drive relative to its momentary peak torque [-].
+            link_inertia: Inertia that every drive accelerates [kg·m²], for an arm
+                :func:`free_inertia`. Shape (n_joints,). None uses the inertia of the
+                task, which assumes that the other joints are locked.
+            drift: Change of a disturbance within one second, relative to rated torque
+                [-].
+
+        Raises:
+            InputError: If an argument is not positive.
         """
         if not (horizon >= 1 and min(frequency, peak, drift) > 0.0):
             raise InputError(
@@ -105,11 +112,11 @@ class PredictiveController:
         self.link_inertia = None if link_inertia is None else np.array(link_inertia)
 
     def start(self, task: Task) -> None:
-        """Make the plan, and find the stiffnesses on it."""
+        """Make the plan and determine the stiffness levels along it."""
         self.planned = self.plan(task)
         if self.link_inertia is not None:
-            own = replace(task.joints, link_inertia=self.link_inertia)
-            task = replace(task, joints=own)
+            adapted = replace(task.joints, link_inertia=self.link_inertia)
+            task = replace(task, joints=adapted)
         joints = task.joints
         self._task = task
         self._count, *shape = task.position.shape
@@ -138,10 +145,15 @@ class PredictiveController:
         self._link = task.as_read(task.position, "link")
         self._drive = task.as_read(task.link_torque, "torque")
         self.limited = 0
-        """Motors and instants at which a limit was within the horizon."""
+        """Number of joint instants at which a limit was active within the horizon."""
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """See :class:`swgjoint.sim.controller.Controller`."""
+        """Motor torques about the plan [N·m]. Shape (..., n_joints).
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+        """
         task, plan = self._task, self.planned
         readings = self._off_plan(k, measured)
         assert self._design is not None
@@ -152,7 +164,7 @@ class PredictiveController:
         x = self._state
         corrected = x + _times(parts.gain, readings - _times(parts.reads, x))
         x = corrected
-        for push in self._given:  # since the readings
+        for push in self._given:  # torques applied since the readings were taken
             x = _times(parts.transition, x) + parts.by_torque * push
         off = x[:, :4] - _times(parts.target, x[:, 4:])
         steady = np.einsum("ij,ij->i", parts.steady, x[:, 4:])
@@ -182,7 +194,7 @@ class PredictiveController:
         return np.asarray(wanted.reshape(task.position.shape[1:]))
 
     def _off_plan(self, k: int, measured: Measured) -> Array:
-        """Readings off the plan of one instant, the newest that all sensors tell."""
+        """Deviations from the plan at the newest instant that all sensors cover."""
         ratio = self._task.joints.ratio
         seen = {"motor": (measured.motor_angle - self._angle[k]) / ratio}
         if measured.link_angle is not None:
@@ -197,7 +209,7 @@ class PredictiveController:
         return np.stack([self._seen[key].popleft() for key in now], axis=-1)
 
     def _begin(self, now: dict[str, Array], measured: Measured) -> None:
-        """Feedback for the sensors that there are; the joint begins at rest."""
+        """Compute the feedback for the available sensors; the joint starts at rest."""
         task = self._task
         readings = np.stack(list(now.values()), axis=-1)
         old = {key: task.periods_old(key) for key in now}  # type: ignore[arg-type]
@@ -227,7 +239,7 @@ class PredictiveController:
         )
 
     def _bounds(self, k: int, steady: Array, link: Array) -> tuple[Array, Array]:
-        """Of motor and drive torques over their units, off the set-point. (m, 2 N)."""
+        """Bounds of motor and drive torques about the set-point, scaled. (m, 2 N)."""
         ahead = np.minimum(np.arange(k, k + self.horizon + 1), self._count - 1)
         plan, task = self.planned, self._task
         motor = plan.torque[ahead[:-1]].reshape(self.horizon, -1).T + steady[:, None]
@@ -243,13 +255,16 @@ class PredictiveController:
 
 
 def free_inertia(model: mujoco.MjModel, position: ArrayLike) -> Array:
-    r"""Inertia that a torque at a joint meets, the other joints free [kg·m²].
+    r"""Inertia that a torque at a joint accelerates if the other joints are free.
 
-    :math:`1/(M^{-1})_{jj}`, never more than :math:`M_{jj}`.
+    It is :math:`1/(M^{-1})_{jj}`, which never exceeds :math:`M_{jj}`.
 
     Args:
-        model: Rigid arm.
-        position: [rad]. Shape (n_joints,).
+        model: Model of the rigid arm.
+        position: Joint angles [rad]. Shape (n_joints,).
+
+    Returns:
+        Inertia of every joint [kg·m²]. Shape (n_joints,).
     """
     data, whole = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     data.qpos[:] = position
@@ -263,9 +278,10 @@ def _times(matrices: Array, vectors: Array) -> Array:
 
 
 def _stiffness(drive: DriveMap, theta: Array, psi: Array) -> Array:
-    """Stiffness of the map along a plan [N·m/rad]."""
-    found = drive.stiffness(drive.torsion(theta, psi), theta, psi)
-    return np.maximum(found, 1e-3 * drive.mean_stiffness)  # clearance has none
+    """Stiffness of the map along a plan, at least 0.1 % of its mean [N·m/rad]."""
+    along = drive.stiffness(drive.torsion(theta, psi), theta, psi)
+    # within a clearance the stiffness is zero
+    return np.maximum(along, 1e-3 * drive.mean_stiffness)
 
 
 def _model(

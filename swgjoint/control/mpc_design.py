@@ -1,8 +1,8 @@
-"""Matrices of predictive control of one joint at one stiffness.
+"""Matrices of model-predictive control for one joint at one stiffness.
 
 Source:
     Doyle, Stein (1979), "Robustness with observers", IEEE Trans. Autom. Control 24,
-    607-611, for the noise of the filter.
+    607-611, for the process noise of the filter.
 """
 
 from __future__ import annotations
@@ -18,38 +18,51 @@ from swgjoint.control.mpc_solver import prepare
 from swgjoint.typing import Array
 
 ENCODER = 1e-3
-"""What the motor's encoder, and the link's times the ratio, may be off [rad].
+"""Assumed standard deviation of the motor encoder, and of the link encoder times the
+ratio [rad].
 
-More than their noise: it bounds how fast the filter is, some 60 Hz for a joint of a
-cobot's shoulder, so that what the model lacks (delay of half a period, kinematic error)
-does not make it restless."""
+It exceeds the encoder noise in order to limit the bandwidth of the filter, to about
+60 Hz for a shoulder joint of a cobot. Effects that the model omits (the delay of half a
+period and the kinematic error) then do not make the estimate noisy."""
 SENSOR = 2e-3
-"""Noise of a torque sensor, parts of rated torque."""
+"""Standard deviation of a torque sensor relative to rated torque [-]."""
 DRIFT = 2.0
-"""Change of a disturbance in a second, parts of rated torque."""
+"""Change of a disturbance within one second, relative to rated torque [-]."""
 DRIFT_ALONE = 0.2
-"""The same where nothing is read at the link: what the torsion does to the motor looks
-like a disturbance there."""
+"""Largest value of :data:`DRIFT` without a sensor at the link [-]; the motor encoder
+alone cannot distinguish the effect of the torsion from a disturbance."""
 SHAKE = 0.1
-"""Torque on either body that is no disturbance, parts of rated torque. Noise at the
-input that is larger than real gives the feedback back the margins that a filter takes
-(Doyle, Stein 1979): a tenth holds 20 % of stiffness either way."""
+"""Standard deviation of the white torque noise on either body, relative to rated torque
+[-]. Input noise above its real level restores stability margins that a filter reduces
+(Doyle, Stein 1979); with 0.1 the loop tolerates stiffness errors of ±20 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoMassModel:
-    """A joint about its plan, motor on the output side."""
+    """Linear model of a joint about its plan, with the motor on the output side."""
 
     ratio: float
+    """Signed ratio i [-]."""
     rotor_inertia: float
+    """Inertia of rotor and wave generator about the motor axis [kg·m²]."""
     link_inertia: float
+    """Link inertia about the joint [kg·m²]."""
     stiffness: float
+    """Torsional stiffness k at the output [N·m/rad]."""
     damping: float
+    """Damping C along the torsion [N·m·s/rad]."""
     period: float
+    """Control period [s]."""
     rated_torque: float
+    """Rated torque of the drive at the output [N·m]."""
 
     def discretise(self) -> tuple[Array, Array]:
-        """Transition of (x1, x2, rates, d_m, d_l), and of the motor torque. (6, 7)."""
+        """Discrete-time model of the state (x1, x2, rates, d_m, d_l) over one period.
+
+        Returns:
+            Transition matrix, shape (6, 6), and input column of the motor torque, shape
+            (6,).
+        """
         i, k, c = self.ratio, self.stiffness, self.damping
         rotor, link = i**2 * self.rotor_inertia, self.link_inertia
         whole = np.zeros((7, 7))
@@ -63,42 +76,49 @@ class TwoMassModel:
 
     @property
     def torque_row(self) -> Array:
-        """Torque of the drive from (x1, x2, rates)."""
+        """Row that maps (x1, x2, rates) to the drive torque. Shape (4,)."""
         k, c = self.stiffness, self.damping
         return np.array([k, -k, c, -c])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PredictionMatrices:
-    """What the controller multiplies with; stacked, axes in front are designs."""
+    """Matrices of the controller; leading axes count joints and stiffness levels.
+
+    Scaled torques are N motor torques, divided by their unit, followed by N drive
+    torques, divided by rated torque.
+    """
 
     transition: Array
-    """(6, 6)."""
+    """Transition of the state over one period. Shape (6, 6)."""
     by_torque: Array
-    """(6,)."""
+    """Change of the state per motor torque. Shape (6,)."""
     reads: Array
-    """Readings from the state (n_readings, 6)."""
+    """Readings per state. Shape (n_readings, 6)."""
     gain: Array
-    """Gain of the Kalman filter (6, n_readings)."""
+    """Gain of the Kalman filter. Shape (6, n_readings)."""
     target: Array
-    """Set-point of (x1, x2, rates) from the disturbances (4, 2)."""
+    """Set-point of (x1, x2, rates) per disturbance. Shape (4, 2)."""
     steady: Array
-    """Motor torque there (2,)."""
+    """Motor torque at the set-point per disturbance. Shape (2,)."""
     ahead: Array
-    """Torques of the motor, then of the drive, of the optimum without limits, over
-    their units, from the state off its set-point (2 N, 4)."""
+    """Scaled torques of the optimum without limits, per deviation of the state from the
+    set-point. Shape (2 N, 4)."""
     rows: Array
-    """The same from the motor torques of the horizon (2 N, N)."""
+    """Scaled torques per scaled motor torque of the horizon. Shape (2 N, N)."""
     free: Array
-    """The same from the state, without motor torque (2 N, 4)."""
+    """Scaled torques per deviation of the state, without motor torque. Shape
+    (2 N, 4)."""
     slope: Array
-    """Linear part g of the programme from the state (N, 4)."""
+    """Linear term g of the programme per deviation of the state. Shape (N, 4)."""
     inverse: Array
+    """Inverse from :func:`swgjoint.control.mpc_solver.prepare`. Shape (N, N)."""
     weight: Array
+    """Weights from :func:`swgjoint.control.mpc_solver.prepare`. Shape (2 N,)."""
 
     @classmethod
     def stack(cls, designs: list[list[PredictionMatrices]]) -> PredictionMatrices:
-        """Designs of all joints and stiffnesses, axes in front."""
+        """Stack the matrices of all joints (outer list) and stiffness levels."""
         return cls(
             **{
                 f.name: np.array([[getattr(d, f.name) for d in row] for row in designs])
@@ -107,7 +127,7 @@ class PredictionMatrices:
         )
 
     def select(self, index: tuple[NDArray[Any], ...]) -> PredictionMatrices:
-        """Those of joints and stiffnesses."""
+        """Index the leading axes, for instance by joints and stiffness levels."""
         return PredictionMatrices(
             **{f.name: getattr(self, f.name)[index] for f in fields(self)}
         )
@@ -123,16 +143,17 @@ def design(
     reads_link: bool,
     reads_torque: bool,
 ) -> PredictionMatrices:
-    """Feedback, filter and programme.
+    """Compute feedback, filter and quadratic programme.
+
+    Without a sensor at the link the cost weights the motor angle instead of the link
+    angle, because kinematic error and hysteresis then make the link angle uncertain.
 
     Args:
-        joint: The model.
-        horizon: N.
-        frequency: Bandwidth of a rigid joint with this feedback [Hz]. Where nothing is
-            read at the link, the motor's angle is what is held: what kinematic error
-            and hysteresis do to the torque is then no knowledge of the link.
-        drift: Of a disturbance in a second, parts of rated torque.
-        unit: f, that motor torques are counted in [N·m].
+        joint: Linear model of the joint.
+        horizon: Prediction horizon N [control instants].
+        frequency: Bandwidth of a rigid joint with this feedback [Hz].
+        drift: Change of a disturbance within one second, relative to rated torque [-].
+        unit: Unit f of the motor torques [N·m].
         reads_link: Whether there is a link encoder.
         reads_torque: Whether there is a torque sensor.
     """
@@ -148,7 +169,7 @@ def design(
     P = solve_discrete_are(A, B, Q, R)
     K = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)  # (1, 4)
 
-    # states x_1 .. x_N from x_0 and the torques
+    # states x_1 ... x_N as functions of x_0 and the torques
     powers = [np.eye(4)]
     for _ in range(horizon):
         powers.append(A @ powers[-1])
@@ -159,7 +180,7 @@ def design(
             forced[j, :, m] = (powers[j - m] @ B)[:, 0]
     weights = np.array([Q] * (horizon - 1) + [P])
     hessian = np.einsum("jam,jab,jbn->mn", forced, weights, forced)
-    hessian = unit**2 * hessian + np.eye(horizon)  # torques over their unit
+    hessian = unit**2 * hessian + np.eye(horizon)  # for torques divided by their unit
     slope = unit * np.einsum("jam,jab,jbc->mc", forced, weights, free)
     on_drive = joint.torque_row / joint.rated_torque
     rows = np.vstack([np.eye(horizon), unit * np.einsum("a,jam->jm", on_drive, forced)])
@@ -195,7 +216,7 @@ def _filter(
 ) -> tuple[Array, Array]:
     """Rows of the readings, and the stationary gain of the Kalman filter.
 
-    Without a reading at the link its disturbance cannot be told, and is left out.
+    Without a sensor at the link its disturbance is not observable and is omitted.
     """
     rated, h, i = joint.rated_torque, joint.period, joint.ratio
     rows, noise = [[1.0, 0, 0, 0, 0, 0]], [ENCODER / i]

@@ -1,19 +1,19 @@
-r"""Many small quadratic programmes at once, by ADMM.
+r"""Solve many small quadratic programmes at once by ADMM.
 
 .. math:: \min_z \tfrac12 z^T H z + g^T z, \qquad l \le A z \le u
 
-H and A of a kind are known before, so that an iteration is two products,
+H and A are known in advance, so that an iteration needs no factorisation,
 
 .. math::
     z \leftarrow (H + A^T R A)^{-1} (A^T(R w - y) - g), \quad
     w \leftarrow \mathrm{clip}(A z + R^{-1} y, l, u), \quad
     y \leftarrow y + R (A z - w)
 
-Where no z is within all bounds, the result is close to the least violation.
+If the bounds are infeasible, the result is close to the least violation.
 
 Source:
     Stellato et al. (2020), "OSQP: an operator splitting solver for quadratic programs",
-    Math. Prog. Comp. 12, 637-672; without its relaxation and step adaption.
+    Math. Prog. Comp. 12, 637-672; without its relaxation and step adaptation.
 """
 
 from __future__ import annotations
@@ -23,19 +23,21 @@ import numpy as np
 from swgjoint.typing import Array
 
 ITERATIONS = 300
+"""Largest number of iterations."""
 TOLERANCE = 1e-6
-"""Largest violation, in the unit of the rows, at which the iteration ends."""
+"""Residual at which the iteration ends, in the unit of the rows."""
 
 
 def prepare(hessian: Array, rows: Array) -> tuple[Array, Array]:
-    """Inverse and weights R of a kind of programme.
+    """Compute the inverse and the weights R of programmes in advance.
 
     Args:
-        hessian: H. Shape (..., n, n).
-        rows: A. Shape (..., m, n).
+        hessian: Hessian H. Shape (..., n, n).
+        rows: Constraint matrix A. Shape (..., m, n).
 
     Returns:
-        Shapes (..., n, n) and (..., m).
+        Inverse of H + A^T R A, shape (..., n, n), and the diagonal of R, shape
+        (..., m).
     """
     size = np.einsum("...ii->...", hessian) / hessian.shape[-1]
     weight = size[..., None] / np.maximum((rows**2).sum(axis=-1), 1e-300)
@@ -46,15 +48,18 @@ def prepare(hessian: Array, rows: Array) -> tuple[Array, Array]:
 def solve(
     inverse: Array, weight: Array, rows: Array, g: Array, low: Array, high: Array
 ) -> Array:
-    """Solutions z of programmes side by side.
+    """Solve k programmes at once.
 
     Args:
-        inverse: From :func:`prepare`. Shape (k, n, n).
-        weight: The same. Shape (k, m).
-        rows: A. Shape (k, m, n).
-        g: Shape (k, n).
-        low: Shape (k, m).
-        high: Shape (k, m).
+        inverse: Inverse from :func:`prepare`. Shape (k, n, n).
+        weight: Weights from :func:`prepare`. Shape (k, m).
+        rows: Constraint matrices A. Shape (k, m, n).
+        g: Linear terms. Shape (k, n).
+        low: Lower bounds l. Shape (k, m).
+        high: Upper bounds u. Shape (k, m).
+
+    Returns:
+        Solutions z. Shape (k, n).
     """
     w = np.clip(np.zeros_like(low), low, high)
     y = np.zeros_like(low)

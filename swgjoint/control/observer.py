@@ -1,16 +1,19 @@
-r"""Disturbance observer on the motors.
+r"""Disturbance observer of the motors.
 
-From the momentum :math:`p = J_m \dot\theta` of the rotor and the torques that are
-known, the motor's and :math:`n` of the drive, the observer
+From the momentum :math:`p = J_m \dot\theta` of the rotor, the motor torque
+:math:`\tau` and the drive torque :math:`n`, the observer
 
 .. math:: \hat d = L \left( p(t) - p(0) - \int_0^t (\tau - n + \hat d)\,dt \right)
 
-has :math:`\dot{\hat d} = L (d - \hat d)`: it follows friction and unknown load, d, like
-a low-pass of bandwidth L, without accelerations. It is taken off the motor's torque.
-n is :math:`T/i` with T of the torque sensor where there is one, else that of the known
-arm on the motion; what a drive swings against that is then taken for a disturbance, so
-that the bandwidth must stay below the joint's resonance. Speeds that are old are held
-against the torques of then; d is as old.
+estimates the disturbance d, which is friction and unknown load. It needs no
+accelerations: :math:`\dot{\hat d} = L (d - \hat d)`, a low-pass filter of bandwidth L.
+The estimate is subtracted from the motor torque.
+
+The drive torque is :math:`n = T/i`, where T is the reading of the torque sensor or,
+without a sensor, the known link torque of the motion. In the second case oscillations
+of the drive torque count as disturbance, so that the bandwidth must stay below the
+joint resonance. Delayed speeds are compared with the torques of the same instant, and
+the estimate has the same delay.
 
 Source:
     De Luca, Mattone (2003), "Actuator failure detection and isolation using generalized
@@ -28,11 +31,12 @@ from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.typing import Array
 
 FASTEST = 0.25
-"""Largest bandwidth times period; the sum in place of the integral rings from 1 on."""
+"""Largest product of bandwidth L and period [-]; from 1 on the discrete sum that
+replaces the integral oscillates."""
 
 
 class DisturbanceObserver:
-    """Another controller, and the disturbance of its motors taken off."""
+    """Controller that subtracts the estimated disturbance from another one's torque."""
 
     def __init__(
         self, inner: Controller, *, bandwidth: float = 5.0, limit: float = np.inf
@@ -40,14 +44,18 @@ class DisturbanceObserver:
         """Observe the motors of a controller.
 
         Args:
-            inner: Gives the torques without the observer.
-            bandwidth: L over 2 pi [Hz].
-            limit: Largest torque that is taken off [N·m].
+            inner: Controller that computes the torques without the observer.
+            bandwidth: Bandwidth L/(2 pi) [Hz].
+            limit: Largest torque that is subtracted [N·m].
         """
         self.inner, self.bandwidth, self.limit = inner, bandwidth, limit
 
     def start(self, task: Task) -> None:
-        """Start from no disturbance."""
+        """Reset the estimate to zero.
+
+        Raises:
+            InputError: If the bandwidth is not positive or too high for the period.
+        """
         self._gain = 2.0 * np.pi * self.bandwidth
         if not 0.0 < self._gain * task.period <= FASTEST:
             highest = FASTEST / (2.0 * np.pi * task.period)
@@ -61,14 +69,20 @@ class DisturbanceObserver:
         self._late = task.periods_old("motor")
         self._applied: deque[Array] = deque(maxlen=self._late + 1)
         self.estimate: Array = np.zeros(task.position.shape[1:])
-        """Disturbance that acts along the motors' rotation [N·m]. (..., n_joints)."""
+        """Disturbance torque on the motors, positive in the direction of rotation
+        [N·m]. Shape (..., n_joints)."""
         self.inner.start(task)
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """See :class:`swgjoint.sim.controller.Controller`."""
+        """Torque of the inner controller minus the estimated disturbance [N·m].
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+        """
         joints, period = self._task.joints, self._task.period
         momentum = joints.rotor_inertia * measured.motor_speed
-        if self._sum is None or k <= self._late:  # the first reading, still
+        if self._sum is None or k <= self._late:  # readings from before the motion
             self._sum = momentum
         else:
             if measured.output_torque is None:
@@ -79,8 +93,8 @@ class DisturbanceObserver:
                 self._applied[0] - known / joints.ratio + self.estimate
             )
         self.estimate = self._gain * (momentum - self._sum)
-        taken = np.clip(self.estimate, -self.limit, self.limit)
-        wanted = self.inner.torque(k, measured) - taken
+        correction = np.clip(self.estimate, -self.limit, self.limit)
+        wanted = self.inner.torque(k, measured) - correction
         applied = np.clip(wanted, -joints.torque_limit, joints.torque_limit)
         self._applied.append(applied)
         return np.asarray(wanted)
