@@ -1,21 +1,19 @@
-r"""Optimal point-to-point motions of flexible joints, the map of the drives included.
+r"""Optimal point-to-point motions of flexible joints, including the drive maps.
 
-Direct collocation: in each of N equal intervals the motor torques stand still, as a
-sampled controller holds them, and angles and rates are polynomials through three
-Gauss-Legendre points. The dynamics stay implicit there,
+The method is direct collocation. In each of N equal intervals the motor torques are
+constant, as with a sampled controller, and angles and rates are polynomials through
+three Gauss-Legendre points. At these points the dynamics are implicit constraints,
 
 .. math:: M(q)\,a + h(q, v) = F_{drives}(q, v) + \tau_{motors},
 
-so that no inertia is inverted. Cost is the loss in the windings over the motion,
-:math:`\int \sum_j (\tau_j/\tau_{rated,j})^2 dt`, or the time. Bounds are those of the
-motors and of the torque through the drives (by their elastic torque, which is what
-turns the torsion).
+so that the inertia matrix is not inverted. The cost is the winding loss of the motion,
+:math:`\int \sum_j (\tau_j/\tau_{rated,j})^2 dt`, or the duration. The motor torques and
+the elastic torques of the drives are bounded.
 
-The drives have the smooth law of :func:`swgjoint.control.symbolic.smooth_forces`: no
-hysteresis, and friction without presliding. Harmonics that turn by a good part of a
-wave in an interval have to be left out of the map
-(:meth:`~swgjoint.maps.drive_map.DriveMap.with_harmonics`): polynomials through three
-points do not follow them.
+The drives follow the smooth law of :func:`swgjoint.control.symbolic.smooth_forces`,
+without hysteresis and presliding. Polynomials through three points cannot represent
+harmonics whose phase changes by a large part of a period within an interval; omit them
+from the map (:meth:`~swgjoint.maps.drive_map.DriveMap.with_harmonics`).
 
 Source:
     Betts (2010), "Practical methods for optimal control and estimation using nonlinear
@@ -40,31 +38,34 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.typing import Array
 
 DEGREE = 3
-"""Points of an interval: of sixth order at its end."""
+"""Number of collocation points per interval; the order at its end is six."""
 ITERATIONS = 500
+"""Largest number of IPOPT iterations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OptimalMotion:
-    """Motion from rest to rest; n intervals, q and v in the order of the model."""
+    """Motion from rest to rest in n intervals; coordinates in the model's order."""
 
     time: Array
-    """Ends of the intervals [s]. Shape (n + 1,)."""
+    """Times of the interval ends [s]. Shape (n + 1,)."""
     position: Array
-    """[rad]. Shape (n + 1, n_q)."""
+    """Angles of rotors and links at these times [rad]. Shape (n + 1, n_q)."""
     velocity: Array
-    """[rad/s]. Same shape."""
+    """Speeds of rotors and links at these times [rad/s]. Shape (n + 1, n_q)."""
     motor_torque: Array
-    """In every interval [N·m]. Shape (n, n_joints)."""
+    """Motor torques in every interval [N·m]. Shape (n, n_joints)."""
     drive_torque: Array
-    """Elastic torque along the torsion, at the ends [N·m]. Shape (n + 1, n_joints)."""
+    """Elastic torques along the torsion at the interval ends [N·m]. Shape (n + 1,
+    n_joints)."""
     loss: float
-    """Integral of the squared shares of rated motor torque [s]."""
+    """Integral of the squared motor torques, relative to rated motor torque [s]."""
     iterations: int
+    """Number of IPOPT iterations."""
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration of the motion [s]."""
         return float(self.time[-1])
 
 
@@ -80,22 +81,23 @@ def optimal_motion(
     drive_limit: ArrayLike = np.inf,
     intervals: int = 50,
 ) -> OptimalMotion:
-    """Motor torques that take an arm from rest to rest.
+    """Compute motor torques that move an arm from rest to rest.
 
     Args:
-        arm: From :func:`~swgjoint.control.symbolic_arm.symbolic_arm`.
-        drives: Its drives.
-        start: Link angles [rad]. Shape (n_joints,).
-        end: Link angles [rad]. Shape (n_joints,).
-        duration: Of the motion; where the time is minimised, a guess [s].
+        arm: Arm from :func:`~swgjoint.control.symbolic_arm.symbolic_arm`.
+        drives: Drives of the arm, in the same order.
+        start: Link angles at the start [rad]. Shape (n_joints,).
+        end: Link angles at the end [rad]. Shape (n_joints,).
+        duration: Duration of the motion [s]; the initial guess if it is minimised.
         minimise: ``loss`` or ``time``.
-        torque_limit: Of the motors [N·m]. Shape (n_joints,).
-        drive_limit: Of the torque through the drives [N·m]. Shape (n_joints,).
-        intervals: N.
+        torque_limit: Torque limits of the motors [N·m]. Shape (n_joints,).
+        drive_limit: Limits of the elastic torques of the drives [N·m]. Shape
+            (n_joints,).
+        intervals: Number of intervals N.
 
     Raises:
-        InputError: If an argument cannot be used.
-        ComputationError: If no such motion is found.
+        InputError: If an argument is not accepted.
+        ComputationError: If IPOPT does not converge.
     """
     ca = casadi()
     n, ratio = len(drives), np.array([d.ratio for d in drives])
@@ -105,15 +107,14 @@ def optimal_motion(
     if minimise not in ("loss", "time"):
         raise InputError(f"minimise {minimise!r}; accepted: loss, time")
     if minimise == "time" and not np.isfinite(top).all():
-        raise InputError("the shortest time needs a torque_limit of every motor")
+        raise InputError("minimise 'time' needs a finite torque_limit for every motor")
     if not (0.0 < duration < np.inf and intervals >= 2):
         raise InputError(
-            f"duration {duration:g} s, intervals {intervals}; accepted: > 0 s, at least"
-            " 2"
+            f"duration {duration:g} s, intervals {intervals}; accepted: > 0 s and >= 2"
         )
     size = arm.inverse_dynamics.size1_in(0)
     unit = np.ones(size)
-    unit[arm.rotors] = ratio  # motors count on the output side
+    unit[arm.rotors] = ratio  # motor angles referred to the output side
     rated = np.array([d.drive.ratings.rated_torque for d in drives])
     of_motor = rated / np.abs(ratio)
     point = _dynamics(arm, unit, rated, of_motor)
@@ -149,7 +150,7 @@ def optimal_motion(
     if minimise == "time":
         problem.subject_to(problem.bounded(0.05 * duration, total, 20.0 * duration))
         problem.set_initial(total, duration)
-        # a thousandth of the loss: torques that do not matter are small
+        # a small weight on the loss makes torques that do not affect the time small
         problem.minimize(total + 1e-3 * loss)
     else:
         problem.minimize(loss)
@@ -165,8 +166,8 @@ def optimal_motion(
     except RuntimeError:
         reason = problem.return_status()
         raise ComputationError(
-            f"no optimal motion: IPOPT says {reason}; give more time, higher limits or"
-            " another number of intervals"
+            f"no optimal motion: IPOPT reports {reason}; allow more time, higher"
+            " limits or another number of intervals"
         ) from None
     found = np.asarray(solved.value(ends)).T
     torque = np.atleast_2d(solved.value(shares)).T * of_motor
@@ -191,11 +192,21 @@ def optimal_motion(
 def rest_at(
     arm: SymbolicArm, drives: list[JointDrive], psi: Array
 ) -> tuple[Array, Array]:
-    """Positions of the model and motor torques that hold links at angles."""
+    """Rest of an arm at given link angles.
+
+    Args:
+        arm: Arm from :func:`~swgjoint.control.symbolic_arm.symbolic_arm`.
+        drives: Drives of the arm, in the same order.
+        psi: Link angles [rad]. Shape (n_joints,).
+
+    Returns:
+        Angles of rotors and links [rad], shape (n_q,), and motor torques that hold them
+        [N·m], shape (n_joints,).
+    """
     size = arm.inverse_dynamics.size1_in(0)
     q, still = np.zeros(size), np.zeros(size)
     q[arm.links] = psi
-    # the weight of a rotor does not depend on where it stands
+    # the gravity torque does not depend on the rotor angles
     load = arm.inverse_dynamics(q, still, still).full().ravel()
     for drive, r, k in zip(drives, arm.rotors, arm.links, strict=True):
         wanted, law, at = load[k], drive.drive, q[k]
@@ -213,30 +224,33 @@ def rest_at(
 def replay(
     model: mujoco.MjModel, arm: SymbolicArm, motion: OptimalMotion, *, parts: int = 50
 ) -> Array:
-    """Positions of the engine under the torques of a motion, nothing fed back [rad].
+    """Simulate a motion open-loop in MuJoCo.
 
     Args:
-        model: With its integrator; the step is set.
-        arm: Of that model.
-        motion: Held torques.
-        parts: Steps of the engine in an interval.
+        model: Compiled arm; its integrator is used, its time step is overwritten.
+        arm: Symbolic arm of the same model.
+        motion: Motion whose motor torques are applied.
+        parts: Number of simulation steps per interval.
 
     Returns:
-        At the ends of the intervals. Shape (n + 1, n_q).
+        Angles of rotors and links at the interval ends [rad]. Shape (n + 1, n_q).
     """
     data = mujoco.MjData(model)
     model.opt.timestep = motion.time[1] / parts
     data.qpos[:], data.qvel[:] = motion.position[0], motion.velocity[0]
-    found = [data.qpos.copy()]
+    positions = [data.qpos.copy()]
     for torque in motion.motor_torque:
         data.qfrc_applied[arm.rotors] = torque
         mujoco.mj_step(model, data, parts)
-        found.append(data.qpos.copy())
-    return np.array(found)
+        positions.append(data.qpos.copy())
+    return np.array(positions)
 
 
 def _dynamics(arm: SymbolicArm, unit: Array, rated: Array, of_motor: Array) -> Any:
-    """``(z, w, a, share) -> (what is left of the dynamics, drive torques)``, scaled."""
+    """Function ``(z, w, a, share) -> (residual of the dynamics, drive torques)``.
+
+    All quantities are scaled: ``share`` is the motor torque relative to rated torque.
+    """
     ca = casadi()
     size, n = len(unit), len(rated)
     z, w, a = (ca.SX.sym(name, size) for name in "zwa")
@@ -260,7 +274,7 @@ def _guess(
     holding: tuple[Array, Array],
     duration: float,
 ) -> None:
-    """A smooth motion: the quintic from rest to rest, and the torques that hold."""
+    """Initial guess: a quintic from rest to rest with interpolated holding torques."""
     count = ends.size2() - 1
     low, high = (x[:, None] for x in between)
     for variable, t in (

@@ -1,11 +1,11 @@
-"""The rigid arm in Pinocchio: what a controller's feed-forward takes the arm for.
+"""Rigid arm in Pinocchio, as model for the feed-forward of a controller.
 
-Given to :func:`swgjoint.run_scene` as ``known_arm`` it makes the torque of the
-links, weight and inertia, that every plan starts from, in place of the engine's inverse
-dynamics. From a compiled MuJoCo model the tree is built number by number, since MuJoCo
-writes MJCF with six digits; an arm that is known to Pinocchio by a URDF, or from an
-identification, comes as it is. Of its joints it has linear springs (of a MuJoCo model),
-viscous damping and dry friction; damping and springs that are polynomials are refused.
+Pass it to :func:`swgjoint.run_scene` as ``known_arm``. It then computes the link
+torques (weight and inertia) from which every plan starts, instead of MuJoCo's inverse
+dynamics. A compiled MuJoCo model is converted value by value, because MuJoCo writes
+MJCF with only six digits. A Pinocchio model, for instance from a URDF file or an
+identification, is used unchanged. The joints may have viscous damping, dry friction
+and, in a MuJoCo model, linear springs; polynomial springs and damping are rejected.
 """
 
 from __future__ import annotations
@@ -20,32 +20,33 @@ from swgjoint.typing import Array
 
 
 class PinocchioArm:
-    """Inverse dynamics of an arm of hinges; arrays end with its joints.
+    """Inverse dynamics of an arm with hinge joints.
 
     Attributes:
         model: The ``pinocchio.Model``.
-        joints: Names of its joints, in the order of all arrays.
+        joints: Joint names, in the order of the last axis of all arrays.
     """
 
     def __init__(self, model: Any) -> None:
-        """Take over tree, inertias, gravity, armature, damping, friction and springs.
+        """Copy tree, inertias, gravity, armature, damping, friction and springs.
 
         Args:
-            model: Of MuJoCo, for instance ``swgjoint.sim.arm.rigid_arm.RigidArm("ur5e")
-                .model``, or of Pinocchio.
+            model: MuJoCo model, for instance
+                ``swgjoint.sim.arm.rigid_arm.RigidArm("ur5e").model``, or Pinocchio
+                model.
 
         Raises:
-            InputError: If a joint is not a hinge, a body has several, or a spring or
-                damper is not linear.
+            InputError: If a joint is not a hinge, if a body has several joints, or if a
+                spring or damper is not linear.
             MissingExtraError: If Pinocchio is not installed.
         """
         self._pin = _pinocchio()
-        own = isinstance(model, mujoco.MjModel)
-        self.model: Any = _tree(self._pin, model) if own else model
+        is_mujoco = isinstance(model, mujoco.MjModel)
+        self.model: Any = _tree(self._pin, model) if is_mujoco else model
         self.joints: tuple[str, ...] = tuple(self.model.names)[1:]  # 0: the universe
         if self.model.nv != len(self.joints):
             raise InputError(
-                "arm with joints that are no hinges; accepted: hinges alone"
+                "arm with joints that are not hinges; accepted: hinges only"
             )
         self._data = self.model.createData()
         self._zero = self._pin.neutral(self.model)
@@ -55,17 +56,20 @@ class PinocchioArm:
             np.array(self.model.upperDryFrictionLimit),
         )
         none = np.zeros(len(self.joints))
-        self._spring = _springs(model, self.joints) if own else (none, none)
+        self._spring = _springs(model, self.joints) if is_mujoco else (none, none)
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Joint torques that the motion needs, gravity and joint losses included [N·m].
+        """Joint torques of a motion, including gravity and joint losses [N·m].
 
-        Dry friction is that of a joint that slides; at rest it is zero.
+        Dry friction acts only on moving joints.
 
         Args:
-            position: [rad]. Shape (n, n_joints).
-            velocity: [rad/s]. Same shape.
-            acceleration: [rad/s²]. Same shape.
+            position: Joint angles [rad]. Shape (n, n_joints).
+            velocity: Joint speeds [rad/s]. Same shape.
+            acceleration: Joint accelerations [rad/s²]. Same shape.
+
+        Returns:
+            Joint torques [N·m]. Same shape.
         """
         out = np.empty_like(position)
         rnea, model, data = self._pin.rnea, self.model, self._data
@@ -74,8 +78,8 @@ class PinocchioArm:
         low, high = self._friction
         stiffness, centre = self._spring
         dry = np.where(velocity > 0.0, high, np.where(velocity < 0.0, low, 0.0))
-        held = stiffness * (position - centre)
-        return np.asarray(out + self._damping * velocity + dry + held)
+        spring = stiffness * (position - centre)
+        return np.asarray(out + self._damping * velocity + dry + spring)
 
     def inertia(self, position: Array) -> Array:
         """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
@@ -83,19 +87,19 @@ class PinocchioArm:
         return np.diag(full).copy()
 
     def _place(self, angles: Array) -> Array:
-        """Configuration: joints without limits have cosine and sine there."""
+        """Configuration vector; it has cosine and sine of joints without limits."""
         return np.asarray(self._pin.integrate(self.model, self._zero, angles))
 
 
 def _tree(pin: Any, model: mujoco.MjModel) -> Any:
-    """The joints and bodies of a compiled model."""
+    """Pinocchio model with the joints and bodies of a compiled MuJoCo model."""
     if (model.jnt_type != mujoco.mjtJoint.mjJNT_HINGE).any():
-        raise InputError("arm with joints that are no hinges; accepted: hinges alone")
+        raise InputError("arm with joints that are not hinges; accepted: hinges only")
     if (model.body_jntnum > 1).any():
-        raise InputError("arm with two hinges on one body; accepted: one a body")
+        raise InputError("arm with two or more hinges on one body; accepted: one")
     other = pin.Model()
     other.gravity.linear = model.opt.gravity
-    # joint that carries a body, and where the body's frame lies in that of the joint
+    # joint that carries each body, and pose of the body frame in the joint frame
     holder = {0: (0, pin.SE3.Identity())}
     for b in range(1, model.nbody):
         joint, place = holder[int(model.body_parentid[b])]
@@ -121,16 +125,16 @@ def _tree(pin: Any, model: mujoco.MjModel) -> Any:
 
 
 def _springs(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array]:
-    """Stiffness [N·m/rad] of the joints and where their springs rest [rad]."""
+    """Stiffness [N·m/rad] and rest angle [rad] of the joint springs."""
     for what, higher in (
         ("spring", model.jnt_stiffnesspoly),
         ("damping", model.dof_dampingpoly),
     ):
-        bent = [model.joint(k).name for k in np.flatnonzero(higher.any(axis=1))]
-        if bent:
+        nonlinear = [model.joint(k).name for k in np.flatnonzero(higher.any(axis=1))]
+        if nonlinear:
             raise InputError(
-                f"arm with a {what} that is a polynomial in joint"
-                f" {', '.join(bent)}; accepted: a linear one"
+                f"arm with a polynomial {what} in joint {', '.join(nonlinear)};"
+                f" accepted: a linear {what}"
             )
     order = [int(model.joint(name).id) for name in joints]
     return model.jnt_stiffness[order].copy(), model.qpos_spring[order].copy()
@@ -146,6 +150,6 @@ def _pinocchio() -> Any:
         import pinocchio
     except ImportError:
         raise MissingExtraError(
-            "the arm model of Pinocchio needs pin: pip install 'swgjoint[control]'"
+            "PinocchioArm needs the package pin: pip install 'swgjoint[control]'"
         ) from None
     return pinocchio

@@ -1,21 +1,23 @@
-r"""The joint with its map as CasADi expressions, for optimal control.
+r"""Joint with its drive map as CasADi expressions, for optimal control.
 
-The energy alone is written down; CasADi differentiates it, so that forces, their
-tangents and the Hessians that Newton-type solvers ask for belong to one potential:
+Only the energy is programmed. CasADi differentiates it, so that the forces, their
+tangents and the Hessians of Newton-type solvers derive from one potential:
 
 .. math:: F = -\nabla_{(\theta,\psi)} V(\Delta, \alpha, \beta) - C\,(g\cdot v)\,g
 
-A coefficient of V is a polynomial of degree four on each interval of the torsion, a
-parabola beyond the knots. The interval is picked by comparisons, which have no slope: V
-is twice continuously differentiable wherever the map is, and its derivatives are those
-of the polynomial in force.
+Each coefficient of V is a polynomial of degree four on each torsion interval and a
+parabola beyond the knots. Comparisons, whose derivative is zero, select the interval. V
+is therefore twice continuously differentiable wherever the map is, and its derivatives
+are those of the selected polynomial.
 
-Hysteresis and friction have states, those of the plugin: the torsion at which each
-element is relaxed, and beta at which the bristle is. :func:`joint_forces` takes them as
-given, :func:`joint_history` moves them after a step. Both have corners where an element
-begins to slip. :func:`smooth_forces` has none and no states: friction at speed, smooth
-through rest; without the presliding of the bristle and without hysteresis, whose torque
-is at most the sum of the yield torques. Ratcheting is in neither.
+Hysteresis and friction have the same states as in the plugin: the torsion at which each
+hysteresis element is relaxed, and the angle beta at which the friction bristle is
+relaxed. :func:`joint_forces` takes them as input and :func:`joint_history` updates them
+after a step. Both functions have kinks where an element begins to slip.
+
+:func:`smooth_forces` has neither kinks nor states. Its friction depends smoothly on the
+speed; it omits the presliding of the bristle and the hysteresis, whose torque is at
+most the sum of the yield torques. No function includes ratcheting.
 
 Source:
     Andersson et al. (2019), "CasADi: a software framework for nonlinear optimization
@@ -36,9 +38,10 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
 LARGE = 20_000
-"""Numbers in a map from which its functions keep matrices instead of scalars."""
-_SLIPS = 1.0 - 1e-9  # of its reach: as swgjoint.maps.friction has it
-_NO_LOAD = 1e-3  # of rated torque, below which |T| is rounded in the smooth law
+"""Number of map coefficients above which expressions use matrices instead of
+scalars."""
+_SLIPS = 1.0 - 1e-9  # fraction of the largest stretch, as in swgjoint.maps.friction
+_NO_LOAD = 1e-3  # fraction of rated torque below which the smooth law rounds |T|
 
 
 def casadi() -> Any:
@@ -56,7 +59,13 @@ def casadi() -> Any:
 
 
 def torsion(drive: DriveMap, theta: Any, psi: Any) -> Any:
-    """Torsion theta/i + e0 - psi of CasADi angles [rad]."""
+    """Torsion theta/i + e0 - psi as a CasADi expression [rad].
+
+    Args:
+        drive: Drive map.
+        theta: CasADi expression of the input angle [rad].
+        psi: CasADi expression of the output angle [rad].
+    """
     ca = casadi()
     cos, sin = _waves(drive, theta, psi)
     a, b = drive.kinematic_error.T
@@ -64,12 +73,19 @@ def torsion(drive: DriveMap, theta: Any, psi: Any) -> Any:
 
 
 def potential(drive: DriveMap, x: Any, theta: Any, psi: Any) -> Any:
-    """V of a CasADi torsion and CasADi angles [J]."""
+    """Potential V as a CasADi expression [J].
+
+    Args:
+        drive: Drive map.
+        x: CasADi expression of the torsion [rad].
+        theta: CasADi expression of the input angle [rad].
+        psi: CasADi expression of the output angle [rad].
+    """
     ca = casadi()
     waves = ca.vertcat(*_waves(drive, theta, psi))
     origins, table = _pieces(drive)
     above = [x >= knot for knot in drive.torsion_knots]
-    # one for the piece that holds the torsion, zero for all others
+    # one for the interval that contains the torsion, zero for all others
     here = ca.vertcat(1 - above[0], *(a - b for a, b in pairwise(above)), above[-1])
     d = x - ca.dot(origins, here)
     pieces = ca.reshape(ca.mtimes(ca.DM(table), waves), 5, len(origins))
@@ -78,16 +94,17 @@ def potential(drive: DriveMap, x: Any, theta: Any, psi: Any) -> Any:
 
 
 def joint_forces(drive: DriveMap, *, damping: float) -> Any:
-    """Function of all torques of the drive, those with a history included.
+    """Function of all drive torques, including those that depend on the history.
 
     Args:
-        drive: The map.
-        damping: Torque per torsion rate, C [N·m·s/rad].
+        drive: Drive map.
+        damping: Damping C along the torsion [N·m·s/rad].
 
     Returns:
-        ``forces(q, v, history) -> (force, torsion)`` with q = (theta, psi), v its rate
-        and force = (on the rotor, on the link) [N·m]; the history has the elements'
-        relaxed torsions [rad] and, with friction, beta where the bristle is relaxed.
+        ``forces(q, v, history) -> (force, torsion)`` with q = (theta, psi) [rad], its
+        rate v [rad/s] and the torques (on the rotor, on the link) [N·m]. The history
+        contains the relaxed torsions of the hysteresis elements [rad] and, for a drive
+        with friction, the angle beta at which the bristle is relaxed [rad].
     """
     ca = casadi()
     q, v, past = _symbols(drive)
@@ -112,7 +129,7 @@ def joint_forces(drive: DriveMap, *, damping: float) -> Any:
 
 
 def joint_history(drive: DriveMap) -> Any:
-    """Function ``history(q, v, history) -> next`` at the end of a step."""
+    """Function ``history(q, v, history) -> next`` that updates the history [rad]."""
     ca = casadi()
     q, v, past = _symbols(drive)
     x, _, elastic, _ = _conservative(drive, q)
@@ -129,7 +146,16 @@ def joint_history(drive: DriveMap) -> Any:
 
 
 def relaxed_history(drive: DriveMap, theta: float, psi: float) -> Array:
-    """History of a joint that begins here: elements at zero torsion, bristle here."""
+    """Initial history: hysteresis relaxed at zero torsion, bristle at these angles.
+
+    Args:
+        drive: Drive map.
+        theta: Input angle [rad].
+        psi: Output angle [rad].
+
+    Returns:
+        History for :func:`joint_forces` [rad]. Shape (n_states,).
+    """
     b = np.array(drive.friction_direction, float) @ [theta, psi]
     rests = [0.0] * len(drive.hysteresis)
     return np.array(rests if drive.friction is None else [*rests, b], dtype=float)
@@ -143,20 +169,20 @@ def joint_step(
     link_inertia: float,
     timestep: float,
 ) -> Any:
-    """One step of classical Runge-Kutta, as the engine's RK4 takes it.
+    """One step of the classical Runge-Kutta method, as MuJoCo's RK4.
 
-    The history stands still during the step and moves at its end.
+    The history is constant during the step and is updated at its end.
 
     Args:
-        drive: The map.
-        damping: C [N·m·s/rad].
-        rotor_inertia: [kg·m²].
-        link_inertia: [kg·m²].
-        timestep: h [s].
+        drive: Drive map.
+        damping: Damping C along the torsion [N·m·s/rad].
+        rotor_inertia: Inertia of rotor and wave generator about the motor axis [kg·m²].
+        link_inertia: Link inertia about the joint [kg·m²].
+        timestep: Step h [s].
 
     Returns:
-        Function ``(q, v, history, applied) -> (q, v, history)``, with the torques
-        applied to rotor and link [N·m].
+        Function ``(q, v, history, applied) -> (q, v, history)``, where ``applied`` are
+        the torques applied to rotor and link [N·m].
     """
     ca = casadi()
     forces, history = joint_forces(drive, damping=damping), joint_history(drive)
@@ -183,15 +209,16 @@ def joint_step(
 
 
 def smooth_forces(drive: DriveMap, *, damping: float, creep_speed: float = 0.1) -> Any:
-    """Function ``forces(q, v) -> (force, torsion)`` without corners or history.
+    """Function ``forces(q, v) -> (force, torsion)`` without kinks or history.
 
-    Friction is f tanh(nu/nu_0) + eta nu; a joint at rest under load creeps at a
-    fraction of nu_0 where a real one sticks.
+    The friction torque is f tanh(nu/nu_0) + eta nu. Under load, a joint that would
+    stick creeps at a fraction of nu_0.
 
     Args:
-        drive: The map; its hysteresis is left out.
-        damping: C [N·m·s/rad].
-        creep_speed: nu_0, relative speed at the input [rad/s].
+        drive: Drive map; its hysteresis is omitted.
+        damping: Damping C along the torsion [N·m·s/rad].
+        creep_speed: Speed nu_0 of the wave generator relative to the flexspline
+            [rad/s].
     """
     ca = casadi()
     q, v, _ = _symbols(drive)
@@ -208,13 +235,13 @@ def smooth_forces(drive: DriveMap, *, damping: float, creep_speed: float = 0.1) 
 
 
 def elastic_torque(drive: DriveMap) -> Any:
-    """Function ``q -> T``, dV/d(torsion) at held angles [N·m]."""
+    """Function ``q -> T``, the elastic torque dV/d(torsion) at fixed angles [N·m]."""
     q, _, _ = _symbols(drive)
     return casadi().Function("elastic", [q], [_conservative(drive, q)[2]])
 
 
 def _symbols(drive: DriveMap) -> tuple[Any, Any, Any]:
-    """Angles, rates and history; of scalars where the map is small."""
+    """Symbols of angles, rates and history; scalar expressions if the map is small."""
     ca = casadi()
     kind = ca.MX if drive.potential.size > LARGE else ca.SX
     states = len(drive.hysteresis) + (drive.friction is not None)
@@ -222,7 +249,7 @@ def _symbols(drive: DriveMap) -> tuple[Any, Any, Any]:
 
 
 def _conservative(drive: DriveMap, q: Any) -> tuple[Any, Any, Any, Any]:
-    """Torsion, its slope (1, 2), torque along it at held angles, and -dV/dq (2, 1)."""
+    """Torsion, its gradient (1, 2), torque along it at fixed angles, -dV/dq (2, 1)."""
     ca = casadi()
     x, held = torsion(drive, q[0], q[1]), type(q).sym("x")
     energy = potential(drive, held, q[0], q[1])
@@ -234,7 +261,7 @@ def _conservative(drive: DriveMap, q: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _reach(drive: DriveMap, speed: Any, along: Any) -> Any:
-    """Largest stretch of the bristle [rad] at a torque along the torsion."""
+    """Largest stretch of the bristle [rad] at a speed and a torque ``along``."""
     law, ca = drive.friction, casadi()
     assert law is not None
     more = (law.static - law.coulomb) * ca.exp(-((speed / law.stribeck_speed) ** 2))
@@ -255,9 +282,9 @@ def _waves(drive: DriveMap, theta: Any, psi: Any) -> tuple[Any, Any]:
 
 
 def _pieces(drive: DriveMap) -> tuple[Array, Array]:
-    """Where each polynomial counts from (n + 2,), and all (5 (n + 2), 2 n_harmonics).
+    """Origins (n + 2,) and coefficients (5 (n + 2), 2 n_harmonics) of all polynomials.
 
-    The parabola below the knots, n intervals, the parabola above.
+    Their order is: parabola below the knots, n intervals, parabola above the knots.
     """
     knots = drive.torsion_knots
     origins = np.concatenate([knots[:1], knots])

@@ -1,16 +1,16 @@
-r"""Dynamics of a tree of hinges as CasADi expressions, numbers from an MjModel.
+r"""Dynamics of a tree of hinges as CasADi expressions, with parameters of an MjModel.
 
-The recursive Newton-Euler algorithm in the world frame: out along the tree the motion
-of every body, back along it the force and moment that move it,
+The recursive Newton-Euler algorithm in the world frame computes the motion of every
+body from the base outwards, and the joint torques from the tips inwards,
 
 .. math::
     \tau_j = z_j \cdot \sum_{b \succeq j} \left[ I_b\dot\omega_b
         + \omega_b \times I_b\omega_b + (c_b - p_j) \times m_b (\ddot c_b - g) \right]
         + a_j\,\ddot q_j,
 
-with :math:`a_j` the armature. Rotors of attached drives are bodies of the tree like
-any other. Joint damping is in; contacts, joint limits, friction loss, springs and
-tendons are not: the tendons of drives are replaced by their symbolic law.
+where :math:`a_j` is the armature. Rotors of attached drives are ordinary bodies of the
+tree. Joint damping is included. Contacts, joint limits, friction loss, springs and
+tendons are omitted; the symbolic law replaces the tendons of the drives.
 
 Source:
     Luh, Walker, Paul (1980), "On-line computational scheme for mechanical
@@ -36,22 +36,23 @@ _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SymbolicArm:
-    """CasADi functions of a compiled arm with drives; q, v, a in the model's order."""
+    """CasADi functions of an arm with drives; q, v and a are in the model's order."""
 
     inverse_dynamics: Any
     """``(q, v, a) -> tau``: inertia, gyroscopic, weight and damping torques [N·m]."""
     drive_forces: Any
-    """``(q, v) -> (tau, torsion)``: what all drives exert on the joints of the model,
-    and their torsions, without corners or history [N·m], [rad]."""
+    """``(q, v) -> (tau, torsion)``: torques of all drives on the joints of the model
+    [N·m] and torsions [rad], without kinks or history."""
     elastic: Any
     """``q -> T``: elastic torques along the torsions [N·m]."""
     rotors: NDArray[np.intp]
-    """Places of the rotors in q. Shape (n_joints,)."""
+    """Indices of the rotors in q. Shape (n_joints,)."""
     links: NDArray[np.intp]
+    """Indices of the links in q. Shape (n_joints,)."""
 
     @property
     def forward_dynamics(self) -> Any:
-        """``(q, v, motor_torque) -> a`` with the drives [rad/s²]."""
+        """Function ``(q, v, motor_torque) -> a`` of the arm with drives [rad/s²]."""
         ca = casadi()
         n = self.inverse_dynamics.size1_in(0)
         q, v, motor = (
@@ -69,15 +70,17 @@ class SymbolicArm:
 def symbolic_arm(
     model: mujoco.MjModel, drives: Sequence[JointDrive], *, creep_speed: float = 0.1
 ) -> SymbolicArm:
-    """An arm with drives of level ``full``.
+    """Build the CasADi functions of an arm with drives of level ``full``.
 
     Args:
-        model: Compiled, hinges only.
-        drives: As :func:`~swgjoint.joint.attach.attach` returned them.
-        creep_speed: See :func:`~swgjoint.control.symbolic.smooth_forces` [rad/s].
+        model: Compiled model with hinge joints only.
+        drives: Drives that :func:`~swgjoint.joint.attach.attach` returned.
+        creep_speed: Speed nu_0 of the friction law, see
+            :func:`~swgjoint.control.symbolic.smooth_forces` [rad/s].
 
     Raises:
-        InputError: If a joint is no hinge, or a drive has no rotor.
+        InputError: If a joint is not a hinge, or if the level of a drive is not
+            ``full``.
     """
     ca = casadi()
     for drive in drives:
@@ -110,14 +113,14 @@ def inverse_dynamics(model: mujoco.MjModel) -> Any:
     """Function ``(q, v, a) -> tau`` of a tree of hinges, without its drives [N·m].
 
     Raises:
-        InputError: If a joint is no hinge.
+        InputError: If a joint is not a hinge.
     """
     ca = casadi()
     for j in range(model.njnt):
         if model.jnt_type[j] != _HINGE:
             raise InputError(
-                f"joint {model.joint(j).name!r} is no hinge; a symbolic arm has hinges"
-                " only"
+                f"joint {model.joint(j).name!r} is not a hinge; accepted in a symbolic"
+                " arm: hinges only"
             )
     n = model.nv
     q, v, a = (ca.SX.sym(name, n) for name in "qva")
@@ -159,7 +162,11 @@ def inverse_dynamics(model: mujoco.MjModel) -> Any:
 
 
 def inertia_of(dynamics: Any) -> Any:
-    """Function ``q -> M`` of an inverse dynamics, armature included [kg·m²]."""
+    """Function ``q -> M`` of the joint inertia, including armature [kg·m²].
+
+    Args:
+        dynamics: Function from :func:`inverse_dynamics`.
+    """
     ca = casadi()
     n = dynamics.size1_in(0)
     q, a = ca.SX.sym("q", n), ca.SX.sym("a", n)
@@ -169,7 +176,7 @@ def inertia_of(dynamics: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Body:
-    """Frame of a body in the world and its motion."""
+    """Frame of a body and its motion, in world coordinates."""
 
     place: Any
     turn: Any
@@ -186,7 +193,7 @@ class _Body:
         return cls(place=zero, turn=ca.SX.eye(3), rate=zero, spin=zero, push=zero)
 
     def at(self, arm: Any) -> Any:
-        """Acceleration at a vector from the origin, world axes."""
+        """Acceleration of the point at ``arm`` from the origin of the frame."""
         ca = casadi()
         return (
             self.push
@@ -195,7 +202,7 @@ class _Body:
         )
 
     def carried(self, position: Any, rotation: Any) -> _Body:
-        """A frame fixed in this one."""
+        """Frame that is fixed in this one."""
         arm = self.turn @ casadi().DM(position)
         return _Body(
             place=self.place + arm,
@@ -208,7 +215,7 @@ class _Body:
     def turned(
         self, axis: Any, anchor: Any, angle: Any, speed: Any, acceleration: Any
     ) -> tuple[_Body, Any, Any]:
-        """The frame behind a hinge, and axis and anchor in the world."""
+        """Frame behind a hinge, and axis and anchor of the hinge in the world."""
         ca = casadi()
         z, arm = self.turn @ ca.DM(axis), self.turn @ ca.DM(anchor)
         pivot, push = self.place + arm, self.at(arm)
@@ -221,7 +228,7 @@ class _Body:
     def needs(
         self, mass: float, centre: Any, turn: Any, inertia: Any, gravity: Any
     ) -> tuple[Any, Any, Any]:
-        """Centre of mass, force and moment about it that this motion needs."""
+        """Centre of mass, and force and moment about it that the motion requires."""
         ca = casadi()
         arm = self.turn @ ca.DM(centre)
         axes = self.turn @ ca.DM(turn)
@@ -232,7 +239,7 @@ class _Body:
 
 
 def _about(axis: Any, angle: Any) -> Any:
-    """Rotation about a unit axis, Rodrigues."""
+    """Rotation matrix about a unit axis by Rodrigues' formula."""
     ca = casadi()
     K = ca.skew(axis)
     return ca.DM.eye(3) + ca.sin(angle) * K + (1 - ca.cos(angle)) * (K @ K)
