@@ -1,4 +1,4 @@
-"""One joint follows a reference under load, by the torque of its motor."""
+"""One joint follows a reference under load; the action is its motor torque."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ LOAD_RAMP = 0.3
 MOTION_START = 0.1
 """Rest before the motion [s]."""
 SHORTEST = 0.012
-"""In which the fastest reference would reach its speed at its largest acceleration [s]:
-only moves of episodes below 0.7 s would be shorter."""
+"""Ratio of the largest speed to the largest acceleration of references [s]. Only
+point-to-point moves in episodes shorter than 0.7 s would exceed this acceleration."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,16 +29,19 @@ class TrackingSettings(BenchSettings):
     """Arguments of ``JointTracking-v0``."""
 
     reference: str | tuple[str, ...] = tuple(KINDS)
+    """One or several names of :data:`~swgjoint.envs.references.KINDS`."""
     error_scale_arcmin: float = 3.0
+    """Error scale of the reward [arcmin]."""
     effort_weight: float = 0.1
+    """Effort weight of the reward [-]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check("error_scale_arcmin", "arcmin", zero=False)
         self._check("effort_weight", "", zero=True)
         several = isinstance(self.reference, tuple | list) and self.reference
-        given = self.reference if several else [self.reference]
-        for one in given:
+        names = self.reference if several else [self.reference]
+        for one in names:
             if not (isinstance(one, str) and one in KINDS):
                 raise InputError(
                     f"reference {format_value(one)}; accepted: one or several of"
@@ -47,9 +50,9 @@ class TrackingSettings(BenchSettings):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of references that are drawn."""
-        given = self.reference
-        return (given,) if isinstance(given, str) else tuple(given)
+        """Kinds of references from which an episode draws one."""
+        names = self.reference
+        return (names,) if isinstance(names, str) else tuple(names)
 
     @property
     def max_acceleration(self) -> float:
@@ -86,7 +89,7 @@ class TrackingCore(BenchCore):
         ), (share,)
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """A reference of one of the kinds, and a load that grows to its value."""
+        """Draw a reference of one of the kinds and a load that grows to its value."""
         s = self.settings
         time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
         start = int(np.searchsorted(time, MOTION_START))
@@ -106,7 +109,7 @@ class TrackingCore(BenchCore):
         return np.stack([*motion, load, known], axis=1)[:, :, None]
 
     def command(self, action: Array) -> Array:
-        """The share of the limit."""
+        """Motor torque, the action times the torque limit [N·m]."""
         return np.asarray(action * self.limits.motor_torque)
 
     def columns(self) -> list[Array]:
@@ -139,12 +142,13 @@ class TrackingCore(BenchCore):
 class JointTrackingEnv(SingleEnv):
     """A joint with a strain wave gear follows a smooth reference under load.
 
-    The bench joint: motor and wave generator, the drive, a load about a vertical axis.
-    The drive has what real ones have: stiffness that grows with torque, kinematic error
-    at 2 and 4 cycles per turn of the wave generator, hysteresis and friction where its
-    map has them. The reference is known at the start of an episode, as ``task``.
+    The joint consists of motor and wave generator, the drive and a load that turns
+    about a vertical axis. The stiffness of the drive grows with torque, and its
+    kinematic error has 2 and 4 cycles per turn of the wave generator. Hysteresis and
+    friction are those of its map. The reference is known from the start of an episode
+    as ``task``.
 
-    Action, held over one control period:
+    The action is constant over one control period:
 
     =====  ==========================  ====  =======
     index  meaning                     unit  range
@@ -152,8 +156,8 @@ class JointTrackingEnv(SingleEnv):
     0      motor torque, of its limit  1     -1 to 1
     =====  ==========================  ====  =======
 
-    Observation; the last two entries only with ``sensors={"link_encoder": True,
-    "torque_sensor": True}``:
+    Observation with the default arguments; the last two entries exist only with
+    ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
     =====  =====================================  =======  ===========
     index  meaning                                unit     range
@@ -171,58 +175,60 @@ class JointTrackingEnv(SingleEnv):
     10     output torque, read                    N·m      -410 to 410
     =====  =====================================  =======  ===========
 
-    The tracking errors, 2 and 3, end at 50 arcmin of the link and at that in 0.1 s, and
-    what the reference does in the age of a reading; beyond they stay there. Readings
-    have resolution, noise and delay, see
-    :class:`swgjoint.envs.sensors.Sensors`; ranges depend on the arguments, those above
-    belong to the default ones.
+    The ranges of the tracking errors 2 and 3 correspond to a link error of 50 arcmin
+    and to a change of 50 arcmin in 0.1 s, plus the change of the reference during the
+    age of a reading. Larger errors are clipped. Readings have resolution, noise and
+    delay, see :class:`swgjoint.envs.sensors.Sensors`.
 
     Reward of a step, with the error e of the true link angle at its end and the motor
-    torque u as part of its limit:
+    torque u relative to its limit:
 
         1/(1 + (e/error_scale)^2) - effort_weight u^2
 
-    Start: motor at rest at 0, no load; the load grows over 0.3 s, the motion begins
-    at 0.1 s. ``truncated`` after ``episode_s``. ``terminated`` when a limit is broken,
-    which ``info["broken_limit"]`` names by its number in
-    :data:`swgjoint.envs.core.LIMITS`: angle of the link (1 + 2 max_angle), motor speed
-    (twice that of the fastest reference), torque of the drive beyond its momentary peak
-    or that at which it ratchets.
+    An episode starts with the motor at rest at angle 0 and without load. The load grows
+    over 0.3 s, and the motion begins at 0.1 s. The episode is ``truncated`` after
+    ``episode_s`` and ``terminated`` when a limit is exceeded. ``info["broken_limit"]``
+    is then the number of the limit in :data:`swgjoint.envs.core.LIMITS`: link angle
+    (1 + 2 max_angle), motor speed (twice that of the fastest reference), or drive
+    torque (momentary peak torque or ratcheting torque).
 
-    ``info`` holds true values: ``link_error_arcmin``, ``transmission_error_arcmin``
-    (output minus input/ratio), ``output_torque_Nm`` (of the drive on the link, mean of
-    the engine's last step), ``motor_torque_Nm``, ``load_torque_Nm``,
-    ``link_angle_rad``, ``motor_angle_rad``, ``time_s``, ``broken_limit``.
+    ``info`` contains true values: ``link_error_arcmin``, ``transmission_error_arcmin``
+    (output minus input/ratio), ``output_torque_Nm`` (of the drive on the link, mean
+    over the last simulation step), ``motor_torque_Nm``, ``load_torque_Nm``,
+    ``link_angle_rad``, ``motor_angle_rad``, ``time_s`` and ``broken_limit``.
 
-    Args (all by keyword):
+    Args (all by keyword, with their defaults):
         drive: Catalogue name, map file, design or DriveMap; ``CSG-25-100``.
-        level: ``full`` or ``linear``, one constant spring.
-        rotor_inertia_kgm2: Motor rotor and wave generator; 1e-4.
-        load_inertia_kgm2: About the joint; 1.0.
-        payload_kg: At the end of the 0.5 m bar; 0.
+        level: ``full``, or ``linear`` for one constant spring; ``full``.
+        rotor_inertia_kgm2: Inertia of motor rotor and wave generator [kg·m²]; 1e-4.
+        load_inertia_kgm2: Inertia of the load about the joint [kg·m²]; 1.0.
+        payload_kg: Payload at the end of the 0.5 m bar [kg]; 0.
         friction: Whether the drive has the friction of its map; True.
-        kinematic_error_arcmin: Peak to peak over one output turn, for a drive without
-            error of its own; None takes the transmission accuracy that the catalogue
-            states, for a catalogue name, and leaves others as they are.
-        torque_limit_Nm: Of the motor; None: repeated peak torque over the ratio.
-        max_speed_rad_s: Of references, at the link; 0.6. Their acceleration is at most
-            that speed in 12 ms.
-        max_angle_rad: Of references; 1.0.
-        period_s: Of the control, up to 0.05; 1e-3. The engine steps as often, or, where
-            the drive is too stiff for that, in equal parts of it.
-        episode_s: 2.0.
-        load_of_rated: Largest load torque, as part of the rated torque; 0.5.
-        sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
+        kinematic_error_arcmin: Peak-to-peak kinematic error over one output turn
+            [arcmin], for a drive whose map has none. None uses the transmission
+            accuracy of the catalogue for a catalogue name and leaves other drives
+            unchanged; None.
+        torque_limit_Nm: Torque limit of the motor [N·m]; None uses the repeated peak
+            torque over the ratio; None.
+        max_speed_rad_s: Largest link speed of references [rad/s]; 0.6. Their largest
+            acceleration is this speed divided by 12 ms.
+        max_angle_rad: Largest link angle of references [rad]; 1.0.
+        period_s: Control period [s], up to 0.05; 1e-3. The simulation step is the
+            control period, or an integer fraction of it if the drive is too stiff.
+        episode_s: Duration of an episode [s]; 2.0.
+        load_of_rated: Largest load torque relative to rated torque [-]; 0.5.
+        sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`; None.
         randomise: True, or a mapping with fields of
-            :class:`~swgjoint.envs.specimen.SpecimenTolerances`: every episode has a
-            drive and a load of its own. ``task`` keeps the nominal ones. At ``linear``
-            True draws the load's inertia alone, and tolerances of the drive are
-            refused. False.
-        reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
-        error_scale_arcmin: Of the reward; 3.
-        effort_weight: Of the reward; 0.1.
+            :class:`~swgjoint.envs.specimen.SpecimenTolerances`, draws a new drive and
+            load for every episode, while ``task`` keeps the nominal ones. At
+            ``linear``, True draws only the load inertia, and tolerances of the drive
+            are rejected; False.
+        reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``;
+            all three.
+        error_scale_arcmin: Error scale of the reward [arcmin]; 3.
+        effort_weight: Effort weight of the reward [-]; 0.1.
 
-    Versions: v0, the first.
+    Version: v0.
     """
 
     core_of = TrackingCore
@@ -232,8 +238,8 @@ class JointTrackingEnv(SingleEnv):
 class JointTrackingVectorEnv(BatchEnv):
     """Many episodes of :class:`JointTrackingEnv` on the threads of the engine.
 
-    ``gymnasium.make_vec("swgjoint/JointTracking-v0", num_envs=256)``; ``threads`` of
-    the engine, 0 for one per core.
+    ``gymnasium.make_vec("swgjoint/JointTracking-v0", num_envs=256)`` makes it. The
+    argument ``threads`` is the number of engine threads; 0 uses one per core.
     """
 
     single = JointTrackingEnv

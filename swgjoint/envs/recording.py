@@ -1,8 +1,8 @@
-"""Episodes as recordings for the rerun viewer.
+"""Recordings of episodes for the rerun viewer.
 
-Entity paths: ``arm/<body>`` poses at 50 Hz with their shapes, ``<figure>/<joint>`` the
-figures of ``info`` at every step (``<figure>`` alone where there is one for all),
-``reward``; on the timeline ``time``.
+Entity paths are ``arm/<body>`` for shapes and poses of the bodies at 50 Hz,
+``<figure>/<joint>`` for the values of ``info`` at every step (``<figure>`` for values
+that are not per joint), and ``reward``. The timeline is ``time``.
 """
 
 from __future__ import annotations
@@ -30,25 +30,34 @@ SHOWN = (
     "output_torque_Nm",
     "motor_torque_Nm",
 )
-"""Figures with a plot when a recording is opened; all others are in it, too."""
+"""Quantities that are plotted when a recording is opened; it contains all others as
+well."""
 POSE_RATE = 50.0
-"""Poses per second [Hz]."""
+"""Rate of the recorded poses [Hz]."""
 
 
 class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Writes every episode of an environment as ``episode-<number>.rrd``.
+    """Wrapper that writes every episode to a file ``episode-<number>.rrd``.
 
     ::
 
         env = EpisodeRecorder(gymnasium.make("swgjoint/JointTracking-v0"), "episodes")
 
-    Written whole when the episode ends, is reset or the environment is closed;
-    ``files`` lists what was written. Numbers go on from those in the folder, whose
-    files stay.
+    A file is written when the episode ends, or when the environment is reset or closed.
+    ``files`` lists the files that were written. The numbers continue those in the
+    folder, so that existing files are kept.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], folder: str | Path) -> None:
-        """Record an environment of this package into a folder, which is made."""
+        """Record an environment of this package.
+
+        Args:
+            env: Single environment of ``swgjoint.envs``.
+            folder: Folder of the recordings; it is created.
+
+        Raises:
+            InputError: If the environment is not one of ``swgjoint.envs``.
+        """
         super().__init__(env)
         if not isinstance(env.unwrapped, SingleEnv):
             raise InputError(
@@ -70,15 +79,15 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Take a step and record where it led."""
-        got = super().step(action)
-        self._take(float(got[1]), got[-1])
-        if got[2] or got[3]:
+        """Take a step and record the state that follows."""
+        result = super().step(action)
+        self._take(float(result[1]), result[-1])
+        if result[2] or result[3]:
             self._write()
-        return got
+        return result
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the recording of an unfinished episode and close the environment."""
         self._write()
         super().close()
 
@@ -86,10 +95,10 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._rows.append((self._plant.batch.qpos[0].copy(), reward, info))
 
     def _free_number(self) -> int:
-        """After those of all recordings in the folder."""
-        there = [file.name for file in self.folder.iterdir()]
-        found = [re.fullmatch(r"episode-(\d+)\.rrd", name) for name in there]
-        return max((int(one[1]) + 1 for one in found if one), default=0)
+        """Number above those of all recordings in the folder."""
+        names = [file.name for file in self.folder.iterdir()]
+        matches = [re.fullmatch(r"episode-(\d+)\.rrd", name) for name in names]
+        return max((int(one[1]) + 1 for one in matches if one), default=0)
 
     def _write(self) -> None:
         rows, self._rows = self._rows, []
@@ -117,14 +126,14 @@ def write_episode(
     positions: Array,
     figures: dict[str, Array],
 ) -> None:
-    """Write one recording, whole or not at all.
+    """Write one recording; the file is either complete or absent.
 
     Args:
         path: File.
-        model: Of the simulation.
-        time: [s]. Shape (n,).
-        positions: qpos. Shape (n, nq).
-        figures: By entity path. Shapes (n,).
+        model: Model of the simulation.
+        time: Times of the steps [s]. Shape (n,).
+        positions: Positions qpos of the model. Shape (n, nq).
+        figures: Curves by entity path. Shapes (n,).
     """
     import rerun as rr
     import rerun.blueprint as rrb
@@ -148,7 +157,7 @@ def write_episode(
 
 
 def _log_arm(stream: Any, model: mujoco.MjModel, time: Array, positions: Array) -> None:
-    """Shapes once, poses of the bodies that have some."""
+    """Log the shapes once, and the poses of all bodies that have shapes."""
     import rerun as rr
 
     bodies = set()

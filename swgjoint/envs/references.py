@@ -1,7 +1,7 @@
-r"""Seeded smooth motions of one joint, with rest at the start.
+r"""Seeded smooth motions of one joint that start at rest.
 
-All are four times continuously differentiable, what the feed-forward of a flexible
-joint needs (Spong 1987), and pass through the smooth step
+All motions are four times continuously differentiable, as the feed-forward of a
+flexible joint requires (Spong 1987). They are built from the smooth step
 
 .. math:: s(x) = x^5\,(126 - 420 x + 540 x^2 - 315 x^3 + 70 x^4), \quad 0 \le x \le 1,
 
@@ -24,26 +24,34 @@ RAMP = 0.4
 HOLD = 0.05
 """Rest before and after a move from point to point [s]."""
 FREQUENCIES = (0.3, 2.0)
-"""Range of the oscillations [Hz]: below the first mode of any joint of an arm."""
+"""Frequency range of the oscillations [Hz], below the first mode of all arm joints."""
 PARTS = 5
-"""Oscillations of a multisine."""
+"""Number of oscillations in a multisine."""
 
 _STEP = np.polynomial.Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70])
 _STEP_1, _STEP_2 = _STEP.deriv(), _STEP.deriv(2)
 
 
 def smooth_step(time: Array, duration: float) -> Motion:
-    """The step from 0 to 1 over a duration from time 0 on, and two derivatives."""
+    """Smooth step from 0 to 1 that starts at time 0, with two derivatives.
+
+    Args:
+        time: Times [s]. Shape (n,).
+        duration: Duration of the step [s].
+
+    Returns:
+        Step [-] and its derivatives [1/s] and [1/s²]. Shapes (n,).
+    """
     x = np.clip(np.asarray(time) / duration, 0.0, 1.0)
     return _STEP(x), _STEP_1(x) / duration, _STEP_2(x) / duration**2
 
 
 def _oscillation(time: Array, frequency: Array, phase: Array, weight: Array) -> Motion:
-    """Sum of sines that grows from rest, from 0 on."""
+    """Sum of sines that starts at rest at angle 0 and grows over :data:`RAMP`."""
     omega = 2.0 * np.pi * frequency
     angle = omega * time[:, None] + phase
     sin, cos = weight * np.sin(angle), weight * np.cos(angle)
-    # the offset makes the motion begin at 0 with the step's own zeros
+    # the offset makes y start at 0, in addition to the zeros of the smooth step
     y = sin.sum(axis=1) - sin[0].sum()
     y_1, y_2 = (omega * cos).sum(axis=1), (-(omega**2) * sin).sum(axis=1)
     w, w_1, w_2 = smooth_step(time, RAMP)
@@ -51,13 +59,23 @@ def _oscillation(time: Array, frequency: Array, phase: Array, weight: Array) -> 
 
 
 def sinusoid(time: Array, rng: np.random.Generator) -> Motion:
-    """One oscillation."""
+    """Draw one oscillation.
+
+    Args:
+        time: Times from 0 on [s]. Shape (n,).
+        rng: Random number generator.
+    """
     frequency = rng.uniform(*FREQUENCIES, 1)
     return _oscillation(time, frequency, rng.uniform(0, 2 * np.pi, 1), np.ones(1))
 
 
 def multisine(time: Array, rng: np.random.Generator) -> Motion:
-    """Oscillations of random frequencies and phases with equal speeds."""
+    """Draw a sum of oscillations with random frequencies and phases and equal speeds.
+
+    Args:
+        time: Times from 0 on [s]. Shape (n,).
+        rng: Random number generator.
+    """
     low, high = map(float, np.log(FREQUENCIES))
     frequency = np.exp(rng.uniform(low, high, PARTS))
     phase = rng.uniform(0, 2 * np.pi, PARTS)
@@ -65,7 +83,12 @@ def multisine(time: Array, rng: np.random.Generator) -> Motion:
 
 
 def point_to_point(time: Array, rng: np.random.Generator) -> Motion:
-    """A move and half of it back, with rests before, between and after."""
+    """Draw a move and a return by half its distance, with rests around both.
+
+    Args:
+        time: Times from 0 on [s]. Shape (n,).
+        rng: Random number generator.
+    """
     first = rng.uniform(0.3, 0.6) * time[-1]
     second = time[-1] - first
     there = smooth_step(time - HOLD, first - 2.0 * HOLD)
@@ -90,15 +113,15 @@ def draw_motion(
     max_angle: float,
     max_acceleration: float,
 ) -> Motion:
-    """A motion of one of the kinds, with 40 to 100 % of what the limits allow.
+    """Draw a motion whose amplitude is 40 to 100 % of the largest within the limits.
 
     Args:
-        time: From 0 on [s]. Shape (n,).
-        rng: Source of all that is random.
+        time: Times from 0 on [s]. Shape (n,).
+        rng: Random number generator.
         kinds: Names of :data:`KINDS`, one of which is drawn.
-        max_speed: Limit of the speed [rad/s].
-        max_angle: Limit of the distance from the start [rad].
-        max_acceleration: Limit of the acceleration [rad/s²].
+        max_speed: Largest speed [rad/s].
+        max_angle: Largest distance from the start [rad].
+        max_acceleration: Largest acceleration [rad/s²].
     """
     kind = kinds[int(rng.integers(len(kinds)))]
     position, velocity, acceleration = KINDS[kind](time, rng)

@@ -18,14 +18,14 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 RAMP = 0.5
-"""Time in which speed and load grow; then the motion is steady [s]."""
+"""Time over which speed and load grow to constant values [s]."""
 STEEPEST = 2.5
-"""Largest slope of :func:`~swgjoint.envs.references.smooth_step` over its mean, 2.46,
-rounded up."""
+"""Ratio of the largest to the mean slope of
+:func:`~swgjoint.envs.references.smooth_step`, 2.46, rounded up [-]."""
 SETTLE = 1.0
-"""Time after that until the reward counts the motion [s]."""
+"""Settling time after the ramp, before the reward counts [s]."""
 MEMORY = 0.15
-"""Time constant of the mean that is taken out of errors [s]."""
+"""Time constant of the running mean that is subtracted from errors [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +58,8 @@ class RippleSettings(BenchSettings):
             raise InputError(f"slowest {self.slowest}; accepted: > 0 to 1")
         if self.episode_s <= RAMP + SETTLE:
             raise InputError(
-                f"episode_s {self.episode_s} s; accepted: above {RAMP + SETTLE:g} s,"
-                " from which on the motion counts"
+                f"episode_s {self.episode_s} s; accepted: > {RAMP + SETTLE:g} s, the"
+                " time before the reward counts"
             )
         way = self.max_speed_rad_s * self.episode_s
         if way > self.max_angle_rad:
@@ -75,7 +75,13 @@ class RippleCore(BenchCore):
     settings: RippleSettings
 
     def __init__(self, count: int, threads: int, settings: RippleSettings) -> None:
-        """See :class:`RippleSuppressionEnv`."""
+        """Build the model once, then ``count`` simulations of it.
+
+        Args:
+            count: Number of episodes.
+            threads: Number of engine threads; 0: one per core.
+            settings: Arguments of the environment.
+        """
         s = settings
         super().__init__(
             count,
@@ -114,7 +120,7 @@ class RippleCore(BenchCore):
         ), (known("added motor torque, of its authority", "1", 1.0),)
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Speed and load, each either way, that grow and then stay."""
+        """Draw speed and load of either sign that grow and then stay constant."""
         s = self.settings
         time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
         share = rng.uniform(s.slowest, 1.0) * rng.choice([-1.0, 1.0])
@@ -123,8 +129,8 @@ class RippleCore(BenchCore):
         up, bend, _ = smooth_step(time, RAMP)
         speed = float(share) * s.max_speed_rad_s
         velocity, acceleration = speed * up, speed * bend
-        # the integral of the step, by its own symmetry 1/2 over the ramp; Simpson's
-        # rule on the grid is far below a count of any encoder
+        # integral of the step by Simpson's rule, whose error is far below one count of
+        # any encoder
         middle = smooth_step(time[:-1] + 0.5 * s.period_s, RAMP)[0]
         parts = s.period_s / 6.0 * speed * (up[:-1] + 4.0 * middle + up[1:])
         position = np.concatenate([[0.0], np.cumsum(parts)])
@@ -134,12 +140,12 @@ class RippleCore(BenchCore):
         return plan[:, :, None]
 
     def command(self, action: Array) -> Array:
-        """The reference of the loop, known torques and a share of the authority."""
+        """Input of the motor loop: reference, feed-forward and added torque [N·m]."""
         plan, ratio = self.next_plan(), self.joint.ratio
         rotor = self.settings.rotor_inertia_kgm2
         known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
-        own = self.loop.command(plan[:, 0], plan[:, 1])
-        return np.asarray(own + known + action * self._authority)
+        loop = self.loop.command(plan[:, 0], plan[:, 1])
+        return np.asarray(loop + known + action * self._authority)
 
     def columns(self) -> list[Array]:
         """See the table of :class:`RippleSuppressionEnv`."""
@@ -161,7 +167,7 @@ class RippleCore(BenchCore):
         ]
 
     def judge(self) -> None:
-        """Ripple of the torque; errors that have a mean."""
+        """Set the torque ripple [N·m] and the errors before their mean is removed."""
         super().judge()
         now, inertia = self.now[:, :, 0], self.settings.link_inertia
         self.ripple = self.output_torque[:, 0] - now[:, 3] - inertia * now[:, 2]
@@ -170,13 +176,13 @@ class RippleCore(BenchCore):
         self._errors = np.stack([self.link_error[:, 0], error])
 
     def remember(self) -> None:
-        """Follow the means of the errors."""
+        """Update the running means of the errors."""
         share = self.period / MEMORY
         self._mean = self._mean + share * (self._errors - self._mean)
         self.link_ripple, self.error_ripple = self._errors - self._mean
 
     def forget(self, rows: Rows) -> None:
-        """Begin with what the errors are."""
+        """Set the running means of some episodes to the current errors."""
         self._mean = self._mean.copy()
         self._mean[:, rows] = self._errors[:, rows]
         self.link_ripple, self.error_ripple = self._errors - self._mean
@@ -187,11 +193,11 @@ class RippleCore(BenchCore):
         a = self.ripple / self._ripple_scale
         b = self.link_ripple / (s.error_scale_arcmin * arcmin)
         effort = self.action[:, 0]
-        got = 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
-        return np.where(self.instant > self._first, got, 0.0)
+        value = 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
+        return np.where(self.instant > self._first, value, 0.0)
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """With ripple of torque, link and transmission error, and whether it counts."""
+        """True values, including the ripples and whether the reward counts."""
         return super().info() | {
             "torque_ripple_Nm": self.ripple,
             "link_error_ripple_arcmin": self.link_ripple / arcmin,
@@ -201,16 +207,16 @@ class RippleCore(BenchCore):
 
 
 class RippleSuppressionEnv(SingleEnv):
-    """A joint turns at constant speed under load; torque is added to its motor's loop.
+    """A joint turns at constant speed under load; the action adds a motor torque.
 
-    The loop is the servo drive's own (:class:`swgjoint.envs.loop.MotorLoop`): PD on the
-    motor's angle, ``loop_Hz`` and ``loop_damping_ratio`` for motor and link on a rigid
-    drive, load and acceleration fed forward. Kinematic error and the torque that goes
-    with it come at even orders of the wave generator's angle, of which the observation
-    has sine and cosine.
+    The motor loop of the servo drive (:class:`swgjoint.envs.loop.MotorLoop`) is PD
+    control of the motor angle with feed-forward of load and acceleration. ``loop_Hz``
+    and ``loop_damping_ratio`` describe it for motor and link on a rigid drive.
+    Kinematic error and the torque ripple that it causes have even orders of the
+    wave-generator angle, whose sine and cosine are observed.
 
-    Action, held over one control period; the authority is ``authority_of_rated`` times
-    rated torque over ratio:
+    The action is constant over one control period. The authority is
+    ``authority_of_rated`` times rated torque over ratio:
 
     =====  ====================================  ====  =======
     index  meaning                               unit  range
@@ -218,8 +224,8 @@ class RippleSuppressionEnv(SingleEnv):
     0      added motor torque, of its authority  1     -1 to 1
     =====  ====================================  ====  =======
 
-    Observation; the last two entries only with ``sensors={"link_encoder": True,
-    "torque_sensor": True}``:
+    Observation with the default arguments; the last two entries exist only with
+    ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
     =====  ==========================================  =====  ===========
     index  meaning                                     unit   range
@@ -237,37 +243,43 @@ class RippleSuppressionEnv(SingleEnv):
     10     output torque, read                         N·m    -410 to 410
     =====  ==========================================  =====  ===========
 
-    Ranges of the tracking errors as in
+    The ranges of the tracking errors are defined as in
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
-    Reward of a step, from 1.5 s on (before: 0), with the ripple r of the torque, that
-    of the drive less load and inertia of the link on the reference, the error e of the
-    link less its running mean (time constant 0.15 s), and the action a:
+    Reward of a step from 1.5 s on; before that it is zero. r is the torque ripple, the
+    drive torque minus the load and inertia torques of the reference. e is the link
+    error minus its running mean (time constant 0.15 s), and a is the action:
 
         1/(1 + (r/ripple_scale)^2 + (e/error_scale)^2) - effort_weight a^2
 
-    Start: motor at rest at 0, no load; speed and load, drawn in size and sign, grow
-    over 0.5 s. ``truncated`` after ``episode_s``; ``terminated`` as in
-    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`, whose ``info`` and whose
-    arguments of bench, drive, sensors and ``randomise`` are those of this one, too.
-    ``info`` also has ``torque_ripple_Nm``, ``link_error_ripple_arcmin`` and
-    ``transmission_error_ripple_arcmin``, both less their running means, and ``steady``,
-    whether the reward counts. As long as the motor turns evenly the two are one; an
-    added torque that evens the motion of the link takes the first away and leaves the
-    second, for the motor then runs against the kinematic error.
+    An episode starts with the motor at rest at angle 0 and without load. Speed and
+    load, of random size and sign, grow over 0.5 s. The episode is ``truncated`` after
+    ``episode_s`` and ``terminated`` as in
+    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
-    Further args:
-        max_angle_rad: At least the way of the fastest motion; 3.
-        episode_s: 4.
-        slowest: Share of ``max_speed_rad_s`` of the slowest motion; 0.3.
-        authority_of_rated: 0.2.
-        loop_Hz: 8.
-        loop_damping_ratio: 1.
-        ripple_scale_of_rated: Of the reward; 0.01.
-        error_scale_arcmin: Of the reward; 0.1.
-        effort_weight: Of the reward; 0.1.
+    ``info`` is the same as there, with ``torque_ripple_Nm``,
+    ``link_error_ripple_arcmin``, ``transmission_error_ripple_arcmin`` and ``steady``
+    (whether the reward counts) in addition. The two error ripples are errors minus
+    their running means. They are equal while the motor speed is constant. An added
+    torque that makes the link speed constant removes the ripple of the link error but
+    not that of the transmission error, because the motor then moves against the
+    kinematic error.
 
-    Versions: v0, the first.
+    Args (all by keyword, with their defaults): those of ``JointTracking-v0`` for bench,
+    drive, sensors and ``randomise``, and
+        max_angle_rad: Limit of the link angle, at least the distance that the fastest
+            motion travels [rad]; 3.
+        episode_s: Duration of an episode [s]; 4.
+        slowest: Smallest speed relative to ``max_speed_rad_s`` [-]; 0.3.
+        authority_of_rated: Largest added motor torque, see above [-]; 0.2.
+        loop_Hz: Natural frequency of the motor loop [Hz]; 8.
+        loop_damping_ratio: Damping ratio of the motor loop [-]; 1.
+        ripple_scale_of_rated: Ripple scale of the reward relative to rated torque [-];
+            0.01.
+        error_scale_arcmin: Error scale of the reward [arcmin]; 0.1.
+        effort_weight: Effort weight of the reward [-]; 0.1.
+
+    Version: v0.
     """
 
     core_of = RippleCore

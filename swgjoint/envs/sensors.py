@@ -1,4 +1,4 @@
-"""What the controller of a simulated joint reads: resolution, noise, delay."""
+"""Sensor readings of simulated joints, with resolution, noise and delay."""
 
 from __future__ import annotations
 
@@ -16,25 +16,29 @@ from swgjoint.units import arcsec
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """Sensors of every joint; the motor's encoder is always there.
+    """Sensors of every joint; the motor encoder is always present.
 
-    Defaults are the order of magnitude of servo drives, not of one product.
+    The defaults have the order of magnitude of servo drives in general, not of one
+    product.
     """
 
     motor_counts: int = 2**17
-    """Counts of the motor's encoder per turn; 0 reads the angle itself."""
+    """Counts of the motor encoder per turn; 0 means an exact angle."""
     motor_noise_rad: float = 2e-5
-    """Standard deviation before the reading is rounded."""
+    """Standard deviation of the motor angle before it is rounded to counts [rad]."""
     link_encoder: bool = False
+    """Whether there is a link encoder."""
     link_counts: int = 2**20
-    """Counts of the link's encoder per turn; 0 reads the angle itself."""
+    """Counts of the link encoder per turn; 0 means an exact angle."""
     link_noise_rad: float = arcsec
+    """Standard deviation of the link angle before it is rounded to counts [rad]."""
     torque_sensor: bool = False
+    """Whether there is an output torque sensor."""
     torque_noise_of_rated: float = 1e-3
-    """Standard deviation, as part of the rated torque."""
+    """Standard deviation of the torque reading relative to rated torque [-]."""
     delay_periods: int = 1
-    """Age of every reading when the controller gets it, in control periods; at most
-    those of an episode."""
+    """Age of every reading when the controller receives it [control periods], at most
+    the length of an episode."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -48,12 +52,18 @@ class Sensors:
                 raise InputError(
                     f"sensor {field.name} {format_value(value)}; accepted: {accepted}"
                 )
-            if kind == "int":  # what a file or a division may have as 2.0
+            if kind == "int":  # accepts 2.0, as from a file or a division
                 object.__setattr__(self, field.name, int(value))
 
     @classmethod
     def from_argument(cls, argument: Mapping[str, float] | Sensors | None) -> Sensors:
-        """What the argument ``sensors`` of an environment means; None: defaults."""
+        """Sensors from the argument ``sensors`` of an environment.
+
+        None means the defaults.
+
+        Raises:
+            InputError: If the argument has another type or an unknown key.
+        """
         if argument is None or isinstance(argument, Sensors):
             return argument or cls()
         known = {field.name for field in fields(cls)}
@@ -73,20 +83,20 @@ class Sensors:
 class Readout:
     """Readings of n simulations over time.
 
-    Channels are the motor angles of all joints, then, where there are such sensors,
-    the link angles and the output torques.
+    The channels are the motor angles of all joints, followed by the link angles and the
+    output torques if there are such sensors.
     """
 
     def __init__(
         self, sensors: Sensors, count: int, rated_torque: Array, period: float
     ) -> None:
-        """Prepare; see :class:`Sensors`.
+        """Prepare the channels of all simulations.
 
         Args:
-            sensors: Of every joint.
-            count: Of the simulations.
-            rated_torque: Of the joints [N·m]. Shape (n_joints,).
-            period: Of the control [s].
+            sensors: Sensors of every joint.
+            count: Number of simulations.
+            rated_torque: Rated torque of every drive [N·m]. Shape (n_joints,).
+            period: Control period [s].
         """
         joints, self._period = len(rated_torque), period
         one = np.ones(joints)
@@ -103,44 +113,45 @@ class Readout:
         self._coarse = self._resolution > 0.0
         self._rounds = self._resolution[self._coarse]
         self.channels = self._noise.size
-        """Numbers of one reading."""
+        """Number of channels."""
         self._motor = slice(0, joints)
         self._ages = sensors.delay_periods + 1
-        # a ring of the last readings, the oldest of them is what is given
+        # ring buffer of the last readings, of which the oldest is returned
         self._ring = np.zeros((self._ages, count, self.channels))
         self._now = 0
         self._last = np.zeros((count, joints))
         self.value = np.zeros((count, self.channels))
-        """What the controller gets. Shape (n, channels)."""
+        """Delayed readings that the controller receives. Shape (n, channels)."""
         self.motor_speed = np.zeros((count, joints))
-        """Change of the motor reading over a period [rad/s]. Shape (n, n_joints)."""
+        """Change of the motor reading per control period [rad/s]. Shape
+        (n, n_joints)."""
 
     def _sense(self, true: Array, normal: Array) -> Array:
-        got = true + self._noise * normal
-        got[:, self._coarse] = (
-            np.floor(got[:, self._coarse] / self._rounds) * self._rounds
+        reading = true + self._noise * normal
+        reading[:, self._coarse] = (
+            np.floor(reading[:, self._coarse] / self._rounds) * self._rounds
         )
-        return got
+        return reading
 
     def start(self, rows: NDArray[np.intp], true: Array, normal: Array) -> None:
-        """Begin anew for some simulations, at rest as long as the delay looks back.
+        """Restart some simulations, with rest during the delay before the start.
 
         Args:
-            rows: Which simulations. Shape (m,).
-            true: Of the channels. Shape (m, channels).
+            rows: Indices of the simulations. Shape (m,).
+            true: True values of the channels. Shape (m, channels).
             normal: Standard normal numbers. Same shape.
         """
-        got = self._sense(true, normal)
-        self._ring[:, rows] = got
-        self.value[rows] = got
-        self._last[rows] = got[:, self._motor]
+        reading = self._sense(true, normal)
+        self._ring[:, rows] = reading
+        self.value[rows] = reading
+        self._last[rows] = reading[:, self._motor]
         self.motor_speed[rows] = 0.0
 
     def read(self, true: Array, normal: Array) -> None:
         """Take the readings of one instant of all simulations.
 
         Args:
-            true: Of the channels. Shape (n, channels).
+            true: True values of the channels. Shape (n, channels).
             normal: Standard normal numbers. Same shape.
         """
         self._ring[self._now] = self._sense(true, normal)

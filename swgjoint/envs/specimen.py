@@ -1,4 +1,4 @@
-"""Drives of simulated joints and the spread of their specimens."""
+"""Drives of simulated joints and the tolerances of individual specimens."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ from swgjoint.units import arcmin
 def load_drive_once(
     reference: str, *, kinematic_error_arcmin: float | None = None
 ) -> DriveMap:
-    """The map that a reference names now: environments are made by the hundred.
+    """Load a drive map once for many environments.
 
-    It is kept as long as the file has the same content, wherever the process works.
+    The map is kept in memory as long as the content of its file does not change, even
+    if the working folder of the process does.
 
     Args:
         reference: See :func:`swgjoint.drives.references.load_drive`.
-        kinematic_error_arcmin: The same.
+        kinematic_error_arcmin: See :func:`swgjoint.drives.references.load_drive`.
 
     Raises:
-        InputError: The same.
+        InputError: As :func:`swgjoint.drives.references.load_drive`.
     """
     file = Path(reference)
     try:
         content = sha256(file.read_bytes()).digest() if file.is_file() else None
-    except (OSError, ValueError):  # what cannot be read is refused by the loader
+    except (OSError, ValueError):  # the loader rejects unreadable files
         content = None
     return _load_once(
         reference if content is None else str(file.resolve()),
@@ -49,26 +50,28 @@ def load_drive_once(
 def _load_once(
     reference: str, content: bytes | None, *, kinematic_error_arcmin: float | None
 ) -> DriveMap:
-    """The map of a reference whose file, if it is one, has this content."""
+    """Load a map; ``content`` is the hash of its file, as part of the cache key."""
     return load_drive(reference, kinematic_error_arcmin=kinematic_error_arcmin)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpecimenTolerances:
-    """Within what a drive and its load may differ from the nominal ones; ± shares.
+    """Relative tolerances of a drive and its load: largest deviations of either sign.
 
-    At ``linear`` a drive is one constant spring, and ``load_inertia`` is all there is:
-    the others are then 0, and refused where they are not.
+    At level ``linear`` a drive is one constant spring. All tolerances except
+    ``load_inertia`` must then be zero.
     """
 
     stiffness: float = 0.15
+    """Tolerance of the stiffness [-]."""
     kinematic_error: float = 0.5
-    """Share of its amplitude."""
+    """Tolerance of the amplitude of the kinematic error [-]."""
     losses: float = 0.3
-    """Share of hysteresis and friction."""
+    """Tolerance of hysteresis and friction [-]."""
     load_inertia: float = 0.2
+    """Tolerance of the load inertia [-]."""
     phase: bool = True
-    """Whether the angle functions begin anywhere in their cycle."""
+    """Whether the periodic functions of the angles have a random phase."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -82,7 +85,7 @@ class SpecimenTolerances:
                 )
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:
-        """A specimen of the drive, and by what share the load's inertia differs."""
+        """Draw a specimen of the drive and a relative load-inertia deviation [-]."""
         share, turn = rng.uniform(-1.0, 1.0, 4), rng.uniform(0.0, 2.0 * np.pi, 2)
         variation = Variation(
             stiffness=float(self.stiffness * share[0]),
@@ -94,7 +97,7 @@ class SpecimenTolerances:
         return variation, float(self.load_inertia * share[3])
 
     def extremes(self) -> tuple[Variation, Variation]:
-        """The softest and the stiffest specimen, with the largest error."""
+        """Softest and stiffest specimen, both with the largest kinematic error."""
         error = self.kinematic_error
         return (
             Variation(stiffness=-self.stiffness, kinematic_error=error),
@@ -105,14 +108,18 @@ class SpecimenTolerances:
 def tolerances_of(
     argument: bool | Mapping[str, float] | SpecimenTolerances, level: str
 ) -> SpecimenTolerances | None:
-    """What the argument ``randomise`` of an environment means; None: off.
+    """Tolerances from the argument ``randomise`` of an environment.
 
     Args:
-        argument: As given.
-        level: Of the drives; ``linear`` carries what the load has alone.
+        argument: Value of the argument; True means the default tolerances.
+        level: Level of the drives; ``linear`` supports only ``load_inertia``.
+
+    Returns:
+        The tolerances; None if the argument is False.
 
     Raises:
-        InputError: If it is of another kind, or says what the level cannot carry.
+        InputError: If the argument is not accepted, or if the level does not support a
+            tolerance.
     """
     known = {field.name for field in fields(SpecimenTolerances)}
     if argument is False:
@@ -132,30 +139,31 @@ def tolerances_of(
         )
     absent = dict.fromkeys(known - {"load_inertia"}, 0) if level == "linear" else {}
     if isinstance(argument, SpecimenTolerances):
-        got = argument
+        tolerances = argument
     else:
-        given = argument if isinstance(argument, Mapping) else {}
-        got = SpecimenTolerances(**{**absent, **given})  # type: ignore[arg-type]
+        chosen = argument if isinstance(argument, Mapping) else {}
+        tolerances = SpecimenTolerances(**{**absent, **chosen})  # type: ignore[arg-type]
     for key in sorted(absent):
-        if value := getattr(got, key):
+        if value := getattr(tolerances, key):
             raise InputError(
-                f"tolerance {key} {value} at level linear, whose drives are all alike;"
-                " accepted: load_inertia alone, or level full"
+                f"tolerance {key} {value} at level linear, where all drives are equal;"
+                " accepted: load_inertia only, or level full"
             )
-    return got
+    return tolerances
 
 
 def drive_of_environment(drive: str | DriveMap, error: float | None) -> DriveMap:
-    """The map of a drive with the kinematic error that an environment asks for.
+    """Drive map with the kinematic error that the arguments of an environment state.
 
     Args:
-        drive: Reference, or a map, which is taken as it is.
-        error: Peak to peak of an assumed error [arcmin], for a drive without one; None:
-            what its catalogue states, of others nothing.
+        drive: Reference of a drive, or its map.
+        error: Peak-to-peak value of an assumed kinematic error [arcmin], for a drive
+            without one. None uses the transmission accuracy of the catalogue for a
+            catalogue name and leaves other drives unchanged.
 
     Raises:
-        InputError: If there is no such drive, or it has an error of its own and another
-            one is asked for.
+        InputError: If the drive does not exist, or if it has a kinematic error and
+            ``error`` states another one.
     """
     if isinstance(drive, str):
         return load_drive_once(drive, kinematic_error_arcmin=error)
