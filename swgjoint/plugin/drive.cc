@@ -18,18 +18,19 @@ constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
     "friction",        "contact_damping"};
-constexpr int kAccelerations = 2;  // states before those of the hysteresis
-constexpr int kBristle = 2;        // where it is relaxed, whether that is known
+constexpr int kAccelerations = 2;  // number of states before those of the hysteresis
+constexpr int kBristle = 2;        // states: angle where it is relaxed, whether known
 constexpr size_t kMaxElements = 64;
-constexpr int kDeviations = 5;           // user data of the tendon
-constexpr mjtNum kLeastLosses = 1e-6;    // the bristle keeps some stiffness
-// Largest cubic coefficient of the tendon of the friction, its mark: so small that the
-// spring pulls with nothing, for its length, unlike a torsion, is a rotation of many
-// turns. 1e-19 is written, as XML has nothing below 1e-20; older models have 1e-30.
+constexpr int kDeviations = 5;           // number of user values of the tendon
+constexpr mjtNum kLeastLosses = 1e-6;    // keeps the bristle stiffness above zero
+// Largest cubic coefficient of the friction tendon, which a small value identifies. The
+// value is so small that the spring force vanishes, because the length of this tendon is
+// a rotation of many turns and not a torsion. Models are written with 1e-19, since XML
+// keeps nothing below 1e-20; older models have 1e-30.
 constexpr mjtNum kFrictionCubic = 1e-18;
-// Torque that the engine warns of (mjWARN_BADQACC) at inertias up to 1e10 kg m^2
+// Torque that triggers mjWARN_BADQACC at inertias up to 1e10 kg m^2.
 constexpr mjtNum kDiverged = mjMAXVAL * mjMAXVAL;
-// Custom numeric with the bounds of the integrator's region, see joint/watch.py.
+// Custom numeric with the bounds of the integration region, see joint/watch.py.
 constexpr char kRegion[] = "swgjoint_region";
 
 Drive* Get(const mjData* d, int instance) {
@@ -51,7 +52,7 @@ bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum 
   return true;
 }
 
-// Stiffness and yield torque of every Jenkin element; an absent attribute has none.
+// Stiffness and yield torque of every Jenkin element; none if the attribute is absent.
 bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
   const char* text = mj_getPluginConfig(m, instance, "hysteresis");
   list->clear();
@@ -65,15 +66,16 @@ bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
 
 int CountStates(const mjModel* m, int instance) {
   std::vector<double> list;
-  // a bad attribute is refused when the instance is made
+  // Create rejects an invalid attribute
   if (!Elements(m, instance, &list)) return kAccelerations;
   const char* friction = mj_getPluginConfig(m, instance, "friction");
   return kAccelerations + static_cast<int>(list.size() / 2) +
          (friction && *friction ? kBristle : 0);
 }
 
-// Tangent stiffness of a tendon's cubic spring at the length that this sets; 0 would
-// leave the engine's metric. Returns the stiffness that it has after rounding.
+// Sets the length of a tendon such that its cubic spring has tangent stiffness p. The
+// engine would omit a stiffness of 0 from its metric. Returns the stiffness after
+// rounding.
 mjtNum SetTangent(const mjModel* m, mjData* d, int tendon, mjtNum p) {
   const mjtNum a = m->tendon_stiffness[tendon];
   const mjtNum c = m->tendon_stiffnesspoly[mjNPOLY * tendon + 1];
@@ -82,14 +84,14 @@ mjtNum SetTangent(const mjModel* m, mjData* d, int tendon, mjtNum p) {
   return a + 3 * c * length * length;
 }
 
-// Force of a tendon's cubic spring, as the engine applied it.
+// Force that the engine applied for a tendon's cubic spring.
 mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
   const mjtNum x = d->ten_length[tendon];
   return x * (m->tendon_stiffness[tendon] +
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
-// Whether a model with this signature and step has not been warned of yet.
+// Whether this is the first warning for a model signature, step and bound.
 bool First(uint64_t model, mjtNum step, int bound) {
   static std::mutex mutex;
   static std::set<std::tuple<uint64_t, mjtNum, int>> warned;
@@ -103,7 +105,7 @@ Drive::Region Drive::Region::Find(const mjModel* m) {
   Region found;
   for (int n = 0; n < m->nnumeric; ++n) {
     const char* name = mj_id2name(m, mjOBJ_NUMERIC, n);
-    // attaching may have put a prefix before the name
+    // attaching may have added a prefix to the name
     if (!name || !std::strstr(name, kRegion) || m->numeric_size[n] != 4) continue;
     const mjtNum* bound = m->numeric_data + m->numeric_adr[n];
     for (int k = 0; k < 3; ++k) {
@@ -115,7 +117,7 @@ Drive::Region Drive::Region::Find(const mjModel* m) {
   return found;
 }
 
-// Warns once for a model and a step when the region of the integrator is left.
+// Warns once per model and step size when the integration region is left.
 void Drive::Watch(const mjModel* m, const mjData* d, int instance, int scheme) {
   const mjtNum h = m->opt.timestep, limit = region_.step[scheme];
   const mjtNum speed = std::fabs(d->qvel[v_rotor_]);
@@ -124,7 +126,7 @@ void Drive::Watch(const mjModel* m, const mjData* d, int instance, int scheme) {
   const bool steps = limit > 0 && h > limit * (1 + 1e-9);
   if (!steps && !turns) return;
   const mjtNum most = region_.phase;
-  (steps ? region_.step[scheme] : region_.phase) = 0;  // this one has said it
+  (steps ? region_.step[scheme] : region_.phase) = 0;  // no second warning
   if (!First(m->signature, h, steps ? scheme : 3)) return;
   const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
   if (steps) {
@@ -179,8 +181,8 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   }
   drive->stretch_.assign(drive->reach_.size(), 0.0);
 
-  // config strings get no prefix when a model is attached, names do: the tendon
-  // has the name of the instance
+  // When a model is attached, names get a prefix and config strings do not. The tendon
+  // therefore has the same name as the instance.
   const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
   const int t = name ? mj_name2id(m, mjOBJ_TENDON, name) : -1;
   if (t < 0) return Refuse(m, instance, "no tendon has the name of the instance");
@@ -190,7 +192,7 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance, "its tendon does not join a rotor and a link joint");
   }
   const int rotor = m->wrap_objid[wrap], link = m->wrap_objid[wrap + 1];
-  // XML keeps six digits of a coefficient; nothing below is computed from it
+  // XML keeps six digits of a coefficient, so it is only compared and not used further
   if (m->jnt_type[rotor] != mjJNT_HINGE || m->jnt_type[link] != mjJNT_HINGE ||
       std::fabs(m->wrap_prm[wrap] * drive->map_.ratio() - 1) > 1e-5 ||
       m->wrap_prm[wrap + 1] != -1) {
@@ -230,8 +232,9 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   return drive;
 }
 
-// The tendon that carries the friction's metric has the same joints, with b as
-// coefficients, and the mark; found by that, for attaching may change its name.
+// Finds the tendon that carries the friction term of the metric. It has the same joints
+// with coefficients b and the small cubic coefficient; its name may change when a model
+// is attached.
 bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link) {
   std::vector<double> list;
   Friction friction;
@@ -256,28 +259,29 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
   return friction_.has_value();
 }
 
-// Of the wave generator relative to the flexspline, from positions or velocities.
+// Rotation or speed of the wave generator relative to the flexspline, from positions or
+// velocities of rotor and link.
 mjtNum Drive::Rotation(const mjtNum* q) const {
   return friction_->b_theta() * q[0] + friction_->b_psi() * q[1];
 }
 
-// How the drive of this model deviates from its map; zeros, or no user data: nowhere.
-// Read in every step, so that simulations of one batch may differ.
+// Applies the deviations of this drive from its map. Zeros or no user data mean no
+// deviation. They are read in every step, so that simulations of one batch may differ.
 void Drive::Vary(const mjModel* m) {
   if (m->nuser_tendon < kDeviations) return;
   const mjtNum* by = m->tendon_user + tendon_ * m->nuser_tendon;
   map_.Vary(1 + by[0], 1 + by[1], by[2], by[3]);
-  losses_ = std::max(1 + by[4], kLeastLosses);  // NaN stays, to be found
+  losses_ = std::max(1 + by[4], kLeastLosses);  // keeps NaN, which Diverges detects
   if (friction_) friction_->Scale(losses_);
 }
 
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   Vary(m);
   step_.scheme = step_.gradient = false;
-  // without springs the engine leaves the tendon out of its metric, too
+  // if springs are disabled, the engine also omits the tendon from its metric
   if (m->opt.disableflags & mjDSBL_SPRING) return;
 
-  // take the native spring of the tendon out again, as the engine applied it
+  // remove the spring force of the tendon that the engine applied
   const mjtNum native = NativeForce(m, d, tendon_);
   d->qfrc_passive[v_rotor_] += native * d->ten_J[entry_rotor_];
   d->qfrc_passive[v_link_] += native * d->ten_J[entry_link_];
@@ -287,7 +291,7 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
     d->qfrc_passive[v_link_] += rubbed * friction_->b_psi();
   }
 
-  // PGS solves without the tendon part of the metric
+  // PGS ignores the tendon term of the metric
   if (m->opt.integrator == mjINT_DISCRETE && m->opt.solver != mjSOL_PGS) {
     Watch(m, d, instance, 0);
     AddScheme(m, d, instance);
@@ -297,16 +301,17 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   }
 }
 
-// Stretch of every element at the torsion where the map begins: it slips to reach it.
+// Sets the stretch of every element at the begin torsion; an element slips if the
+// torsion exceeds its reach.
 void Drive::Place(const mjtNum* rest) {
   for (size_t j = 0; j < reach_.size(); ++j) {
     stretch_[j] = std::clamp(map_.torsion() - rest[j], -reach_[j], reach_[j]);
   }
 }
 
-// Adds the elements over a change of the torsion: the mean of their torque along it,
-// so that their work is exact, and how that mean grows with the change. An element
-// sticks for the part f of the way.
+// Adds the elements over a change of the torsion: their mean torque along it, so that
+// their work is exact, and the derivative of that mean by the change. An element sticks
+// over the fraction f of the change.
 void Drive::Slip(mjtNum change, DriveValue* value) const {
   for (size_t j = 0; j < reach_.size(); ++j) {
     const mjtNum k = losses_ * stiffness_[j], begin = stretch_[j];
@@ -320,11 +325,11 @@ void Drive::Slip(mjtNum change, DriveValue* value) const {
   }
 }
 
-// Whether one of the torques and stiffnesses of a step is not finite or beyond all
-// bounds, for the user data or the state are. The engine's solver would take it for no
-// force at all and let the whole model coast in silence. So the rotor gets a torque by
-// which the engine warns of a divergence and starts anew, as after any other, and the
-// step leaves no trace in the history of the drive.
+// Whether a torque or stiffness of a step is not finite or excessively large, because
+// the user data or the state are. The engine's solver would treat it as zero force and
+// the whole model would coast without a warning. The rotor therefore gets a torque at
+// which the engine reports divergence and resets, as after any other divergence. The
+// step does not change the history of the drive.
 bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
   const auto bounded = [](mjtNum x) { return std::fabs(x) <= kDiverged; };  // not NaN
   if (std::all_of(numbers.begin(), numbers.end(), bounded)) return false;
@@ -333,15 +338,16 @@ bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
   return true;
 }
 
-// Acceleration of a dof by a unit torque on it, with all others free: the diagonal of
-// M^-1, from the factor L' D L as the sum of (L^-T e)^2/D over the dof's ancestors.
+// Acceleration of a dof under a unit torque on it, with all other dofs free. This is an
+// entry of the diagonal of M^-1. With M = L' D L it is the sum of (L^-T e)^2/D over the
+// ancestors of the dof.
 mjtNum Drive::Response(const mjModel* m, const mjData* d, int dof) {
   const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
   std::fill_n(column_.begin(), last, 0.0);
   column_[last] = 1;
   mjtNum sum = 0;
   for (int a = last; a >= 0; --a) {
-    // the ancestors of an ancestor are the entries before it
+    // the ancestors of an ancestor are the preceding entries
     const int j = m->M_colind[row + a];
     const mjtNum* factor = d->qLD + m->M_rowadr[j];
     sum += column_[a] * column_[a] * d->qLDiagInv[j];
@@ -382,19 +388,19 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   step_.gradient = true;
 }
 
-// Torque per torsion rate in a step of the scheme. The engine pushes a link out of a
-// contact or a limit along a prescribed path, whatever torque that takes, and so feeds
-// the torsion of a drive that has no losses: contact_damping takes that.
+// Torque per torsion rate in a step of the scheme. The engine moves a link out of a
+// contact or a limit along a prescribed path, regardless of the torque. This feeds
+// energy into the torsion of a drive without losses; contact_damping dissipates it.
 mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
   const mjtNum own = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
-  // the rows of the step are made before the passive stage
+  // the engine makes the constraint rows of the step before the passive stage
   const bool touches = d->nefc > d->ne + d->nf;
   return touches ? std::max(own, contact_damping_) : own;
 }
 
-// Predicts the step of the pair, takes the discrete gradient over it and hands the
-// rest, linear in the velocity step, to the engine: its metric M + h^2 p g g' is
-// built after this stage from ten_J (the direction g) and from the tangent of the
+// Predicts the step of rotor and link and evaluates the discrete gradient over it. The
+// engine adds the part that is linear in the velocity change. After this stage it builds
+// its metric M + h^2 p g g' from ten_J (the direction g) and from the tangent of the
 // tendon's cubic spring at ten_length (the stiffness p).
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
@@ -403,7 +409,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   const mjtNum damping = Damping(m, d);
 
-  // the scheme is a midpoint rule in positions half a step back
+  // the scheme is a midpoint rule for positions that are half a step earlier
   map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);
   Place(state + kAccelerations);
   DriveValue& g = step_.value;
@@ -443,7 +449,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     dm = h * (am - wm * g.g_theta * f);
     dl = h * (al - wl * g.g_psi * f);
     if (friction_) {
-      // (M + h^2 p g g')^-1 b: how the pair answers to friction
+      // (M + h^2 p g g')^-1 b: response of rotor and link to friction
       const mjtNum bm = friction_->b_theta(), bl = friction_->b_psi();
       const mjtNum along = h * h * p * (wm * bm * g.g_theta + wl * bl * g.g_psi) /
                            (1 + h * h * w * p);
@@ -462,14 +468,14 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     return;
   }
   p = SetTangent(m, d, tendon_, p);
-  // the engine will add -h p times the tendon's velocity along g: cancel it
+  // cancel the force -h p times the tendon velocity, which the engine adds along g
   const mjtNum shift = h * p * d->ten_velocity[tendon_];
   d->ten_J[entry_rotor_] = g.g_theta;
   d->ten_J[entry_link_] = g.g_psi;
   d->qfrc_passive[v_rotor_] -= (force - shift) * g.g_theta + g.e_theta;
   d->qfrc_passive[v_link_] -= (force - shift) * g.g_psi + g.e_psi;
   if (friction_) {
-    // the same along b, a second term of the metric
+    // the same along b, as second term of the metric
     rub.metric = SetTangent(m, d, friction_tendon_, rub.metric);
     const mjtNum rubs = rub.force - h * rub.metric * d->ten_velocity[friction_tendon_];
     d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
@@ -487,7 +493,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
 }
 
 void Drive::Advance(const mjModel* m, mjData* d, int instance) {
-  Vary(m);  // a copy may end a step that it has not begun
+  Vary(m);  // a copied mjData may end a step that it has not begun
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   AdvanceState(m, d, state);
   std::replace_if(
@@ -497,9 +503,9 @@ void Drive::Advance(const mjModel* m, mjData* d, int instance) {
 
 void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
   state[0] = state[1] = 0;
-  // one path from the last torsion: its end decides where an element is relaxed. The
-  // end of a step of the scheme is the beginning of the next and counts then; stages
-  // of other integrators do not count at all.
+  // The torsion at the end of a step determines where each element is relaxed. The end
+  // of a step of the scheme is the beginning of the next one and is evaluated there;
+  // intermediate stages of other integrators are ignored.
   if (!reach_.empty() && (step_.scheme || step_.gradient)) {
     if (step_.gradient) {
       map_.Begin(d->qpos[q_rotor_], d->qpos[q_link_]);
@@ -565,11 +571,11 @@ void Drive::RegisterPlugin() {
     d->plugin_data[instance] = 0;
   };
   plugin.copy = +[](mjData* dest, const mjModel* m, const mjData* src, int instance) {
-    // a copy between the two halves of a step must carry what Advance needs
+    // a copy between Compute and Advance must contain the data that Advance needs
     const Drive* from = Get(src, instance);
     if (dest == src || !from) return;
     if (!Get(dest, instance) || Get(dest, instance) == from) {
-      // new data; a model that was edited since it was compiled may be refused
+      // new data; Create may reject a model that was edited after compilation
       auto drive = Drive::Create(m, instance);
       if (!drive) drive = std::make_unique<Drive>(*from);
       dest->plugin_data[instance] = reinterpret_cast<uintptr_t>(drive.release());

@@ -1,4 +1,4 @@
-// The engine plugin swgjoint.drive: one drive between a rotor and a link hinge.
+// Engine plugin swgjoint.drive: one drive between a rotor hinge and a link hinge.
 #ifndef SWGJOINT_PLUGIN_DRIVE_H_
 #define SWGJOINT_PLUGIN_DRIVE_H_
 
@@ -16,40 +16,44 @@ namespace swgjoint {
 
 class Drive {
  public:
-  // Reads the attributes of an instance; null after mju_warning on a bad one.
+  // Reads the attributes of an instance. If one is invalid, warns with mju_warning and
+  // returns null.
   static std::unique_ptr<Drive> Create(const mjModel* m, int instance);
 
-  // Adds the force and, for the discrete integrator, hands its linearisation over.
+  // Adds the torques of the drive and, for the integrator discrete, passes their
+  // linearisation to the engine.
   void Compute(const mjModel* m, mjData* d, int instance);
 
-  // After the step: keeps the acceleration that all other forces caused, and where
-  // the elements of the hysteresis and the bristle of the friction are relaxed. A
-  // state that is not finite becomes 0.
+  // After the step: stores the acceleration due to all other forces, and where the
+  // hysteresis elements and the friction bristle are relaxed. A state that is not finite
+  // becomes 0.
   void Advance(const mjModel* m, mjData* d, int instance);
 
   void Forget() { step_ = Step(); }
 
-  // Takes over what Advance needs of a step that the drive of another mjData began. That
-  // one may be of another model, so its map, addresses and parameters stay there.
+  // Copies the data that Advance needs for a step that the drive of another mjData has
+  // begun. That drive may belong to another model, so that its map, addresses and
+  // parameters are not copied.
   void Continue(const Drive& other) { step_ = other.step_; }
 
   static void RegisterPlugin();
 
  private:
-  // What Compute found and Advance needs, within one step.
+  // Results of Compute that Advance needs, within one step.
   struct Step {
     bool scheme = false, gradient = false;
     mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // velocity, 1/inertia
     mjtNum force = 0, metric = 0;                             // lam, p
-    mjtNum torsion = 0, rotation = 0;                         // begin of the step
+    mjtNum torsion = 0, rotation = 0;                         // at begin of step
     DriveValue value;
     FrictionStep friction;
   };
 
-  // Bounds within which the integration was tested, where the model states them; 0: any.
+  // Bounds within which the integration was tested, if the model states them; 0 means
+  // unbounded.
   struct Region {
     mjtNum step[3] = {0, 0, 0};  // discrete, RK4, other integrators
-    mjtNum phase = 0;            // of the highest order in a step
+    mjtNum phase = 0;            // phase change of the highest order in a step
     static Region Find(const mjModel* m);
   };
 
@@ -69,14 +73,14 @@ class Drive {
   DriveMap map_;
   mjtNum damping_ = 0, contact_damping_ = 0, numerical_damping_ = 0;
   int passes_ = 0;
-  int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, entries of ten_J
+  int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, indices in ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
-  // Jenkin elements: stiffness, torsion from rest to slip, torsion from rest now
+  // Jenkin elements: stiffness, yield torsion, current torsion from the relaxed state
   std::vector<mjtNum> stiffness_, reach_, stretch_;
-  std::vector<mjtNum> column_;  // of L^-T, room for Response
+  std::vector<mjtNum> column_;  // workspace of Response, a column of L^-T
   mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
-  int friction_tendon_ = -1;  // carries its part of the metric
+  int friction_tendon_ = -1;  // tendon of the friction term in the metric
   Region region_;
   Step step_;
 };

@@ -12,7 +12,7 @@
 namespace swgjoint {
 namespace {
 
-// Four harmonics go through the same products.
+// Vector of kLanes harmonics that undergo the same operations.
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(8 * DriveMap::kLanes)));
 #define SWGJOINT_INLINE inline __attribute__((always_inline))
@@ -47,7 +47,7 @@ SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
 SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
   std::memcpy(to, &x, sizeof(Lanes));
 }
-// The sums of the lanes of each of four.
+// Sums of the lanes of each of four vectors.
 SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
                           const Lanes& d, double out[4]) {
 #if defined(__GNUC__) && !defined(__clang__)
@@ -76,7 +76,7 @@ double Slope(const double w[5], double d) {
 double Curvature(const double w[5], double d) {
   return 2 * w[2] + d * (6 * w[3] + d * 12 * w[4]);
 }
-// (w(b) - w(a))/(b - a) without a difference: exact also where b == a.
+// (w(b) - w(a))/(b - a) without a difference, so that it is exact even if b == a.
 double Divided(const double w[5], double a, double b) {
   const double ab = a * a + a * b + b * b;
   return w[1] + w[2] * (a + b) + w[3] * ab + w[4] * (a + b) * (a * a + b * b);
@@ -128,7 +128,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   ratio_ = list[0];
   if (ratio_ == 0) return Fail(error, "ratio", "is 0");
 
-  // orders by (theta, psi), the mean (0, 0) first
+  // orders in (theta, psi), with the mean (0, 0) first
   if (!Numbers(text.orders, "orders", 0, &orders, error)) return false;
   if (orders.size() % 2) return Fail(error, "orders", "does not hold pairs");
   n_ = static_cast<int>(orders.size() / 2);
@@ -180,7 +180,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   n_theta_ = n_theta;
   n_psi_ = n_psi;
 
-  // one table for the intervals and, as parabolas about the end knots, beyond them
+  // one table for the intervals and the parabolas about the end knots beyond them
   segments_ = m + 2;
   base_.resize(segments_);
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
@@ -219,15 +219,16 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   return true;
 }
 
-// Sums and differences of earlier harmonics need no call of sin and cos: the first pair
-// by the later of the two, then by the earlier one.
+// Harmonics whose orders are the sum or difference of earlier ones need no call of sin
+// and cos. The first suitable pair is used, in the order of its later and then of its
+// earlier member.
 void DriveMap::FindRecipes() {
   const int count = n_ - 1;
   const auto key = [](double theta, double psi) {
-    // one number of two integers below 2e6
+    // one integer from two integers below 2e6
     return static_cast<int64_t>(theta) * (int64_t{1} << 22) + static_cast<int64_t>(psi);
   };
-  std::unordered_map<int64_t, int> first;  // harmonic of these orders
+  std::unordered_map<int64_t, int> first;  // harmonic by its orders
   const auto find = [&](double theta, double psi) {
     const auto at = first.find(key(theta, psi));
     return at == first.end() ? count : at->second;
@@ -252,7 +253,7 @@ int DriveMap::Segment(double torsion) const {
                           knots_.begin());
 }
 
-// The same with a guess: torsion seldom leaves its segment from step to step.
+// The same with a guess, because the torsion rarely leaves its segment within a step.
 int DriveMap::SegmentNear(int guess, double torsion) const {
   return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
 }
@@ -288,7 +289,7 @@ void DriveMap::Begin(double theta, double psi) {
   d0_ = torsion_ - base_[j0_];
 }
 
-// sin(eta)/eta and cos(eta) of half the phase step of every harmonic.
+// sin(eta)/eta and cos(eta) of half the phase change eta of every harmonic.
 void DriveMap::HalfStep(double dtheta, double dpsi) {
   for (int k = 0; k < n_ - 1; ++k) {
     const double x = 0.5 * (n_theta_[k] * dtheta + n_psi_[k] * dpsi);
@@ -297,11 +298,11 @@ void DriveMap::HalfStep(double dtheta, double dpsi) {
   }
 }
 
-// Adds the coefficients of a sum over the harmonics in one segment; `weight` points
-// to those of A and B in the first block.
+// Adds the polynomial coefficients of a weighted sum over the harmonics in one segment;
+// `weight` points to the weights of A and B in the first block.
 void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   Lanes sum[5] = {};
-  // by data(): a map without harmonics has no table
+  // data() is used because a map without harmonics has an empty table
   const double* row = table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock;
   for (int b = 0; b < blocks_; ++b, row += kBlock, weight += kWeights) {
     Lanes wc, ws, even, odd;
@@ -320,9 +321,10 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   out[4] += high[0];
 }
 
-// Weights of all A and B, their sums in the segment of the begin state, and g. One
-// sweep over the table; the processor decides how many lanes go at once, and the result
-// is the same to the last bit. kSmall: no phase moves by more than 0.5.
+// Computes the weights of all A and B, the weighted sums in the segment of the begin
+// state, and g, in one pass over the table. The processor determines how many lanes are
+// processed at once; the result does not depend on it in any bit. kSmall means that no
+// phase changes by more than 0.5 rad.
 template <bool kPsi, bool kSmall>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
   const double* __restrict row =
@@ -345,7 +347,7 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
     Lanes eta = n * (0.5 * dtheta);
     if (kPsi) eta += m * (0.5 * dpsi);
     if (kSmall) {
-      // |eta| <= 1/4, where these series end below 2^-53
+      // |eta| <= 1/4, where the truncation error of these series is below 2^-53
       const Lanes z = eta * eta;
       sinc = 1 + z * (-1. / 6 + z * (1. / 120 + z * (-1. / 5040 + z * (1. / 362880 +
              z * (-1. / 39916800)))));
@@ -423,7 +425,8 @@ __attribute__((target("avx2"))) void DriveMap::WeighAvx2(double dtheta, double d
 }
 #endif
 
-// Mean torque across knots: piece by piece, no difference of two large energies.
+// Mean torque across knots, summed piece by piece to avoid a difference of two large
+// energies.
 void DriveMap::Work(int j1, double x1, DriveValue* out) const {
   double w[5], work = 0, torque_end = 0;
   const int step = j1 > j0_ ? 1 : -1;
@@ -450,10 +453,10 @@ void DriveMap::Work(int j1, double x1, DriveValue* out) const {
 }
 
 void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
-  // With phi the phase half way and eta half its step,
-  //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), likewise for sin,
-  // so every harmonic has its secant by theta and psi in closed form, and the mean
-  // of its two end values is cos(eta) times the value half way.
+  // With phi the phase at the midpoint and eta half of its change,
+  //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), likewise for sin.
+  // Every harmonic therefore has its secants by theta and psi in closed form, and the
+  // mean of its two end values is cos(eta) times the value at the midpoint.
 #ifdef SWGJOINT_AVX2
   avx2_ ? WeighAvx2(dtheta, dpsi, out) : Weigh(dtheta, dpsi, out);
 #else
@@ -463,7 +466,7 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   const int j1 = SegmentNear(j0_, x1);
   const double d1 = x1 - base_[j1];
 
-  // torque: mean of dV/d(torsion) along the step, harmonics held at their mean
+  // torque: mean of dV/d(torsion) along the step, with harmonics at their mean
   if (j0_ == j1) {
     out->torque = Divided(w_, d0_, d1);
     out->slope = DividedSlope(w_, d0_, d1);
@@ -475,7 +478,7 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   const auto bound = std::minmax(out->stiffness_begin, out->stiffness_end);
   out->slope = std::clamp(out->slope, 0.5 * bound.first, 0.5 * bound.second);
 
-  // explicit derivative by the angles: mean of its values at the two torsions
+  // explicit derivative by the angles: mean of the values at the two torsions
   const auto angle = [&](const double u[5], int weights) {
     double end[5] = {0, 0, 0, 0, 0};
     if (j1 != j0_) Combine(j1, weight_.data() + weights * kLanes, end);

@@ -37,7 +37,7 @@ double Friction::Reach(double speed, double torque) const {
 }
 
 double Friction::Torque(double x, double reach, double speed) const {
-  // at its reach it slips onward, also where round-off leaves it just inside
+  // at its reach the bristle keeps slipping, even if round-off leaves it just inside
   const bool slips = std::fabs(x) >= (1 - kRoundOff) * reach && x * speed > 0;
   const double creep = slips ? 0 : damping_ * speed;
   return stiffness_ * std::clamp(x, -reach, reach) + creep + viscous_ * speed;
@@ -47,14 +47,14 @@ double Friction::Solve(double h, double speed, double free, double response,
                        FrictionStep* step) const {
   const double z = step->stretch, reach = step->reach;
   const double half = 0.5 * stiffness_;
-  // dx without friction, and what a torque takes off it
+  // dx without friction, and its reduction per unit of friction torque
   const double d = h * (speed + 0.5 * free), k = 0.5 * h * response;
   const double m = 1 + 0.5 * response * viscous_;
-  // it sticks: torque stiffness (z + dx/2) + damping dx/h
+  // sticking: the torque is stiffness (z + dx/2) + damping dx/h
   double offset = stiffness_ * z, rate = half + damping_ / h;
   double dx = (d - k * offset) / (m + k * rate);
   if (std::fabs(z + dx) > reach) {
-    // sticks over the way a, then slips: the mean torque times dx is exact work
+    // sticking over the distance a, then slipping: the mean torque gives the exact work
     const double sign = dx > 0 ? 1 : -1, limit = stiffness_ * reach;
     const double a = reach - sign * z;
     const double creep = damping_ * a / h;
@@ -63,7 +63,7 @@ double Friction::Solve(double h, double speed, double free, double response,
     const double way = b > 0 ? 0.5 * (b + root) / m : k * stiffness_ * a * a / (root - b);
     const double mean = sign * (limit - half * a * a / way + creep);
     dx = sign * way;
-    // linear in the true dx, and never able to give back more than is stored
+    // linear in the actual dx; the bristle must not return more energy than it stores
     rate = half;
     offset = mean - rate * dx;
     if (std::fabs(offset) > stiffness_ * std::fabs(z)) {
