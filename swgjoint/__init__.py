@@ -5,7 +5,7 @@ import typing as _typing
 
 __version__ = "0.1.0"
 
-# name -> module; imported on first use, so that importing the package stays cheap
+# name -> module; modules are imported on first use to keep the package import fast
 _PUBLIC = {
     "ComputationError": "swgjoint.errors",
     "Design": "swgjoint.gear.design.design",
@@ -30,7 +30,7 @@ _PUBLIC = {
 __all__ = ["__version__", *sorted(_PUBLIC)]
 
 if _typing.TYPE_CHECKING:
-    # for type checkers of users, who do not run __getattr__
+    # for type checkers, which do not evaluate __getattr__
     from swgjoint.drives.attach import attach as attach
     from swgjoint.drives.build_map import build_map as build_map
     from swgjoint.drives.references import load_drive as load_drive
@@ -65,7 +65,7 @@ def __dir__() -> list[str]:
 
 
 if _sys.modules.get("mujoco") is not None:
-    # MuJoCo was imported first: models that were saved with drives load from here on
+    # if MuJoCo was imported first, register now, so that saved models with drives load
     from swgjoint.engine import register as _register
 
     _register()

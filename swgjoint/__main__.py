@@ -1,4 +1,4 @@
-"""``python -m swgjoint``."""
+"""Entry point of ``python -m swgjoint``."""
 
 import sys
 

@@ -39,6 +39,6 @@ def frozen_array(
     ):
         raise ValueError(f"{what} has shape {array.shape}, needs {shape}")
     if not np.isfinite(array).all():
-        raise ValueError(f"{what} holds a value that is not finite")
+        raise ValueError(f"{what} contains a value that is not finite")
     array.setflags(write=False)
     return array

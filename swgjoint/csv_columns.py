@@ -36,9 +36,11 @@ class Sheet:
     """Header and cells of a file, as text."""
 
     header: list[str]
+    """Column names."""
     rows: list[tuple[int, list[str]]]
     """Line number in the file and cells of each row."""
     separator: str
+    """Separator of the cells, a key of :data:`SEPARATORS`."""
 
 
 def read_columns(
@@ -81,7 +83,7 @@ def read_columns(
                 value = float(row[index])
             except ValueError:
                 value = float("nan")
-            if not abs(value * factor) <= LARGEST:  # NaN, too
+            if not abs(value * factor) <= LARGEST:  # rejects NaN as well
                 cell = row[index].strip()
                 comma = _DECIMAL_COMMA.fullmatch(cell)
                 raise InputError(
@@ -185,7 +187,9 @@ def _column(
     if len(indices) == 1:
         return indices[0], units[header[indices[0]]]
     if indices:
-        raise InputError(f"{path}: {name} stands in {len(indices)} columns; needed one")
+        raise InputError(
+            f"{path}: {name} occurs in {len(indices)} columns; accepted: one"
+        )
     near = [m for key in units for m in get_close_matches(key, header, n=1)]
     hint = f" (has {near[0][:40]!r})" if near else ""
     read = ", ".join(repr(cell[:24]) for cell in header[:6])

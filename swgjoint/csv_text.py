@@ -9,15 +9,15 @@ from typing import Any
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    r"""Rows as CSV with a header line and the columns of all rows.
+    r"""Format rows as CSV with a header line and the columns of all rows.
 
-    A cell without a value is empty; counts by name are one text.
+    A cell without a value is empty. A mapping of counts by name fills one cell.
 
     Args:
-        rows: Values by column; a row may lack columns of others.
+        rows: Values by column; a row may lack columns that other rows have.
 
     Returns:
-        The text, empty without rows.
+        The text; empty if there are no rows.
 
     >>> csv_text([{"a": 1, "b": None}, {"a": 2, "c": {"bore": 3, "flank": 4}}])
     'a,b,c\n1,,\n2,,bore:3 flank:4\n'

@@ -17,9 +17,9 @@ from pydantic_core import ErrorDetails
 from swgjoint.errors import InputError
 
 CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-"""Characters that move a terminal's cursor or end a text; tab and newline do not."""
+"""Control characters that can disturb a terminal; tab and newline are not included."""
 
-# the last part of a key that is a unit, as written in messages
+# units by the last part of a key, as written in messages
 _UNITS = {
     "per_mm": "1/mm",
     "kg_m3": "kg/m³",
@@ -81,7 +81,7 @@ class Section(BaseModel):
 
 
 class Fault(ValueError):
-    """Faults that concern several keys: pairs (path below the table, message)."""
+    """Faults that concern several keys, as pairs (path below the table, message)."""
 
     def __init__(self, *lines: tuple[str, str]) -> None:
         super().__init__("; ".join(f"{path}: {text}" for path, text in lines))
@@ -188,8 +188,8 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
         example = _example(info, key, path, kind)
         limits = _limits(info, key) if info is not None else ""
         bounds = f"{', each' if example else ''} {limits}" if limits else ""
-        told = f"accepted: {_TYPES[kind]}{example}{bounds}"
-        return [f"{path} = {_shown(value, '')}: {told}"]
+        text = f"accepted: {_TYPES[kind]}{example}{bounds}"
+        return [f"{path} = {_shown(value, '')}: {text}"]
     return [f"{path} = {_shown(value, key)}: {detail['msg']}"]
 
 
@@ -204,7 +204,7 @@ def _walk(
     path, owner, info = "", model, None
     here: type[BaseModel] | None = model
     options: dict[str, type[BaseModel]] = {}
-    named = False  # the next part is a name that the file chose, not a field
+    named = False  # whether the next part is a name from the file and not a field
     for part in loc:
         if options and part in options:
             here, options = options[str(part)], {}
@@ -219,7 +219,7 @@ def _walk(
             continue
         owner, info = here, here.model_fields.get(part)
         models = models_in(info.annotation) if info is not None else []
-        # by kind, of the field itself or of the items of a list
+        # discriminated by kind, in the field itself or in the items of a list
         union = len(models) > 1 and all("kind" in m.model_fields for m in models)
         options = {_tag(m): m for m in models} if union else {}
         here = models[0] if len(models) == 1 and not union else None
@@ -260,7 +260,7 @@ def _limits(info: Any, key: str) -> str:
 
 
 def _example(info: Any, key: str, path: str, kind: str) -> str:
-    """Example of a list or a table, e.g. ``, e.g. [0, 0, 60]``; else empty."""
+    """Example of a list or a table, e.g. ``, e.g. [0, 0, 60]``, or an empty string."""
     annotation = getattr(info, "annotation", None)
     if annotation is None:
         return ""

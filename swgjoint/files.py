@@ -46,7 +46,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 def _clear(folder: Path, left: re.Pattern[str]) -> None:
     """Remove temporary files of processes of this host that have ended."""
-    with suppress(OSError):  # no such folder, or another process removes them too
+    with suppress(OSError):  # no such folder, or another process removes them as well
         for name in os.listdir(folder):
             found = left.fullmatch(name)
             if found is not None and _is_gone(int(found[1])):
@@ -54,7 +54,7 @@ def _clear(folder: Path, left: re.Pattern[str]) -> None:
 
 
 def _is_gone(process: int) -> bool:
-    if os.name != "posix":  # signal 0 asks there only
+    if os.name != "posix":  # only POSIX systems test a process with signal 0
         return False
     try:
         os.kill(process, 0)
@@ -175,7 +175,7 @@ def read_regular(path: Path) -> bytes:
         OSError: If the file cannot be read or is not a regular file.
     """
     if not stat.S_ISREG(path.stat().st_mode):
-        raise OSError(f"{path} is no regular file")
+        raise OSError(f"{path} is not a regular file")
     return path.read_bytes()
 
 
@@ -224,14 +224,14 @@ def output_folder(path: str | Path) -> Path:
 
 
 def _check_length(path: Path) -> None:
-    """Refuse a path that no file system accepts, or that has too many links."""
+    """Reject a path that the file system does not accept or that is too deep."""
     try:
         path.exists()
     except OSError as exc:
         raise InputError(f"output {str(path)[:60]!r}: {exc.strerror}") from None
     if len(path.parts) > DEEPEST:
         raise InputError(
-            f"output {str(path)[:60]!r}: {len(path.parts)} folders inside each other;"
+            f"output {str(path)[:60]!r}: {len(path.parts)} nested folders;"
             f" accepted: up to {DEEPEST}"
         )
 

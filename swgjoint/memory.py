@@ -43,6 +43,6 @@ def require_memory(what: str, required: float, *, less: str) -> None:
     free = available_memory()
     if free is not None and required > free:
         raise ComputationError(
-            f"{what} needs about {required / 1e9:.1f} GB, of which {free / 1e9:.1f} GB"
-            f" are free; try {less}"
+            f"{what} needs about {required / 1e9:.1f} GB; {free / 1e9:.1f} GB are free;"
+            f" try {less}"
         )

@@ -16,17 +16,17 @@ KINDS = {
     "sweeps": (".toml", "a sweep"),
     "optimisations": (".toml", "an optimisation"),
 }
-"""Folders below ``models/`` whose files a command accepts by name: the suffix, and the
-name of one such file in messages."""
+"""Folders below ``models/`` whose files a command accepts by name, with their suffix
+and the noun for one such file in messages."""
 MAX_NAME, MAX_PATH = 255, 4096
-"""Largest length of a file name and of a path on Linux [B]; other systems accept no
-more."""
+"""Largest length of a file name and of a path on Linux [B]; the limits of other systems
+are not larger."""
 ECHOED = 120
 """Longest reference that a message quotes in full [characters]."""
 SHOWN = 12
 """Largest number of bundled names in a message."""
 TOGETHER = {"scenes": ("arms",)}
-"""Other kinds that are accepted in place of a kind."""
+"""Other kinds whose names are accepted instead of a kind."""
 
 
 def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:

@@ -26,12 +26,12 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
 
     for text in figure.findobj(Text):
         text.set_text(plain_text(text.get_text()))
-    # matplotlib sets tick labels when it draws them; those of a logarithmic axis are
-    # its own mathematics and must be parsed
-    given = (FixedFormatter, FuncFormatter)
+    # matplotlib sets tick labels when it draws them; on a logarithmic axis they are
+    # mathematical text that must be parsed
+    literal = (FixedFormatter, FuncFormatter)
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
-            if isinstance(axis.get_major_formatter(), given):
+            if isinstance(axis.get_major_formatter(), literal):
                 for tick in axis.get_major_ticks(len(axis.get_majorticklocs())):
                     tick.label1.set_parse_math(False)
                     tick.label2.set_parse_math(False)
@@ -39,7 +39,7 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
 
 
 def png(figure: Any, *, dpi: float) -> bytes:
-    """A matplotlib figure as the bytes of a PNG file.
+    """Encode a matplotlib figure as a PNG file.
 
     Args:
         figure: The figure.

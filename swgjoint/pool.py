@@ -16,6 +16,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.progress import Progress, silent
 
 CACHE = "SWGJOINT_CACHE"
+"""Environment variable that names the cache folder."""
 WATCH_S = 1.0
 """Interval at which a worker checks that its parent is alive [s]."""
 
@@ -25,13 +26,14 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Lost:
-    """A task whose process died at every attempt."""
+    """Result of a task whose process died at every attempt."""
 
     reason: str
+    """Explanation for messages."""
 
 
 class Executor(Protocol):
-    """Something that computes tasks in parallel."""
+    """Computes tasks in parallel."""
 
     @property
     def workers(self) -> int:
@@ -58,14 +60,20 @@ class LocalPool:
     """
 
     workers: int
+    """Number of processes that compute at the same time."""
 
     def run(
         self, function: Callable[[Task], Found], tasks: Iterable[Task]
     ) -> Iterator[tuple[Task, Found | Lost]]:
-        """See :class:`Executor`."""
+        """Yield every task with its result, in the order of completion.
+
+        Args:
+            function: Picklable function of one task; its exceptions end the run.
+            tasks: Tasks, drawn one by one when a process is about to need the next.
+        """
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        waiting: dict[int, Task] = {}  # drawn, result pending, in the order of drawing
+        waiting: dict[int, Task] = {}  # drawn tasks without result, in drawing order
         left: Iterator[tuple[int, Task]] = enumerate(tasks)
 
         def drawn() -> Iterator[tuple[int, Task]]:
@@ -81,12 +89,12 @@ class LocalPool:
                 return
             except BrokenProcessPool:
                 pass
-            except GeneratorExit:  # the caller stops; joblib would warn about lost work
+            except GeneratorExit:  # the caller stops; silence joblib's warning about it
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
                     results.close()
                 raise
-            # tasks start in the order of drawing: the first ones waiting were running
+            # tasks start in drawing order, so the first waiting ones were running
             suspects = list(waiting.items())[: self.workers]
             left = chain(list(waiting.items())[self.workers :], left)
             waiting.clear()
@@ -97,8 +105,8 @@ class LocalPool:
                     yield (
                         task,
                         Lost(
-                            "its process died twice, with no other beside it the second"
-                            " time: out of memory, or killed"
+                            "its process died twice, the second time while running"
+                            " alone: out of memory, or killed"
                         ),
                     )
                 else:

@@ -11,11 +11,18 @@ Progress = Callable[[str, int, int], None]
 
 
 def silent(stage: str, done: int, total: int) -> None:
-    """Show nothing."""
+    """Show nothing.
+
+    Args:
+        stage: Name of the stage.
+        done: Number of completed items.
+        total: Number of items.
+    """
 
 
 LONGEST = 100
-"""Longest stage shown [characters]; a stage may contain a name from a file."""
+"""Longest stage that is shown in full [characters]; it may contain a name from a
+file."""
 
 
 class StderrProgress:

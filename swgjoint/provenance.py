@@ -13,13 +13,14 @@ from typing import Any
 from swgjoint import __version__
 
 PACKAGES = ("mujoco", "numpy", "scipy", "scikit-fem")
+"""Packages whose versions are recorded."""
 
 
 def provenance(*, seed: int | None = None) -> dict[str, Any]:
-    """Commit, package versions, machine and date of a result.
+    """Collect commit, package versions, machine and date of a result.
 
     Args:
-        seed: Seed of the random numbers; None if there were none.
+        seed: Seed of the random numbers; None if there are no random numbers.
 
     Returns:
         A table for JSON. Its ``commit`` is None outside a checkout and ends with ``+``

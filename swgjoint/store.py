@@ -38,7 +38,7 @@ _TAIL = len(_COMMENT) + 64
 
 
 class DamagedError(InputError):
-    """A cache file whose content is not what was written."""
+    """A cache file whose content differs from what was written."""
 
 
 def cache_folder() -> Path | None:
@@ -131,7 +131,7 @@ def _check(body: bytes, stated: re.Match[bytes] | None) -> None:
     if stated is None:
         raise DamagedError("no checksum: damaged, or written by an older version")
     if stated[1] != _hash(body):
-        raise DamagedError("damaged: its checksum is that of another content")
+        raise DamagedError("damaged: the checksum does not match the content")
 
 
 def read_kept(path: Path, take: Callable[[bytes], T]) -> T | None:
@@ -157,7 +157,7 @@ def warn_ignored(where: Path | str, why: Exception) -> None:
         where: The cache file or the name of the result.
         why: The reason.
     """
-    _log.warning("%s ignored and computed again: %s", where, one_line(why))
+    _log.warning("%s is ignored and computed again: %s", where, one_line(why))
 
 
 def one_line(error: Exception) -> str:
@@ -177,4 +177,4 @@ def keep(path: Path, data: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
     except (OSError, InputError) as error:
-        _log.warning("not kept: %s", one_line(error))
+        _log.warning("cache file not kept: %s", one_line(error))

@@ -27,7 +27,7 @@ _INTEGERS = range(-(2**63), 2**63)
 """Range of integers in TOML 1.0.0, section "Integer"."""
 
 
-# a dotted key of more than MAX_DEPTH parts, whose parsing takes quadratic time
+# a dotted key of more than MAX_DEPTH parts; parsing it takes quadratic time
 _LONG_KEY = re.compile(
     r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++)"
     rf"{{{MAX_DEPTH}}}"
@@ -128,7 +128,7 @@ def parse_toml(
         data = tomllib.loads(text)
     except RecursionError:
         raise error(f"{where}: {_too_deep()}") from None
-    except ValueError as exc:  # also of Python, for an integer of thousands of digits
+    except ValueError as exc:  # Python also raises it for integers of many digits
         raise error(f"{where}: not valid TOML: {exc}") from None
     fault = _first_fault(data)
     if fault is not None:
@@ -166,7 +166,7 @@ def parse_value(text: str, *, where: str) -> Any:
 
 
 def _too_deep() -> str:
-    return f"TOML tables or lists nested too deep; accepted: {MAX_DEPTH} levels"
+    return f"TOML tables or lists nested too deeply; accepted: {MAX_DEPTH} levels"
 
 
 def _first_fault(data: dict[str, Any]) -> str | None:

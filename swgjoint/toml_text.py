@@ -51,4 +51,4 @@ def _value(value: Any) -> str:
         return f"{{{', '.join(_pairs(value))}}}"
     if isinstance(value, Sequence):
         return f"[{', '.join(_value(item) for item in value)}]"
-    raise TypeError(f"{type(value).__name__} has no TOML form here")
+    raise TypeError(f"{type(value).__name__} cannot be written as TOML")

@@ -33,6 +33,7 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 ACTIONS = ("torque", "setpoint")
+"""Accepted kinds of actions."""
 
 
 ANGLE_MARGIN = 0.3
@@ -45,7 +46,10 @@ SPEED_MARGIN = 20.0
 
 @dataclass(frozen=True, kw_only=True)
 class ArmSettings:
-    """Arguments of ``ArmTracking-v0``."""
+    """Arguments of ``ArmTracking-v0``.
+
+    :class:`~swgjoint.envs.arm_tracking.ArmTrackingEnv` describes them.
+    """
 
     scene: str | Path = "ur5e-circle"
     level: str = "full"

@@ -31,7 +31,9 @@ from swgjoint.sim.figures.transmission import transmission_of
 from swgjoint.typing import Array
 
 LEVELS = ("full", "linear")
+"""Levels of the drive that environments accept."""
 MAX_SUB_STEPS = 16
+"""Largest number of simulation steps per control period."""
 MAX_PERIOD = 0.05
 """Largest control period; longer periods do not resolve the references [s]."""
 JOINT, BODY = "joint", "load"
@@ -41,7 +43,10 @@ REACH = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class BenchSettings:
-    """Arguments common to all environments on the bench."""
+    """Arguments common to all environments on the bench.
+
+    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv` describes them.
+    """
 
     drive: str | DriveMap = "CSG-25-100"
     level: str = "full"
@@ -280,7 +285,7 @@ class BenchCore(Core):
 def _bench(
     settings: BenchSettings, drive: DriveMap, *, variable: bool, top_speed: float
 ) -> tuple[mujoco.MjSpec, JointDrive]:
-    """The bench with its load and its drive, without a motor."""
+    """Model of the bench with load and drive, without a motor."""
     s, spec = settings, RigidArm("bench").spec()
     spec.option.timestep = s.period_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE

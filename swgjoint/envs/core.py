@@ -42,7 +42,7 @@ LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One quantity of an observation or an action."""
+    """One quantity of an observation or an action, with its unit and bounds."""
 
     meaning: str
     unit: str
@@ -114,7 +114,7 @@ class EpisodeLimits:
     ratcheting: Array
     """Ratcheting torque of the drives, inf if unknown [N·m]."""
     motor_torque: Array
-    """Largest motor torque, at which motors saturate without ending it [N·m]."""
+    """Largest motor torque; motors saturate there and the episode continues [N·m]."""
 
 
 class Core(ABC):
@@ -353,7 +353,7 @@ class Core(ABC):
     def info(self) -> dict[str, NDArray[Any]]:
         """True values without sensor errors, per joint if there are several joints."""
         error = self.link_angle - self.motor_angle / self.plant.ratio
-        got: dict[str, NDArray[Any]] = {
+        values: dict[str, NDArray[Any]] = {
             "link_error_arcmin": self.link_error / arcmin,
             "transmission_error_arcmin": error / arcmin,
             "output_torque_Nm": self.output_torque,
@@ -363,8 +363,8 @@ class Core(ABC):
             "motor_angle_rad": self.motor_angle,
         }
         if len(self.joints.names) == 1:
-            got = {key: value[:, 0] for key, value in got.items()}
-        return got | {"time_s": self.instant * self.period}
+            values = {key: value[:, 0] for key, value in values.items()}
+        return values | {"time_s": self.instant * self.period}
 
     # -- for controllers ------------------------------------------------------
 
@@ -395,10 +395,10 @@ class Core(ABC):
         def part(first: int | None) -> Array | None:
             return None if first is None else observation[..., first : first + n]
 
-        got = Measured(
+        motor = Measured(
             motor_angle=observation[..., :n], motor_speed=observation[..., n : 2 * n]
         )
-        return replace(got, link_angle=part(link), output_torque=part(torque))
+        return replace(motor, link_angle=part(link), output_torque=part(torque))
 
 
 def _without(values: Array, rows: Rows) -> Array:

@@ -26,7 +26,7 @@ point-to-point moves in episodes shorter than 0.7 s would exceed this accelerati
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingSettings(BenchSettings):
-    """Arguments of ``JointTracking-v0``."""
+    """Arguments of ``JointTracking-v0``, see :class:`JointTrackingEnv`."""
 
     reference: str | tuple[str, ...] = tuple(KINDS)
     """One or several names of :data:`~swgjoint.envs.references.KINDS`."""

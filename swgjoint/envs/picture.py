@@ -25,7 +25,7 @@ class Picture:
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Open a context.
+        """Open an OpenGL context.
 
         Raises:
             ComputationError: If no OpenGL context is available.
@@ -41,7 +41,7 @@ class Picture:
         mujoco.mjr_setBuffer(off_screen, self._drawing)
 
     def draw(self, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """One picture of a state. Shape (height, width, 3)."""
+        """Draw one picture of a state. Shape (height, width, 3)."""
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_camlight(self._model, data)
@@ -63,14 +63,14 @@ class Picture:
         return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Release the context."""
+        """Release the OpenGL context."""
         self._context.make_current()
         self._drawing.free()
         self._context.free()
 
 
 def _context(height: int, width: int) -> Any:
-    """A current context of OpenGL."""
+    """Current OpenGL context for off-screen rendering."""
     usual = {"linux": "egl", "darwin": "cgl"}.get(sys.platform, "glfw")
     kind = os.environ.get("MUJOCO_GL", "").lower().strip() or usual
     try:
@@ -79,7 +79,7 @@ def _context(height: int, width: int) -> Any:
     except Exception as error:
         line = " ".join(str(error).split())
         raise ComputationError(
-            f"render_mode 'rgb_array': no OpenGL off screen with MUJOCO_GL={kind}"
+            f"render_mode 'rgb_array': no off-screen OpenGL with MUJOCO_GL={kind}"
             f" ({line[:120]}); install EGL (libegl1 and a driver, or libgl1-mesa-dri)"
             " or OSMesa (libosmesa6, MUJOCO_GL=osmesa)"
         ) from error

@@ -30,7 +30,7 @@ MEMORY = 0.15
 
 @dataclass(frozen=True, kw_only=True)
 class RippleSettings(BenchSettings):
-    """Arguments of ``RippleSuppression-v0``."""
+    """Arguments of ``RippleSuppression-v0``, see :class:`RippleSuppressionEnv`."""
 
     max_angle_rad: float = 3.0
     episode_s: float = 4.0
