@@ -1,8 +1,7 @@
 """Base of all environments: n parallel episodes of driven joints.
 
-All numbers are computed here, on arrays whose first axis is the episodes, so that a
-single environment (n = 1) and a batch are bit-identical. :mod:`swgjoint.envs.api`
-provides the two gymnasium interfaces.
+All numbers are computed here, with episodes as first axis, so that one environment and
+a batch are bit-identical. :mod:`swgjoint.envs.api` has the gymnasium interfaces.
 """
 
 from __future__ import annotations
@@ -30,9 +29,8 @@ from swgjoint.units import arcmin
 Rows = NDArray[np.intp]
 
 TRACKED = 50.0 * arcmin
-"""Link error at the bound of the observed tracking error [rad], twenty times the error
-of a rigid plan. With a much larger bound, agents that scale by it would not resolve the
-relevant errors. Larger errors are clipped; reference and reading are not."""
+"""Largest observed link error [rad], twenty times the error of a rigid plan. A much
+larger bound hides relevant errors from agents. Larger errors are clipped."""
 REGAINED = 0.1
 """Time in which the largest observed speed error builds up that link error [s]."""
 
@@ -177,8 +175,6 @@ class Core(ABC):
         """Output torque of the drives [N·m]."""
         self._low, self._high = bounds(self.observation_entries)
 
-    # -- what an environment adds ---------------------------------------------
-
     @abstractmethod
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
         """Entries of observation and action."""
@@ -222,8 +218,6 @@ class Core(ABC):
             index: Index of the simulation.
             shares: Relative changes of the inertia [-]. Shape (n_joints,).
         """
-
-    # -- episodes -------------------------------------------------------------
 
     def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
         """Begin episodes of some simulations.
@@ -365,8 +359,6 @@ class Core(ABC):
         if len(self.joints.names) == 1:
             values = {key: value[:, 0] for key, value in values.items()}
         return values | {"time_s": self.instant * self.period}
-
-    # -- for controllers ------------------------------------------------------
 
     @property
     def task(self) -> Task:
