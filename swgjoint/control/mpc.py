@@ -34,7 +34,7 @@ The plan contains the coupling of the joints of an arm. The controller treats th
 remaining coupling as a disturbance of each joint. A drive then acts on less than the
 inertia about its joint, because the other joints yield. With the defaults the shoulder
 and elbow of a UR5e diverge; with :func:`free_inertia`, a frequency of 10 Hz and a drift
-of 0.2 they are stable.
+of 0.2 they do not.
 
 Source:
     Rawlings, Mayne, Diehl (2017), "Model predictive control", 2nd ed., ch. 1 and 2

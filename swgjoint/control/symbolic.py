@@ -17,7 +17,7 @@ after a step. Both functions have kinks where an element begins to slip.
 
 :func:`smooth_forces` has neither kinks nor states. Its friction depends smoothly on the
 speed; it omits the presliding of the bristle and the hysteresis, whose torque is at
-most the sum of the yield torques. No function includes ratcheting.
+most the sum of the yield torques. None of these functions includes ratcheting.
 
 Source:
     Andersson et al. (2019), "CasADi: a software framework for nonlinear optimization

@@ -267,8 +267,8 @@ class RippleSuppressionEnv(SingleEnv):
 
     Args (all by keyword, with their defaults): those of ``JointTracking-v0`` for bench,
     drive, sensors and ``randomise``, and
-        max_angle_rad: Limit of the link angle, at least the distance that the fastest
-            motion travels [rad]; 3.
+        max_angle_rad: Largest link angle of references [rad], at least
+            ``max_speed_rad_s`` times ``episode_s``; 3.
         episode_s: Duration of an episode [s]; 4.
         slowest: Smallest speed relative to ``max_speed_rad_s`` [-]; 0.3.
         authority_of_rated: Largest added motor torque, see above [-]; 0.2.
