@@ -179,13 +179,15 @@ class _Body:
     """Frame of a body and its motion, in world coordinates."""
 
     place: Any
+    """Origin of the frame [m]."""
     turn: Any
+    """Rotation matrix from the frame to the world [-]."""
     rate: Any
-    """Angular velocity."""
+    """Angular velocity [rad/s]."""
     spin: Any
-    """Angular acceleration."""
+    """Angular acceleration [rad/s²]."""
     push: Any
-    """Acceleration of the origin of the frame."""
+    """Acceleration of the origin of the frame [m/s²]."""
 
     @classmethod
     def world(cls, ca: Any) -> _Body:
