@@ -1,4 +1,4 @@
-"""``swgjoint advise``: level, integrator and step for a wanted error."""
+"""``swgjoint advise``: cheapest level, integrator and step within an error bound."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from swgjoint.cli.shared.text import table
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Scene, error, changes."""
+    """Add the arguments: scene, error bound, changes of the scene."""
     parser.add_argument(
-        "scene", metavar="SCENE", help="scene or arm, a file or a bundled name"
+        "scene", metavar="SCENE", help="scene or arm: a file or a bundled name"
     )
     parser.add_argument(
         "--error",
         required=True,
         metavar="VALUE",
-        help="largest accepted rms error of the link angle of the worst joint"
-        " (0.1arcmin, 5arcsec, 2e-5rad) or of the tool position (0.05mm)",
+        help="largest accepted rms error, with unit: of the link angle of the worst"
+        " joint (0.1arcmin, 5arcsec, 2e-5rad) or of the tool position (0.05mm)",
     )
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change a value of the scene; may be repeated",
+        help="change a key of the scene; repeatable",
     )
     add_arm_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Find the setting.
+    """Find the cheapest setting.
 
     Returns:
         See :func:`swgjoint.explore.advise.advise.advise`.
@@ -46,9 +46,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """The advice, then what was tried."""
+    """Format the recommended setting, then all settings that were tried."""
     parts = result["sub_steps"]
-    cut = "" if parts == 1 else f" in {parts} sub-steps"
+    cut = "" if parts == 1 else f" divided into {parts} sub-steps"
     error = f"{result['expected_error']:.3g} {result['unit']}"
     reference = result["reference"]
     rows = [
@@ -63,17 +63,27 @@ def report(result: dict[str, Any]) -> str:
         )
         for row in result["rows"]
     ]
-    header = ("level", "integrator", "step ms", "outcome", "cost", "arcmin", "tool mm")
+    header = (
+        "level",
+        "integrator",
+        "step [ms]",
+        "outcome",
+        "cost",
+        "link [arcmin]",
+        "tool [mm]",
+    )
     return "\n".join(
         [
             f"{result['scene']} within {result['bound']}: level {result['level']},"
             f" {result['integrator']} at {1e3 * result['step_s']:g} ms{cut}",
-            f"error {error} rms, cost {result['cost']:.3g} times the rigid arm at 1 ms",
+            f"error {error} rms, cost {result['cost']:.3g} times that of the rigid arm"
+            " at 1 ms",
             "",
             table(rows, header=header),
             "",
-            f"against level full, step {1e3 * reference['step_s']:g} ms and less,"
-            f" settled to {reference['error']:.2g} {result['unit']}",
+            "errors: rms difference from the reference, level full with steps of"
+            f" {1e3 * reference['step_s']:g} ms and less extrapolated to zero, converged"
+            f" to {reference['error']:.2g} {result['unit']}",
             f"{result['wall_s']:.0f} s",
         ]
     )

@@ -12,47 +12,50 @@ from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
 PARTS = {
-    "fe": "finite elements, 2D and 3D, coarse to fine",
-    "joint": "levels, integrators and steps of the joint",
-    "scaling": "time over joints, batches, harmonics, teeth, nodes, torque, positions",
+    "fe": "2D and 3D finite-element models with coarse to fine meshes",
+    "joint": "model levels, integrators and time steps of the joint",
+    "scaling": "run time against number of joints, batch size, harmonics, teeth, nodes,"
+    " torque and positions",
 }
-"""In the order in which ``all`` runs them."""
+"""Parts of the benchmark, in the order in which ``all`` runs them."""
 DESIGN = "reference-3d-modified"
+"""Default design of part ``fe``."""
 OPTIONS = {"design": "fe", "recompute": "fe", "only": "joint"}
-"""With the part that they are of."""
+"""Part to which each option belongs."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Part, its options, output folder."""
+    """Add the arguments: part, options of the parts, output folder."""
     listing = "; ".join(f"{name}: {text}" for name, text in PARTS.items())
     parser.add_argument(
         "part",
         nargs="?",
         choices=(*PARTS, "all"),
         default="fe",
-        help=f"{listing}; all: one after the other; default %(default)s",
+        help=f"{listing}; all: all parts in turn; default %(default)s",
     )
     parser.add_argument(
         "--design",
         metavar="DESIGN",
-        help=f"fe: a design with a cup; default {DESIGN}; other designs skip the slow"
-        " settings",
+        help=f"fe: design with a cup; default {DESIGN}; for other designs the slow"
+        " settings are skipped",
     )
     parser.add_argument(
         "--recompute",
         action="store_true",
-        help="fe: also solve the finest references (an hour) instead of reading the"
-        " stored ones, and write a new file of references to --out",
+        help="fe: also solve the slowest settings, such as the reference (about an"
+        " hour), instead of reading their stored results, and write a new file of"
+        " stored results to --out",
     )
     parser.add_argument(
         "--only",
         metavar="SCENE,...",
-        help="joint: run only these scenes (ur5e, iiwa14, bench); default all",
+        help="joint: run only these scenes (ur5e, iiwa14, bench); default: all",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write tables and pictures there; all: a folder for each part",
+        help="write tables and plots to this folder; all: one subfolder per part",
     )
 
 
@@ -60,43 +63,44 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the benchmark.
 
     Returns:
-        Of one part: what its function returns (``run_fe_cost``, ``run_joint_cost``).
-        Of ``all``: ``rows`` of all parts, ``parts`` with the rest of each, ``files``,
-        ``wall_s``.
+        For one part, the result of its function (``run_fe_cost``, ``run_joint_cost``,
+        ``run_scaling``). For ``all``: ``rows`` of all parts, ``parts`` with the result
+        of each part, ``files``, ``wall_s``.
 
     Raises:
-        InputError: Before any part runs, if an option is not of this part, lacks
-            ``--out``, or names no scene.
+        InputError: Before any part runs, if an option does not belong to the part,
+            ``--recompute`` lacks ``--out``, or ``--only`` names an unknown scene.
     """
     _check(args)
     folder = output_folder(args.out) if args.out else None
     if args.part != "all":
         return _run_part(args.part, args, folder)
     begin = time.perf_counter()
-    found = {
+    results = {
         name: _run_part(name, args, None if folder is None else folder / name)
         for name in PARTS
     }
     return {
-        "rows": [row for one in found.values() for row in one["rows"]],
-        "parts": found,
-        "files": [path for one in found.values() for path in one["files"]],
+        "rows": [row for one in results.values() for row in one["rows"]],
+        "parts": results,
+        "files": [path for one in results.values() for path in one["files"]],
         "wall_s": time.perf_counter() - begin,
     }
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuse at once what a part would refuse after an hour of others."""
+    """Reject bad options before the first part runs, not after an hour of work."""
     for option, part in OPTIONS.items():
         given = getattr(args, option) not in (None, False)
         if given and args.part not in (part, "all"):
             raise InputError(
-                f"--{option}: not of bench {args.part}; accepted: bench {part} or all"
+                f"--{option} does not apply to bench {args.part}; accepted with bench"
+                f" {part} or bench all"
             )
     if args.recompute and not args.out:
         raise InputError(
-            "--recompute: writes the file of the references anew, and there is no"
-            " folder for it; accepted: with --out DIR"
+            "--recompute writes a new file of stored results and needs a folder;"
+            " accepted: with --out DIR"
         )
     if args.only is not None:
         from swgjoint.bench.joint.cost import check_scenes
@@ -107,7 +111,7 @@ def _check(args: argparse.Namespace) -> None:
 def _run_part(
     name: str, args: argparse.Namespace, folder: Path | None
 ) -> dict[str, Any]:
-    """One part with its options; the folder need not exist."""
+    """Run one part with its options; the folder need not exist."""
     if name == "fe":
         from swgjoint.gear.design.design import Design
 
@@ -133,7 +137,7 @@ def _run_part(
 
 
 def report(result: dict[str, Any]) -> str:
-    """The tables of the parts."""
+    """Format the tables of all parts."""
     if "parts" not in result:
         return _report_part(result["rows"][0]["bench"], result)
     texts = [_report_part(name, one) for name, one in result["parts"].items()]

@@ -1,4 +1,4 @@
-"""``swgjoint compare``: drives or levels side by side in one scene."""
+"""``swgjoint compare``: compare drives or model levels in one scene."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from swgjoint.files import Outputs, output_folder
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """What to compare, where, how to sort, what to ask for."""
+    """Add the arguments: drives or levels, scene, sorting, limits, output folder."""
     parser.add_argument(
         "arguments",
         metavar="A",
         nargs="+",
-        help="designs, .swg maps, catalogue drives, or levels such as full",
+        help="drives (designs, .swg maps, catalogue names) or model levels such as"
+        " full",
     )
     parser.add_argument(
         "--scene",
         metavar="SCENE|ARM",
         default="bench",
-        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets"
-        " a gentle sweep motion, and default drives in joints that are not"
+        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm is moved"
+        " through a slow sweep and gets default drives in the joints that are not"
         " compared; default bench",
     )
     parser.add_argument(
@@ -44,24 +45,30 @@ def configure(parser: argparse.ArgumentParser) -> None:
         dest="overrides",
         help="change a key of the scene; repeatable",
     )
-    parser.add_argument("--model", choices=("ring", "2d", "3d"), help="of designs")
-    parser.add_argument("--sort", metavar="KEY", help="sort by this figure, best first")
+    parser.add_argument(
+        "--model", choices=("ring", "2d", "3d"), help="fidelity of designs"
+    )
+    parser.add_argument(
+        "--sort", metavar="KEY", help="sort by this quantity, best first"
+    )
     parser.add_argument(
         "--spec",
         metavar="FILE",
-        help="TOML file with a table [spec] of limits; exit status 1 if one is missed",
+        help="TOML file with a [spec] table of limits; the exit status is 1 if a limit"
+        " is missed",
     )
     parser.add_argument(
         "--limit",
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="a limit without a file, e.g. tool_path_rms_mm=0.2; repeatable",
+        help="add or replace a limit, e.g. tool_path_rms_mm=0.2; repeatable",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write compare.json, a picture, the report and a recording of all runs",
+        help="write compare.json, compare.png, report.html and run.rrd (a recording of"
+        " all runs) to this folder",
     )
 
 
@@ -69,9 +76,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the scene for every argument.
 
     Returns:
-        ``scene``, ``joints`` (those that are compared; null for all), ``rows``,
-        ``spec``, ``passed`` (null without a spec), ``kept_by`` (arguments that keep
-        every limit), ``files``.
+        ``scene``, ``joints`` (names of the compared joints; null for all), ``rows``,
+        ``spec``, ``passed`` and ``kept_by`` (arguments that meet every limit), both
+        null without limits, ``columns``, ``notes``, ``files``.
+
+    Raises:
+        InputError: If ``--sort`` names an unknown quantity.
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.explore.compare.compare import SLOW, SORTABLE, compare
@@ -85,7 +95,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         near = near_names(args.sort, SORTABLE)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         raise InputError(
-            f"--sort {args.sort}: unknown figure{hint} accepted: {', '.join(SORTABLE)}"
+            f"--sort {args.sort}: unknown key{hint} accepted: {', '.join(SORTABLE)}"
         )
     spec = _limits(args)
     scene = scene_or_arm(args.scene, args.overrides)
@@ -126,7 +136,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _limits(args: argparse.Namespace) -> dict[str, float] | None:
-    """Limits of the file and of the options, the options first; None without any."""
+    """Limits of the file, replaced by those of the options; None without any limit."""
     from swgjoint.explore.compare.compare import checked_limits, read_spec
     from swgjoint.sim.scene.scene import parse_override
 
@@ -140,13 +150,13 @@ def _limits(args: argparse.Namespace) -> dict[str, float] | None:
 def _write(
     folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
 ) -> None:
-    """Picture, figures, report and recording."""
+    """Write the picture, the report, the recording and the JSON file."""
     from swgjoint.view.plots.compare import comparison_picture, comparison_table
     from swgjoint.view.recording.recording import write_recording
     from swgjoint.view.report.report import write_report
 
     runs: dict[str, Any] = {}
-    for row in rows:  # an argument may be given twice, a run of the report has one name
+    for row in rows:  # arguments may repeat, but runs of the report have unique names
         again = sum(name.split(" (again")[0] == row.argument for name in runs)
         runs[f"{row.argument} (again {again})" if again else row.argument] = row.run
     outputs, pictures = Outputs(folder), {}
@@ -172,7 +182,7 @@ def _write(
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where a limit of the spec is missed or a run is not valid."""
+    """Return 1 if a limit is missed or a run is not valid, else 0."""
     from swgjoint.sim.figures.verdict import VALID
 
     valid = all(row["verdict"] == VALID for row in result["rows"])
@@ -180,7 +190,7 @@ def status(result: dict[str, Any]) -> int:
 
 
 def report(result: dict[str, Any]) -> str:
-    """One line an argument, then what misses the spec."""
+    """Format one line per argument, then every missed limit."""
     from swgjoint.view.plots.compare import cell
 
     columns, spec = result["columns"], result["spec"]
@@ -200,7 +210,7 @@ def report(result: dict[str, Any]) -> str:
     if result["joints"]:
         which += f" of {', '.join(result['joints'])}"
     lines = [
-        f"scene {result['scene']}, {which}; K1 and stress of the drive",
+        f"scene {result['scene']}, values of the {which}; K1 and stress of the drive",
         table([units, *rows], header=header),
         *result["notes"],
     ]
@@ -212,5 +222,5 @@ def report(result: dict[str, Any]) -> str:
             )
     if spec is not None:
         kept = ", ".join(result["kept_by"])
-        lines.append(f"every limit is kept by: {kept or 'none of them'}")
+        lines.append(f"all limits are kept by: {kept or 'none'}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

@@ -13,26 +13,29 @@ from swgjoint.files import Outputs, output_folder
 
 SCENE = "ur5e-sweep"
 DRIVES = {"elliptical": "reference-2d", "simplified": "reference-2d-simplified"}
-"""Wave generators that are compared, as bundled designs."""
+"""Bundled design for each of the two wave generators that are compared."""
 FOLDER = "swgjoint-demo"
+"""Default output folder."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Output folder."""
+    """Add the output folder."""
     parser.add_argument(
         "--out",
         metavar="DIR",
         default=FOLDER,
-        help=f"folder that receives the files, default ./{FOLDER}",
+        help="write run.rrd, demo.png and report.html to this folder; default"
+        f" ./{FOLDER}",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Build both maps, run the arm with each and rigid; recording, picture, report.
+    """Build both maps and run the arm with each of them and with rigid joints.
 
     Returns:
-        ``map`` (figures of both maps), ``metrics`` (of the three runs, with
-        ``tool_against_rigid``), ``files``, ``wall_s``.
+        ``scene``, ``map`` (key figures of both maps), ``metrics`` (of the three runs,
+        with ``tool_against_rigid`` and ``contains``), ``files`` (recording, picture,
+        report), ``wall_s``.
     """
     start = time.perf_counter()
     folder = output_folder(args.out)
@@ -106,14 +109,14 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where a run is not valid."""
+    """Return 1 if a run is not valid, else 0."""
     from swgjoint.sim.figures.verdict import VALID
 
     return int(any(m["verdict"] != VALID for m in result["metrics"].values()))
 
 
 def report(result: dict[str, Any]) -> str:
-    """Tables of drives, joints and tool, and where the files are."""
+    """Format tables of the drives, joints and tool, and the names of the files."""
     lines = []
     for label, item in result["map"].items():
         low, high = item["torque_range_Nm"]
@@ -139,8 +142,17 @@ def report(result: dict[str, Any]) -> str:
         for label, metrics in result["metrics"].items()
     ]
     header = ("", "mean", "rms", "largest", "pp at speed", "steps/s")
-    lines += ["", "tool against the rigid arm [mm]:", table(rows, header=header), ""]
+    lines += [
+        "",
+        "tool position relative to the rigid arm [mm]:",
+        table(rows, header=header),
+        "",
+    ]
     lines += [f"wrote {path}" for path in result["files"]]
-    watch = [f"; watch it: swgjoint view {f}" for f in result["files"] if ".rrd" in f]
+    watch = [
+        f"; to replay the run: swgjoint view {f}"
+        for f in result["files"]
+        if ".rrd" in f
+    ]
     lines += [f"{result['wall_s']:.1f} s{''.join(watch)}"]
     return "\n".join(lines)

@@ -23,19 +23,19 @@ EXTRAS = {
     "tune": ("cma", "optuna"),
     "mkl": ("pypardiso",),
 }
-"""Optional parts by purpose, and the modules that each needs."""
+"""Modules that each optional extra needs, by name of the extra."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """No options of its own."""
+    """Add nothing: the command has no options of its own."""
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     """Check the installation.
 
     Returns:
-        ``ok`` (all required parts) and ``checks``: list of ``name``, ``ok``,
-        ``required``, ``detail``.
+        ``ok`` (whether all required parts are present) and ``checks``, a list of
+        objects with ``name``, ``ok``, ``required`` and ``detail``.
     """
     checks = [
         _check("python", platform.python_version),
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Table of the checks."""
+    """Format the checks as a table, then the verdict."""
     rows = [
         (c["name"], "ok" if c["ok"] else "MISSING" if c["required"] else "absent")
         for c in result["checks"]
@@ -65,13 +65,15 @@ def report(result: dict[str, Any]) -> str:
         for line, check in zip(lines, result["checks"], strict=True)
     ]
     verdict = (
-        "all required parts are installed" if result["ok"] else "not usable as it is"
+        "all required parts are installed"
+        if result["ok"]
+        else "not usable: required parts are missing"
     )
     return "\n".join([*body, verdict])
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if a required part is missing."""
+    """Return 1 if a required part is missing, else 0."""
     return 0 if result["ok"] else 1
 
 
@@ -86,7 +88,7 @@ def _check(
 
 
 def required_packages() -> list[str]:
-    """Distributions of the base install, swgjoint first, as its metadata names them."""
+    """Distribution names of swgjoint and of its required dependencies."""
     names = ["swgjoint"]
     try:
         requirements = metadata.requires("swgjoint") or []
@@ -111,7 +113,7 @@ def _version(name: str) -> Callable[[], str]:
 
 
 def _plugin() -> str:
-    # mujoco may be missing or damaged: the doctor says so and goes on
+    # mujoco may be missing or damaged: report it and continue with the other checks
     try:
         from swgjoint.joint import plugin
     except ImportError as exc:
@@ -132,12 +134,14 @@ def _cache() -> str:
 
     folder = cache_folder()
     if folder is None:
-        return "switched off (SWGJOINT_CACHE is empty)"
+        return "disabled (SWGJOINT_CACHE is empty)"
     existing = Path(folder)
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
     if not existing.is_dir() or not os.access(existing, os.W_OK):
-        raise SwgError(f"{folder} is not writable; name another one in SWGJOINT_CACHE")
+        raise SwgError(
+            f"{folder} is not writable; set SWGJOINT_CACHE to another folder"
+        )
     return str(folder)
 
 
@@ -146,7 +150,7 @@ def _extra(name: str, modules: tuple[str, ...]) -> Callable[[], str]:
         missing = [module for module in modules if find_spec(module) is None]
         if missing:
             raise SwgError(
-                f"without {', '.join(missing)}: pip install 'swgjoint[{name}]'"
+                f"not installed: {', '.join(missing)}; pip install 'swgjoint[{name}]'"
             )
         return ", ".join(modules)
 

@@ -1,9 +1,10 @@
 """Entry point of the ``swgjoint`` command.
 
-Only the module of the chosen command is imported, so that ``--help`` is immediate. A
-command module has ``configure(parser)``, ``run(args) -> dict`` (the JSON object) and
-``report(result) -> str`` (for the terminal); optionally ``status(result) -> int``.
-``args.progress`` is the callback for long work.
+Only the module of the chosen command is imported, so that ``--help`` is fast. A
+command module has ``configure(parser)``, ``run(args) -> dict`` (the JSON object),
+``report(result) -> str`` (text for the terminal) and optionally
+``status(result) -> int`` (the exit status). Commands report the progress of long
+computations through the callback ``args.progress``.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ COMMANDS = {
     "optimise": "search for Pareto-optimal designs",
     "study": "compare swgjoint with published values",
     "bench": "measure error against run time",
-    "advise": "find the cheapest model level, integrator and step for an error",
+    "advise": "find the cheapest level, integrator and step within an error bound",
     "stability": "test the numerical stability of stiff and extreme joints",
     "list": "list the bundled drives, designs, arms and scenes",
     "schema": "list the keys of an input file with unit, range and default",
@@ -55,22 +56,22 @@ BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
 LONGEST, MOST = 500, 50
-"""Characters of a line, and lines, that one message has at most."""
+"""Largest number of characters per line and of lines in one message."""
 BROKEN_PIPE = 141
 STATUSES = (
-    "Exit status: 0 success; 1 a computation failed, or its result misses a limit or is"
-    " not valid; 2 bad input, or a design that cannot be built; 130 interrupted. Errors"
-    " are lines on stderr and leave stdout empty, with --json, too; a result is printed"
-    " whatever its status."
+    "Exit status: 0 success; 1 the computation failed, or its result misses a limit or"
+    " is not valid; 2 bad input, or a design that cannot be built; 130 interrupted."
+    " Error messages are printed on stderr and leave stdout empty, also with --json. A"
+    " result is printed regardless of the exit status."
 )
-"""Epilog of every command."""
+"""Last paragraph of every help text."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser whose errors are one line on stderr, exit status 2."""
+    """Argument parser that reports an error in one line on stderr, exit status 2."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the error and a pointer to the help text."""
+        """Print the error with a pointer to the help text, and exit."""
         line = _cut(f"{self.prog}: {message}")
         self.exit(BAD_INPUT, f"{line}; see '{self.prog} --help'\n")
 
@@ -78,23 +79,27 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
+    Args:
+        argv: Arguments after the program name; None for those of this process.
+
     Returns:
-        Exit status: 0, 1 for a computation that failed, 2 for bad input.
+        Exit status as listed in :data:`STATUSES`, or 141 if the reader of stdout has
+        closed it.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     if "OMP_NUM_THREADS" not in os.environ:
-        # before numpy and scipy load theirs: on matrices of this size their threads
-        # wait for each other, and a 3D model takes twice as long
+        # set before numpy and scipy load OpenBLAS: its threads slow each other down on
+        # matrices of this size, and a 3D model would take twice as long
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # an ASCII terminal shows ? for a unit
+        if hasattr(stream, "reconfigure"):  # an ASCII terminal shows ? in a unit
             stream.reconfigure(errors="replace")
     try:
         if arguments and arguments[0] in COMMANDS:
             return _command(arguments[0], arguments[1:])
         return _top(arguments)
     except BrokenPipeError:
-        # the reading end closed; keep the interpreter from failing on its flush
+        # the reader closed the pipe: keep the final flush of Python from failing
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return BROKEN_PIPE
     except KeyboardInterrupt:
@@ -108,9 +113,10 @@ def _top(arguments: list[str]) -> int:
     parser = Parser(
         prog="swgjoint",
         usage="swgjoint COMMAND ... [--json]",
-        description="From the tooth geometry of a strain wave gear to robot behaviour.",
-        epilog=f"commands:\n{listing}\n\n'swgjoint COMMAND --help' shows its options."
-        f"\n\n{textwrap.fill(STATUSES, 88)}",
+        description="Simulate strain wave gears, from the tooth geometry to the"
+        " behaviour of a robot arm.",
+        epilog=f"commands:\n{listing}\n\n'swgjoint COMMAND --help' lists the options of"
+        f" a command.\n\n{textwrap.fill(STATUSES, 88)}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -137,16 +143,16 @@ def _command(name: str, arguments: list[str]) -> int:
     )
     module.configure(parser)
     parser.add_argument(
-        "--json", action="store_true", help="one JSON object on stdout, nothing else"
+        "--json", action="store_true", help="print one JSON object on stdout"
     )
     loudness = parser.add_mutually_exclusive_group()
     loudness.add_argument(
-        "--quiet", action="store_true", help="hide progress on stderr, keep warnings"
+        "--quiet", action="store_true", help="hide progress, but not warnings"
     )
     loudness.add_argument(
         "--verbose",
         action="store_true",
-        help="print every progress step on its own line",
+        help="print every progress step on a separate line",
     )
     parser.add_argument(
         "--traceback",
@@ -167,13 +173,13 @@ def _command(name: str, arguments: list[str]) -> int:
         return _refuse(name, str(exc), BAD_INPUT if bad_input else FAILED)
     except BrokenPipeError:
         raise
-    except OSError as exc:  # disk full or no permission: not a defect of swgjoint
+    except OSError as exc:  # disk full, no permission: no bug in swgjoint
         what = f"{exc.filename}: " if exc.filename else ""
         return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
     except Exception as exc:
         if out_of_memory(exc):
             return _refuse(name, "out of memory: use a smaller refinement", FAILED)
-        # a defect of ours: one line, and how to report it
+        # a bug in swgjoint: print one line, which tells how to report it
         if args.traceback:
             traceback.print_exc()
         return _refuse(name, _internal(exc, shown=args.traceback), FAILED)
@@ -201,19 +207,19 @@ def _refuse(name: str, message: str, status: int) -> int:
     for line in lines[:MOST]:
         print(_cut(f"swgjoint {name}: {line}"), file=sys.stderr)
     if len(lines) > MOST:
-        print(f"swgjoint {name}: {len(lines) - MOST} more faults", file=sys.stderr)
+        print(f"swgjoint {name}: {len(lines) - MOST} more errors", file=sys.stderr)
     return status
 
 
 def _internal(exc: Exception, *, shown: bool) -> str:
-    """One line about an unexpected exception."""
+    """Describe an unexpected exception in one line."""
     last = traceback.extract_tb(exc.__traceback__)[-1]
     text = " ".join(str(exc).split())[:200]
-    again = "" if shown else " of the same command with --traceback"
+    more = "" if shown else " of the same command with --traceback"
     return (
-        f"internal error, {type(exc).__name__} at {Path(last.filename).name}:"
-        f"{last.lineno}{': ' if text else ''}{text}; please report it with the input"
-        f" and the output{again}"
+        f"internal error: {type(exc).__name__} at {Path(last.filename).name}:"
+        f"{last.lineno}{': ' if text else ''}{text}; please report it together with"
+        f" the input and the output{more}"
     )
 
 
@@ -224,21 +230,21 @@ def _show_warning(
     *_: Any,
     **__: Any,
 ) -> None:
-    """Print a warning; one about an output that is missing is kept, too."""
+    """Print a warning; also collect it if it reports a missing output file."""
     print(_cut(f"swgjoint: warning: {message}"), file=sys.stderr)
     if issubclass(category, OutputWarning):
         incomplete.append(str(message))
 
 
 def _cut(line: str) -> str:
-    """A line of a message without what controls a terminal, and not too long."""
+    """Remove control characters from a line of a message and limit its length."""
     line = "".join(c if c.isprintable() or c == "\t" else "?" for c in line)
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
 
 
 @contextmanager
 def _ended(progress: StderrProgress) -> Iterator[None]:
-    """End the line of a progress that stops early, before anything else is said."""
+    """End the progress line before other text is printed, also after an exception."""
     try:
         yield
     finally:
@@ -247,7 +253,7 @@ def _ended(progress: StderrProgress) -> Iterator[None]:
 
 @contextmanager
 def _stdout_on_stderr() -> Iterator[None]:
-    """Send what libraries print, also from C, to stderr."""
+    """Redirect everything that libraries print, also from C code, to stderr."""
     kept, sys.stdout = sys.stdout, sys.stderr
     copy = os.dup(1)
     try:

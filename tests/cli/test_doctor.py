@@ -95,7 +95,7 @@ def test_cache_folder(capsys, monkeypatch, tmp_path):
     """The cache is where the variable says, off when it is empty, or refused."""
     for value, ok, word in (
         (str(tmp_path / "new" / "deep"), True, "deep"),
-        ("", True, "switched off"),
+        ("", True, "disabled"),
         ("/dev/null/x", False, "not writable"),
     ):
         monkeypatch.setenv("SWGJOINT_CACHE", value)

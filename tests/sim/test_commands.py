@@ -110,7 +110,7 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
     from swgjoint.cli.demo import report
 
     text = report(result)
-    assert "tool against the rigid arm" in text
+    assert "tool position relative to the rigid arm" in text
     assert "shoulder_lift" in text
 
 

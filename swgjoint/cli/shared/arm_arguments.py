@@ -1,4 +1,4 @@
-"""What ``run`` and ``advise`` ask about an arm that has no scene."""
+"""Command-line options for an arm without a scene, shared by ``run`` and ``advise``."""
 
 from __future__ import annotations
 
@@ -19,51 +19,57 @@ OF_AN_ARM = {
     "motion": "--motion",
     "balance_inertia": "--balance-inertia",
 }
+"""Options that apply to an arm only, by attribute of the parsed arguments."""
 
 
 def add_arm_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which hinges move, from where, and how."""
+    """Add the options that select joints, start pose and motion of an arm."""
     group = parser.add_argument_group("for an arm, an MJCF or URDF file")
     group.add_argument(
         "--joints",
         metavar="NAME,PATTERN,...",
         action="append",
         default=[],
-        help="hinges that get drives and move, with * and ? as in 'shoulder*,elbow';"
-        " the others are held in the start pose, without drives; default: all;"
-        " repeatable",
+        help="hinge joints that get drives and move; wildcards * and ? are allowed,"
+        " as in 'shoulder*,elbow'; all other joints are locked in the start pose and"
+        " get no drives; default: all; repeatable",
     )
     group.add_argument(
         "--pose",
         metavar="NAME",
-        help="where the arm starts: a keyframe of the file, reference or middle (of the"
-        " ranges); default: the first of keyframe, reference and middle in which no"
-        " bodies touch",
+        help="start pose: name of a keyframe in the file, 'reference', or 'middle' (of"
+        " the joint ranges); default: the first of keyframe, reference and middle in"
+        " which no bodies touch",
     )
     group.add_argument(
         "--motion",
         metavar="KIND",
         help="sweep (default), step, trapezoid, constant_speed, chirp, line, circle,"
-        " iso9283 or csv, with values that suit an arm; others: --set"
-        " trajectory.KEY=VALUE",
+        " iso9283 or csv, with default values suitable for an arm; change them with"
+        " --set trajectory.KEY=VALUE",
     )
     group.add_argument(
         "--balance-inertia",
         action="store_true",
-        help="repair inertias that no rigid body has: their mean in all directions",
+        help="set all three principal moments of a physically impossible inertia in the"
+        " file to their mean",
     )
 
 
 def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
-    """The scene that is asked for, and the drives chosen by rule.
+    """Load the scene named on the command line, or build one for an arm.
 
     Args:
-        args: With ``scene``, the options of :func:`add_arm_arguments` and, where the
-            command has it, ``drive``.
-        changes: Of the scene, as ``KEY=VALUE``.
+        args: Parsed arguments: ``scene``, the options of :func:`add_arm_arguments` and,
+            if the command has it, ``drive``.
+        changes: Changes of the scene, each as ``KEY=VALUE``.
 
     Returns:
-        The scene, and for an arm its drives by rule, as for JSON; None for a scene.
+        The scene, and for an arm the JSON object of the automatically selected drives
+        by joint; None in place of it if ``args.scene`` is a scene.
+
+    Raises:
+        InputError: If an option for an arm is combined with a scene.
     """
     from swgjoint.sim.arm.scene import arm_scene, is_arm
     from swgjoint.sim.scene.scene import Scene
@@ -84,8 +90,8 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
     given = [option for name, option in OF_AN_ARM.items() if getattr(args, name)]
     if given:
         raise InputError(
-            f"{', '.join(given)} with scene {args.scene!r}; accepted: with an arm, an"
-            " MJCF or URDF file; a scene says it in its own keys"
+            f"{', '.join(given)} with scene {args.scene!r}; accepted: with an arm (an"
+            " MJCF or URDF file); for a scene, set the keys of the scene instead"
         )
     if drive:
         scene = Scene.load_file(args.scene).with_drive(drive)
@@ -94,7 +100,14 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
 
 
 def choice_lines(choice: dict[str, Any]) -> list[str]:
-    """Drives chosen by default, what decided, and where no drive is strong enough."""
+    """Table of the automatically selected drives, and joints too strong for any.
+
+    Args:
+        choice: JSON objects of the selected drives by joint.
+
+    Returns:
+        Lines of text.
+    """
     rows = [
         (
             joint,
@@ -107,16 +120,20 @@ def choice_lines(choice: dict[str, Any]) -> list[str]:
     ]
     lacking = [name for name, one in choice.items() if not one["fits"]]
     lines = [
-        "drives by rule, the smallest CSG of ratio 100 that carries effort (of the"
-        " file), weight and motion; others: --drive, --set joints.JOINT.drive=NAME",
+        "drives selected by rule: the smallest CSG drive of ratio 100 that covers the"
+        " motor torque limit in the file (effort), the weight and the motion; to select"
+        " others: --drive NAME or --set joints.JOINT.drive=NAME",
         table(
             [("", "", "N·m", "N·m", ""), *rows],
-            header=("joint", "drive", "decided by", "carries", ""),
+            header=("joint", "drive", "required torque", "capacity", ""),
         ),
     ]
     if lacking:
         which = "any joint" if len(lacking) == len(choice) else ", ".join(lacking)
-        lines.append(f"no drive of the rule carries {which}: the largest stands in")
+        lines.append(
+            f"no CSG drive of ratio 100 is strong enough for {which}: the largest one"
+            " is used instead"
+        )
     return lines
 
 
@@ -128,16 +145,16 @@ def _remark(one: dict[str, Any]) -> str:
             if kind != one["decided_by"]
         )
         return (
-            f"none carries {_torque(one['needed_Nm'])} of the"
-            f" {_SOURCES[one['decided_by']]}, largest {one['drive']} ({others})"
+            f"too weak for {_torque(one['needed_Nm'])} from the"
+            f" {_SOURCES[one['decided_by']]}; largest drive: {one['drive']} ({others})"
         )
     if one["larger_than_needed"]:
-        return "smallest drive, over 10 times larger than what is asked"
+        return "smallest drive, its capacity is more than 10 times larger than required"
     return ""
 
 
 _SOURCES = {
-    "effort": "file's effort",
+    "effort": "effort limit in the file",
     "weight": "weight",
     "motion": "motion",
 }

@@ -1,4 +1,4 @@
-"""What ``swgjoint bench fe`` prints."""
+"""Terminal output of ``swgjoint bench fe``."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ SHORT = {
     "tensile_MPa": "tensile stress",
     "rim_shape_mm": "rim shape",
 }
+"""Short names of the quantities in the tables."""
 
 
 def report(result: dict[str, Any]) -> str:
-    """Errors of every setting, then the cheapest one within each bound."""
+    """Format the errors of every setting and the cheapest setting within each bound."""
     rows = result["rows"]
     solved = [row for row in rows if row["value"] is not None]
-    text = [f"{result['design']} against {rows[0]['reference']}; * on the Pareto front"]
+    text = [
+        f"{result['design']} compared with {rows[0]['reference']}; * Pareto-optimal"
+    ]
     positions = (
         f" at {result['kinematic_error_positions']} positions of a pitch, first"
         " harmonic"
@@ -46,9 +49,9 @@ def report(result: dict[str, Any]) -> str:
             name + positions * quantity.startswith("kinematic_error"),
             quantity.rpartition("pp_")[2] if "pp_" in quantity else quantity,
             f"error {unit}",
-            "of its kind",
+            "same kind",
             "next level",
-            "core s",
+            "CPU s",
             "wall s",
             "MB",
             "",
@@ -66,31 +69,31 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _stored(stored: dict[str, Any]) -> str:
-    """Where the stored settings come from, and whether they still hold."""
+    """State where the stored settings come from and whether they are still valid."""
     drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
-    state = "of this code" if stored["of_this_code"] else "of ANOTHER code"
+    state = "valid for this code" if stored["of_this_code"] else "from ANOTHER code"
     pace = stored["pace"]
     times = "" if pace is None else f", times of a machine {pace:.2g} times as fast"
     return (
-        f"stored: {'; '.join(stored['settings'])}, commit"
-        f" {stored['provenance']['commit']}, {state} ({stored['witness']} has moved by"
-        f" {drift}){times}; again: {stored['command']}"
+        f"read from the stored file: {'; '.join(stored['settings'])}, commit"
+        f" {stored['provenance']['commit']}, {state} (relative change of"
+        f" {stored['witness']}: {drift}){times}; to recompute: {stored['command']}"
     )
 
 
 def _cheapest(picks: list[dict[str, Any]], title: str) -> str:
-    """Bounds across, quantities down."""
+    """Table of the cheapest settings: one row per quantity, one column per bound."""
     bounds = list(dict.fromkeys(one["bound_percent"] for one in picks))
     body = []
     for quantity, name in SHORT.items():
         cells = [name]
         for one in picks:
             if one["quantity"] == quantity:
-                none = "the reference alone"
+                none = "only the reference"
                 cells.append(
                     none
                     if one["setting"] is None
-                    else f"{one['model']}, {one['setting']} ({one['cpu_s']:.0f} core s)"
+                    else f"{one['model']}, {one['setting']} ({one['cpu_s']:.0f} CPU s)"
                 )
         body.append(cells)
     header = (title, *(f"{bound:g} %" for bound in bounds))

@@ -1,4 +1,4 @@
-"""``swgjoint bench joint`` on the terminal."""
+"""Terminal output of ``swgjoint bench joint``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from swgjoint.cli.shared.text import table
 
 
 def report(result: dict[str, Any]) -> str:
-    """One line a setting: cost, errors, damping; then what the references are worth."""
+    """Format cost, errors and damping of each setting, then the references."""
     units = {
         row["quantity"]: row["unit"]
         for row in result["rows"]
@@ -23,21 +23,22 @@ def report(result: dict[str, Any]) -> str:
     body = []
     for names, line in lines.items():
         row = line["link_angle"]
-        found = [line[name]["error"] if name in line else None for name in units]
+        errors = [line[name]["error"] if name in line else None for name in units]
         damping = line.get("damping_ratio", {}).get("error")
         front = "*" if row["pareto"] else ""
-        own = [row["outcome"], row["cost"], *found, row["own_error"], damping, front]
-        body.append([*names, *own])
+        values = [row["outcome"], row["cost"], *errors, row["own_error"], damping]
+        body.append([*names, *values, front])
     text = [
-        "cost: CPU time over that of the rigid arm at 1 ms; errors against level full"
-        " without an error of its steps; steps: error of the link angle by the steps"
-        " alone [arcmin]; damping: ratio that the steps add to the first mode;"
-        " *: on the front of cost and error of the link angle",
+        "cost: CPU time relative to that of the rigid arm at 1 ms; errors: compared"
+        " with level full without time-step error; steps: error of the link angle due"
+        " to the time step alone [arcmin]; damping: numerical damping ratio that the"
+        " time step adds to the first mode; *: Pareto-optimal in cost and error of the"
+        " link angle",
         table(body, header=(*header, "steps", "damping", "")),
         *(
-            f"reference of {row['scene']}, {row['model']}: {row['reference']}; at twice"
-            f" the step of RK4 the link is {row['step_doubled_link_angle']:.1e} arcmin"
-            " away" + _independent(row)
+            f"reference of {row['scene']}, {row['model']}: {row['reference']}; doubling"
+            " the step of RK4 changes the link angle by"
+            f" {row['step_doubled_link_angle']:.1e} arcmin" + _independent(row)
             for row in result["references"]
         ),
     ]
@@ -48,4 +49,4 @@ def report(result: dict[str, Any]) -> str:
 def _independent(row: dict[str, Any]) -> str:
     if "rk4_link_angle" not in row:
         return ""
-    return f", RK4 {row['rk4_link_angle']:.1e} arcmin"
+    return f", RK4 differs by {row['rk4_link_angle']:.1e} arcmin"

@@ -1,4 +1,4 @@
-"""What ``swgjoint bench scaling`` prints."""
+"""Terminal output of ``swgjoint bench scaling``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from swgjoint.cli.shared.text import table
 
 
 def report(result: dict[str, Any]) -> str:
-    """Time by size, then the fitted exponents."""
+    """Format the CPU times by problem size, then the fitted exponents."""
     body = [
         (
             row["setting"],
@@ -22,8 +22,8 @@ def report(result: dict[str, Any]) -> str:
     ]
     header = ("", "size", "CPU seconds", "per", "steps/s", "outcome")
     fits = [
-        f"{fit['sweep']}: a {fit['per']} takes time ~ size^{fit['exponent']:.2f} from"
-        f" {fit['from_size']:g} on (within a factor {fit['spread']:.2f})"
+        f"{fit['sweep']}: time per {fit['per']} ~ size^{fit['exponent']:.2f} for sizes"
+        f" from {fit['from_size']:g} (fit within a factor of {fit['spread']:.2f})"
         for fit in result["fits"]
     ]
     wrote = [f"wrote {name}" for name in result["files"]]

@@ -1,4 +1,4 @@
-"""Where many designs are computed, and where what comes of them is kept."""
+"""Options that select where designs are computed and where results are stored."""
 
 from __future__ import annotations
 
@@ -16,42 +16,56 @@ if TYPE_CHECKING:
     from swgjoint.pool import Executor
 
 MAX_JOBS = 1024
+"""Largest accepted number of processes."""
 
 
 def configure_places(parser: argparse.ArgumentParser, *, out: str) -> None:
-    """Processes or scheduler, and the folder; ``out`` says what that receives."""
+    """Add the options ``--jobs``, ``--scheduler`` and ``--out``.
+
+    Args:
+        parser: Parser that receives the options.
+        out: Help text for ``--out``: what the folder receives.
+    """
     parser.add_argument(
         "--jobs",
         type=int,
         metavar="N",
-        help="processes of this machine; default: its cores, or the [cluster] of FILE",
+        help="number of processes on this machine; default: number of cores, or the"
+        " [cluster] table of FILE",
     )
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="compute on the workers of a dask scheduler, such as tcp://host:8786, or"
-        " of a scheduler file (.json)",
+        help="compute on the workers of a dask scheduler, given as an address such as"
+        " tcp://host:8786 or as a scheduler file (.json)",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help=f"{out}: a folder or any fsspec address (s3://...); default: results in"
-        " the user's cache, no files",
+        help=f"{out}; a folder or any fsspec address (s3://...); default: store results"
+        " in the user's cache and write no files",
     )
 
 
 def places_of(
     args: argparse.Namespace,
 ) -> tuple[ResultStore | None, Callable[[AskedFile], AbstractContextManager[Executor]]]:
-    """Where records are kept, and what computes the designs of a file.
+    """Interpret the options of :func:`configure_places`.
+
+    Args:
+        args: Parsed arguments.
+
+    Returns:
+        Store of the results (None if there is neither ``--out`` nor a cache), and a
+        function that opens the executor for a sweep or optimisation file.
 
     Raises:
-        InputError: If the options are not accepted.
+        InputError: If ``--jobs`` is out of range or combined with ``--scheduler``.
     """
     if args.jobs is not None and not 1 <= args.jobs <= MAX_JOBS:
         raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
     if args.jobs is not None and args.scheduler is not None:
-        raise InputError("--jobs and --scheduler; accepted: one of them")
+        raise InputError("--jobs together with --scheduler; accepted: only one of them")
     from swgjoint.explore.sweep.executor import chosen_executor
     from swgjoint.explore.sweep.results import place_of
     from swgjoint.store import cache_folder

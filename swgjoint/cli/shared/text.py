@@ -1,4 +1,4 @@
-"""Small pieces of terminal output."""
+"""Tables for terminal output."""
 
 from __future__ import annotations
 
@@ -6,7 +6,15 @@ from collections.abc import Sequence
 
 
 def table(rows: Sequence[Sequence[object]], *, header: Sequence[str] = ()) -> str:
-    """Columns of text, the first flush left, the others flush right."""
+    """Format a table with the first column left-aligned and the others right-aligned.
+
+    Args:
+        rows: Rows of equal length; None is shown as ``-``, a float with four digits.
+        header: Column headings; empty for none.
+
+    Returns:
+        Lines of text, without a line break at the end.
+    """
     cells = [[_cell(value) for value in row] for row in ([header] if header else [])]
     cells += [[_cell(value) for value in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
@@ -20,7 +28,11 @@ def table(rows: Sequence[Sequence[object]], *, header: Sequence[str] = ()) -> st
 
 
 def short_headers(names: Sequence[str]) -> list[str]:
-    """The last part of every key, the whole where that is not enough."""
+    """Shorten dotted keys to their last part, where that part is unique.
+
+    Args:
+        names: Dotted keys, such as ``flexspline.rim_mm``.
+    """
     lasts = [name.rpartition(".")[2] for name in names]
     return [
         last if lasts.count(last) == 1 else name
