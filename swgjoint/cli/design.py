@@ -1,4 +1,4 @@
-"""``swgjoint design``: whether designs can be built, pictures, outlines, new ones."""
+"""``swgjoint design``: check, plot, export and rescale designs."""
 
 from __future__ import annotations
 
@@ -18,69 +18,87 @@ if TYPE_CHECKING:
 
 ACTIONS = ("check", "show", "export", "new")
 ONLY_NEW = ("teeth", "module", "name", "overrides", "output")
-"""Options that belong to ``new``."""
+"""Options that only ``new`` accepts."""
 MEMBERS = ("flexspline", "circular_spline")
 UNREAD = "design file can be read"
+"""Name of the check that fails if a file is not a valid design."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Action, designs and output folder."""
+    """Add the arguments: action, designs, output and the options of ``new``."""
     parser.add_argument(
         "action",
         choices=ACTIONS,
-        help="check: compare figures with their limits; show: draw a picture;"
-        " export: write DXF and CSV; new: scale DESIGN to another tooth count or"
-        " module and write its file",
+        help="check: test whether DESIGN can be built; show: plot DESIGN; export:"
+        " write its outlines as DXF and CSV; new: scale DESIGN to another tooth count"
+        " or module and write the result to a new file",
     )
     parser.add_argument(
         "designs",
         metavar="DESIGN",
         nargs="+",
-        help="design file, bundled name, or size-NN-RRR; several for check",
+        help="design file, bundled name, or size-NN-RRR (size and ratio); check accepts"
+        " several",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="show writes design.png there; export outlines.dxf and one CSV per part",
+        help="output folder: show writes design.png and tooth-path.png, export writes"
+        " outlines.dxf and one CSV file per part",
     )
-    new = parser.add_argument_group("new")
+    new = parser.add_argument_group("options of new")
     new.add_argument(
-        "--teeth", metavar="FS/CS", help="of flexspline and circular spline: 160/162"
+        "--teeth",
+        metavar="FS/CS",
+        help="numbers of teeth of flexspline and circular spline, e.g. 160/162",
     )
     new.add_argument("--module", type=float, metavar="MM", help="module [mm]")
-    new.add_argument("--name", help="name of the design; default: that of the file")
+    new.add_argument(
+        "--name", help="name of the new design; default: the name of the output file"
+    )
     new.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
         default=[],
         dest="overrides",
-        help="change a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
+        help="set a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
     )
-    new.add_argument("-o", "--output", metavar="FILE.toml", help="file to write")
+    new.add_argument(
+        "-o", "--output", metavar="FILE.toml", help="file of the new design"
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Check designs; draw, export or scale one.
+    """Check designs, or plot, export or scale one design.
 
     Returns:
-        ``feasible``, ``checks`` (list of name, ok, value, unit, limit; with several
-        designs also ``design``), ``design`` or ``designs``, ``tooth_path`` (passage of
-        a rigid tooth), ``defaults`` (values that the file does not state), ``files``;
-        of ``new`` also ``factors`` and ``moved`` (values that scaling alone made
-        infeasible).
+        ``feasible``, ``checks`` (list of objects with name, ok, value, unit, limit;
+        for several designs also ``design``), ``design`` or ``designs``, ``tooth_path``
+        (passage of a rigid tooth), ``defaults`` (default values of keys that the file
+        does not state), ``files``; for ``new`` also ``factors`` and ``moved`` (values
+        that were changed because scaling alone made the design infeasible).
+
+    Raises:
+        InputError: If an option does not fit the action.
+        DesignError: If a design to show, export or scale is not feasible.
     """
     given = [name for name in ONLY_NEW if getattr(args, name)]
     if args.action != "new" and given:
         option = {"overrides": "set"}.get(given[0], given[0])
-        raise InputError(f"design {args.action} takes no --{option}: accepted by new")
+        raise InputError(
+            f"--{option} with design {args.action}; accepted: with design new"
+        )
     if args.action == "check":
         if args.out:
-            raise InputError("design check writes nothing: leave out --out")
+            raise InputError(
+                "--out with design check, which writes no files; accepted: with design"
+                " show or design export"
+            )
         return _check(args.designs)
     if len(args.designs) > 1:
         raise InputError(
-            f"design {args.action} takes one DESIGN, not {len(args.designs)}"
+            f"design {args.action} with {len(args.designs)} files; accepted: one DESIGN"
         )
     if args.action == "new":
         return _new(args)
@@ -109,9 +127,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _new(args: argparse.Namespace) -> dict[str, Any]:
-    """Scale a design, make it feasible and write it."""
+    """Scale a design, make it feasible and write it to a file."""
     if args.out:
-        raise InputError("design new writes one file: --output FILE.toml, not --out")
+        raise InputError("--out with design new; accepted: -o FILE.toml")
     if not args.output:
         raise InputError("design new needs -o FILE.toml")
     path = check_output_file(args.output, ".toml")
@@ -120,21 +138,21 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.gear.design.scaling import scaled_design
     from swgjoint.sim.scene.scene import parse_override
 
-    found = scaled_design(
+    scaled = scaled_design(
         Design.load(args.designs[0]),
         name=args.name or path.stem,
         teeth=teeth,
         module=args.module,
         changes=dict(map(parse_override, args.overrides)),
     )
-    checks, passage = _all_checks(found.design)
-    write_whole(path, found.design.to_toml())
+    checks, passage = _all_checks(scaled.design)
+    write_whole(path, scaled.design.to_toml())
     return {
         "action": "new",
-        "design": found.design.drive.name,
+        "design": scaled.design.drive.name,
         "feasible": True,
         "checks": [_row(check) for check in checks],
-        "factors": found.factors,
+        "factors": scaled.factors,
         "moved": [
             {
                 "key": one.key,
@@ -143,7 +161,7 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
                 "at_most" if one.bound.sign == "<=" else "at_least": one.bound.accepted,
                 "text": str(one),
             }
-            for one in found.moved
+            for one in scaled.moved
         ],
         "tooth_path": _path_numbers(passage),
         "files": [str(path)],
@@ -151,25 +169,28 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _teeth(text: str) -> tuple[int, int]:
-    """Teeth of both members from ``160/162``."""
+    """Numbers of teeth of flexspline and circular spline from ``160/162``."""
     flexspline, slash, circular = text.partition("/")
     if not slash or not (flexspline.isdecimal() and circular.isdecimal()):
         raise InputError(
-            f"--teeth {text!r}; accepted: teeth of flexspline and circular spline, e.g."
-            " 160/162"
+            f"--teeth {text!r}; accepted: numbers of teeth of flexspline and circular"
+            " spline, e.g. 160/162"
         )
     return int(flexspline), int(circular)
 
 
 def report(result: dict[str, Any]) -> str:
-    """One row per check, or one per design if there are several."""
+    """Format one row per check, or one row per design if there are several."""
     lines: list[str] = []
     rows: list[tuple[object, ...]]
     if result["action"] != "check":
         count = len(result["checks"])
         lines = [
             f"{result['design']}: feasible, {count} checks passed",
-            *(f"moved: {one['text']}" for one in result.get("moved", ())),
+            *(
+                f"changed to make the design feasible: {one['text']}"
+                for one in result.get("moved", ())
+            ),
             *_remarks(result),
         ]
     elif "designs" in result:
@@ -206,28 +227,28 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _remarks(result: dict[str, Any]) -> list[str]:
-    """Overlap of the flanks, and values that the file does not state."""
+    """Remarks on the overlap of the flanks and on default values."""
     lines = []
     path = result.get("tooth_path", {})
     if path.get("interference_um"):
         lines.append(
-            f"rigid flanks overlap by {path['interference_um']:.3g} µm,"
-            f" {path['angle_deg']:.3g} deg from the lobe ({path['where']}): elasticity"
-            " must take it up"
+            f"rigid flanks overlap by {path['interference_um']:.3g} µm at"
+            f" {path['angle_deg']:.3g} deg from the lobe ({path['where']}); the parts"
+            " must deform elastically by this amount"
         )
     if "missing" in path:
-        lines.append(f"clearance of the flanks over the engagement: {path['missing']}")
+        lines.append(f"clearance of the flanks during engagement: {path['missing']}")
     taken = result.get("defaults", {})
     if set(taken) >= {"material.youngs_modulus_GPa", "material.poisson_ratio"}:
-        lines.append("material of the members not stated: steel")
+        lines.append("material is not stated; steel is assumed")
     if taken:
-        told = ", ".join(f"{key} = {value}" for key, value in taken.items())
-        lines.append(f"defaults taken: {told}")
+        values = ", ".join(f"{key} = {value}" for key, value in taken.items())
+        lines.append(f"default values used: {values}")
     return lines
 
 
 def status(result: dict[str, Any]) -> int:
-    """2 if a design cannot be built."""
+    """Return 2 if a design cannot be built, else 0."""
     return 0 if result["feasible"] else 2
 
 
@@ -243,16 +264,17 @@ def _row(check: Check) -> dict[str, Any]:
 
 
 def _all_checks(design: Design) -> tuple[list[Check], ToothPath | str]:
-    """Checks with those of the engagement, and the passage of a rigid tooth.
+    """All checks of a design, and the passage of a rigid tooth.
 
-    Without a passage the reason: what cannot be built, or a rim without an outline.
+    The passage is replaced by a reason if the design cannot be built or if its rim has
+    no outline to follow.
     """
     from swgjoint.gear.design.feasibility import design_checks, engagement_checks
     from swgjoint.gear.teeth.tooth_path import tooth_path
 
     checks = design_checks(design)
     if not all(check.ok for check in checks):
-        return checks, "not computed of a design that cannot be built"
+        return checks, "not computed for a design that cannot be built"
     try:
         path = tooth_path(design)
     except DesignError as error:  # a rim on rollers has no outline to follow
@@ -261,7 +283,7 @@ def _all_checks(design: Design) -> tuple[list[Check], ToothPath | str]:
 
 
 def _path_numbers(path: ToothPath | str) -> dict[str, Any]:
-    """Figures of the passage of a rigid tooth, or why there are none."""
+    """Key figures of the passage of a rigid tooth, or the reason why it is missing."""
     from swgjoint.units import deg, um
 
     if isinstance(path, str):
@@ -276,7 +298,7 @@ def _path_numbers(path: ToothPath | str) -> dict[str, Any]:
 
 
 def _check(references: list[str]) -> dict[str, Any]:
-    """Checks of every design; one line on stderr for each fault."""
+    """Check every design and print one line on stderr for each fault."""
     designs = [_checked(reference) for reference in references]
     for design in designs:
         for line in design.pop("faults"):
@@ -297,7 +319,7 @@ def _check(references: list[str]) -> dict[str, Any]:
 
 
 def _checked(reference: str) -> dict[str, Any]:
-    """Checks of one design; a file that cannot be read is a failed check."""
+    """Check one design; a file that cannot be read counts as a failed check."""
     from swgjoint.gear.design.defaults import defaults_taken
     from swgjoint.gear.design.design import Design
 
@@ -313,13 +335,16 @@ def _checked(reference: str) -> dict[str, Any]:
             "checks": checks,
             "faults": faults,
         }
-    found, path = _all_checks(design)
+    results, path = _all_checks(design)
     return {
         "design": design.drive.name,
-        "feasible": all(check.ok for check in found),
-        "checks": [_row(check) for check in found],
+        "feasible": all(check.ok for check in results),
+        "checks": [_row(check) for check in results],
         "faults": [
-            line for check in found if not check.ok for line in check.fault.splitlines()
+            line
+            for check in results
+            if not check.ok
+            for line in check.fault.splitlines()
         ],
         "tooth_path": _path_numbers(path),
         "defaults": defaults_taken(design),
@@ -327,7 +352,7 @@ def _checked(reference: str) -> dict[str, Any]:
 
 
 def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]:
-    """Pictures of the design and of the passage of a rigid tooth, with its numbers."""
+    """Plot the design and the passage of a rigid tooth; return its key figures."""
     from swgjoint.view.plots.design import design_picture
     from swgjoint.view.plots.tooth_path import tooth_path_picture
 

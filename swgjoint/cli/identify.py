@@ -16,67 +16,80 @@ if TYPE_CHECKING:
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """The log, what is known of the drive, and where results go."""
+    """Add the arguments: log, known data of the drive, model, output folder."""
     parser.add_argument(
         "log",
         metavar="FILE.csv",
-        help="log with time_s, motor_angle_deg (or _rad), link_angle_deg (or _rad,"
-        " _arcmin), and output_torque_Nm, motor_torque_Nm or both",
+        help="log with columns time_s, motor_angle_deg (or _rad), link_angle_deg (or"
+        " _rad, _arcmin), and output_torque_Nm, motor_torque_Nm or both",
     )
     parser.add_argument(
         "--teeth",
         metavar="FS/CS",
         required=True,
-        help="teeth of flexspline and circular spline, for example 200/202",
+        help="numbers of teeth of flexspline and circular spline, e.g. 200/202",
     )
     parser.add_argument(
-        "--rated", type=float, metavar="NM", required=True, help="rated torque"
+        "--rated", type=float, metavar="NM", required=True, help="rated torque [N·m]"
     )
     parser.add_argument(
         "--corners",
         metavar="T1/T2",
-        help="torques at which the stiffness changes; default 0.2 and 0.6 of rated",
+        help="output torques at which the stiffness changes [N·m]; default: 0.2 and 0.6"
+        " times the rated torque",
     )
     parser.add_argument(
-        "--layout", metavar="LAYOUT", help="default circular_spline_fixed"
+        "--layout",
+        metavar="LAYOUT",
+        help="fixed member: circular_spline_fixed (default), flexspline_fixed or"
+        " wave_generator_fixed",
     )
     parser.add_argument(
         "--spring",
         choices=("three_lines", "cubic"),
-        help="stiffness K1, K2, K3 (default), or stiffness and hardening",
+        help="three_lines: stiffness K1, K2, K3 (default); cubic: stiffness and"
+        " hardening",
     )
     parser.add_argument(
         "--rotor-inertia",
         type=float,
         metavar="KGM2",
-        help="of motor and wave generator; identified if omitted",
+        help="inertia of motor rotor and wave generator about the input [kg·m²];"
+        " identified if omitted",
     )
     parser.add_argument(
         "--orders",
         metavar="P:Q,...",
-        help="kinematic error at p alpha + q beta, alpha and beta the rotations of the"
-        " wave generator against circular spline and flexspline; for example 2:0,0:2",
+        help="orders of the kinematic error: each P:Q is a component of phase P alpha +"
+        " Q beta, where alpha and beta are the rotations of the wave generator relative"
+        " to the circular spline and to the flexspline; e.g. 2:0,0:2",
     )
     parser.add_argument(
         "--window",
         type=float,
         metavar="S",
-        help="samples are averaged over this time; default 0.005",
+        help="time over which samples are averaged [s]; default 0.005",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write identified.swg and identified.png there"
+        "--out",
+        metavar="DIR",
+        help="write identified.swg and identified.png to this folder",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Read, fit, save.
+    """Read the log, fit the parameters and save the map.
 
     Returns:
-        ``estimates`` (per name ``value``, ``unit``, ``low`` and ``high`` of the
-        interval of 95 %), ``kinematic_error`` (``alpha``, ``beta``, ``error_arcmin``),
-        ``residuals`` per channel (``rms_Nm``, ``share`` of the rms torque),
-        ``samples``, ``correlation``, ``notes``, ``doubts`` (why the parameters may not
-        be those of the drive), ``files``, ``wall_s``.
+        ``estimates`` (per parameter ``value``, ``unit``, and the bounds ``low`` and
+        ``high`` of the 95 % confidence interval), ``kinematic_error`` (list of
+        ``alpha``, ``beta``, ``error_arcmin``), ``residuals`` per channel (``rms_Nm``
+        and ``share`` of the rms torque), ``samples``, ``correlation``, ``notes``,
+        ``doubts`` (reasons why the parameters may be wrong), ``log``, ``files``,
+        ``wall_s``.
+
+    Raises:
+        InputError: If ``--teeth``, ``--corners`` or ``--orders`` is malformed.
     """
     start = time.perf_counter()
     out = None if args.out is None else output_folder(args.out)
@@ -93,7 +106,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     corners = None
     if args.corners is not None:
         corners = _pair(args.corners, "--corners", "T1/T2", "/", float)
-    found = identify(
+    identified = identify(
         read_log(args.log),
         teeth_flexspline=teeth[0],
         teeth_circular_spline=teeth[1],
@@ -110,10 +123,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         from swgjoint.view.plots.identification import png
 
         outputs = Outputs(out)
-        outputs.hand_over("identified.swg", found.drive.save)
-        outputs.write("identified.png", lambda: png(found))
+        outputs.hand_over("identified.swg", identified.drive.save)
+        outputs.write("identified.png", lambda: png(identified))
         files = outputs.files
-    return result_of(found) | {
+    return result_of(identified) | {
         "log": args.log,
         "files": files,
         "wall_s": time.perf_counter() - start,
@@ -121,7 +134,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def result_of(found: Identified) -> dict[str, Any]:
-    """The JSON object of an identification, without files."""
+    """Convert an identification to the JSON object of the command, without files."""
     from swgjoint.identify.identification import rms
 
     measured = found.model.measured_torques()
@@ -154,24 +167,26 @@ def result_of(found: Identified) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Table of the parameters with their intervals."""
+    """Format the parameters with their confidence intervals, residuals and doubts."""
     rows = [
         (f"{name} [{e['unit']}]", e["value"], e["low"], e["high"])
         for name, e in result["estimates"].items()
     ]
-    text = table(rows, header=("parameter", "value", "from", "to (95 %)"))
+    text = table(rows, header=("parameter", "value", "95 % from", "to"))
     lines = [f"identified from {result['log']}", text]
     lines += [
-        f"{key}: {r['rms_Nm']:.3g} N·m rms left, {100 * r['share']:.3g} % of it"
+        f"{key}: residual {r['rms_Nm']:.3g} N·m rms, {100 * r['share']:.3g} % of the"
+        " measured rms"
         for key, r in result["residuals"].items()
     ]
     doubts = result["doubts"]
     lines += [note for note in result["notes"] if note not in doubts]
-    return "\n".join([*lines, *(f"doubt: {line}" for line in doubts), *result["files"]])
+    lines += [f"doubtful: {line}" for line in doubts]
+    return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if the identified parameters are doubtful."""
+    """Return 1 if the identified parameters are doubtful, else 0."""
     return int(bool(result["doubts"]))
 
 

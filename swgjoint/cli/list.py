@@ -1,4 +1,4 @@
-"""``swgjoint list``: what is bundled."""
+"""``swgjoint list``: list the bundled drives and files."""
 
 from __future__ import annotations
 
@@ -31,23 +31,24 @@ HEADERS = {
     "duration_s": "duration [s]",
     "description": "description",
 }
-"""Keys of a row that the table shows, and what it calls them."""
+"""Column headings by key of a row, in the order of the table."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """What to list."""
+    """Add the kind of files to list."""
     parser.add_argument(
         "kind",
         choices=KINDS,
-        help="drives: catalogue drives; otherwise the bundled files of that kind",
+        help="drives: catalogue drives; every other kind: bundled files of that kind",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Find them.
+    """Collect the bundled items of one kind.
 
     Returns:
-        ``kind``, ``rows`` (each with ``name`` and the figures of its kind), ``note``.
+        ``kind``, ``rows`` (each with ``name`` and the key figures of its kind) and
+        ``note`` (how other items of the kind are named).
     """
     from swgjoint.sim.bundled import NOTES, bundled_rows
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """A table, then how else one is named."""
+    """Format the table and the note below it."""
     keys = [key for key in HEADERS if key in result["rows"][0]]
     rows = [[_cell(row[key]) for key in keys] for row in result["rows"]]
     header = [HEADERS[key] for key in keys]

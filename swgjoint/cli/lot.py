@@ -15,45 +15,60 @@ MAX_JOBS = 256
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Design, number of drives, how errors are drawn, spec, output folder."""
+    """Add the arguments: design, size of the lot, distribution, limits, output."""
     parser.add_argument(
-        "design", metavar="DESIGN", help="design with a [tolerances] table"
+        "design",
+        metavar="DESIGN",
+        help="design file or bundled name; the design has a [tolerances] table",
     )
     parser.add_argument(
-        "--drives", type=int, default=500, metavar="N", help="default %(default)s"
+        "--drives",
+        type=int,
+        default=500,
+        metavar="N",
+        help="number of drives in the lot; default %(default)s",
     )
     parser.add_argument(
         "--sizes",
         choices=("limit", "uniform"),
         default="limit",
-        help="limit: errors as large as the tolerances (worst case, default);"
-        " uniform: errors drawn between zero and the tolerances",
+        help="magnitude of the errors: limit: equal to the tolerances (worst case,"
+        " default); uniform: uniformly distributed between zero and the tolerances",
     )
     parser.add_argument(
         "--seed",
         type=int,
         default=1,
-        help="seed of the first drive; default %(default)s",
+        help="random seed of the first drive; default %(default)s",
     )
     parser.add_argument(
         "--spec",
         metavar="FILE",
-        help="TOML file with a table [spec] of limits: transmission_accuracy_arcmin,"
-        " ripple_rms_percent, torsional_stiffness_Nm_rad",
+        help="TOML file with a [spec] table of limits for the yield; keys:"
+        " transmission_accuracy_arcmin, ripple_rms_percent, torsional_stiffness_Nm_rad",
     )
     parser.add_argument(
-        "--jobs", type=int, default=2, metavar="N", help="processes; default 2"
+        "--jobs",
+        type=int,
+        default=2,
+        metavar="N",
+        help="number of processes; default 2",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write lot.json, lot.csv and lot.png there"
+        "--out",
+        metavar="DIR",
+        help="write lot.json, lot.csv and lot.png to this folder",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Draw and solve the drives.
+    """Draw the errors of the drives at random and evaluate the lot.
 
     Returns:
-        See :func:`swgjoint.explore.lot.run_lot`, and ``files``.
+        The result of :func:`swgjoint.explore.lot.run_lot`, and ``files``.
+
+    Raises:
+        InputError: If a number is out of range.
     """
     for name, value, most in (
         ("drives", args.drives, MAX_DRIVES),
@@ -88,7 +103,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Percentiles of every figure, then the yield."""
+    """Format the percentiles of every figure, then the yield."""
     columns = ("p1", "p5", "p50", "p95", "p99", "mean", "std")
     rows = [
         [key, *(found[column] for column in columns)]
@@ -98,21 +113,29 @@ def report(result: dict[str, Any]) -> str:
     count = len(result["rows"])
     lines = [table(rows, header=("", *columns)), ""] if rows else []
     if result["failed"]:
-        lines.append(f"{result['failed']} of {count} drives have no equilibrium")
+        lines.append(
+            f"no equilibrium was found for {result['failed']} of {count} drives"
+        )
     off = result["validity"]["superposition_error"]
-    told = "unknown" if off is None else f"{100.0 * off:.1f} % of its peak to peak"
-    lines.append(f"error of the superposition, first drive against full solves: {told}")
+    error = "unknown" if off is None else f"{100.0 * off:.1f} % of the peak to peak"
+    lines.append(
+        "superposition of errors, first drive compared with full solves: difference"
+        f" {error}"
+    )
     if result["yield"] is not None:
-        found = result["yield"]
-        lines.append(f"yield: {_share(found)} of {count} drives, {result['sizes']}")
+        yields = result["yield"]
+        lines.append(
+            f"yield: {_share(yields)} of {count} drives, errors: {result['sizes']}"
+        )
         lines += [
-            f"  {key} {result['spec'][key]:g} alone: {_share(one)}"
-            for key, one in found["by_limit"].items()
+            f"  limit {key} = {result['spec'][key]:g} alone: {_share(one)}"
+            for key, one in yields["by_limit"].items()
         ]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join([*lines, f"{result['wall_s']:.0f} s"])
 
 
-def _share(found: dict[str, Any]) -> str:
-    low, high = 100.0 * found["low"], 100.0 * found["high"]
-    return f"{100.0 * found['part']:.1f} % ({low:.1f} to {high:.1f})"
+def _share(yields: dict[str, Any]) -> str:
+    """A yield with its confidence interval, as text."""
+    low, high = 100.0 * yields["low"], 100.0 * yields["high"]
+    return f"{100.0 * yields['part']:.1f} % ({low:.1f} to {high:.1f} %)"

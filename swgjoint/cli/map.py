@@ -1,4 +1,4 @@
-"""``swgjoint map``: from a design or a measured loop to a ``.swg`` file."""
+"""``swgjoint map``: build the map of a design or of a measured torsion loop."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _MEASURED = ("measured_teeth", "measured_rated", "measured_error", "measured_lay
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Design or measurement, output file, model."""
+    """Add the arguments: design or measurement, output file, fidelity."""
     parser.add_argument(
         "design",
         metavar="DESIGN",
-        help="design file or bundled name; or a .csv file of a measured torque-torsion"
-        " loop, with the options that begin with --measured",
+        help="design file or bundled name; or a .csv file with a measured"
+        " torque-torsion loop, together with the options --measured-...",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="map to write, .swg"
+        "-o", "--output", metavar="FILE", required=True, help="map file to write (.swg)"
     )
     parser.add_argument(
         "--model",
@@ -38,38 +38,44 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-fields",
         action="store_true",
-        help="leave out the stresses and shapes that recordings show; the file"
-        " shrinks from about 1 MB to tens of kB, the drive is the same",
+        help="omit the stresses and shapes that recordings display; the file shrinks"
+        " from about 1 MB to tens of kB and the drive behaves the same",
     )
-    measured = parser.add_argument_group("measured drive")
+    measured = parser.add_argument_group("options for a measured loop")
     measured.add_argument(
         "--measured-teeth",
         metavar="FS/CS",
-        help="teeth of flexspline and circular spline, for example 200/202",
+        help="numbers of teeth of flexspline and circular spline, e.g. 200/202",
     )
     measured.add_argument(
-        "--measured-rated", type=float, metavar="NM", help="rated torque"
+        "--measured-rated", type=float, metavar="NM", help="rated torque [N·m]"
     )
     measured.add_argument(
         "--measured-error",
         metavar="FILE",
-        help=".csv file of the kinematic error over one output turn (optional)",
+        help=".csv file with the kinematic error over one output turn (optional)",
     )
     measured.add_argument(
-        "--measured-layout", metavar="LAYOUT", help="default circular_spline_fixed"
+        "--measured-layout",
+        metavar="LAYOUT",
+        help="fixed member: circular_spline_fixed (default), flexspline_fixed or"
+        " wave_generator_fixed",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Build the map (or take it from the cache) and save it.
+    """Build the map, or read it from the cache, and save it.
 
     Returns:
         ``residual``, ``energy_check`` and ``harmonics`` of the map's record,
         ``validation`` against unseen solves (null with ``validation_reason``),
         ``stiffness_Nm_rad``, ``torque_range_Nm``, ``level``, ``files``, ``wall_s``;
-        of a measured loop ``fit``: ``hysteresis_loss_arcmin`` and
-        ``lost_motion_arcmin`` of the loop and of the map, ``rms_arcmin`` between them,
-        ``warnings``.
+        for a measured loop also ``fit``: ``hysteresis_loss_arcmin`` and
+        ``lost_motion_arcmin`` of the loop and of the map, ``rms_arcmin`` (difference
+        between loop and map), ``warnings``.
+
+    Raises:
+        InputError: If the options do not fit a design or a measured loop.
     """
     start = time.perf_counter()
     path = check_output_file(args.output, ".swg")
@@ -98,10 +104,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _sampled(drive: DriveMap) -> tuple[float, float]:
-    """Range of torque that the map covers and that was sampled [N·m].
+    """Range of torque that was sampled and that the map covers [N·m].
 
-    With errors of the teeth the mean torque at the ends of the map is not that of the
-    last samples.
+    With tooth errors, the mean torque at the ends of the map differs from the torque of
+    the outermost samples.
     """
     low, high = drive.torque_range
     first, last = drive.info.get("sampled_torque_Nm", (low, high))
@@ -109,25 +115,27 @@ def _sampled(drive: DriveMap) -> tuple[float, float]:
 
 
 def _built(args: argparse.Namespace) -> DriveMap:
-    """The map of a design."""
+    """Build the map of a design."""
     given = [name for name in _MEASURED if getattr(args, name) is not None]
     if given:
         raise InputError(
-            f"--{given[0].replace('_', '-')} with a design; accepted with a .csv file"
+            f"--{given[0].replace('_', '-')} with a design; accepted: with a .csv file"
         )
     from swgjoint.gear.design.design import Design
 
     design = Design.load(args.design)
-    # the finite elements take half a second to import: not before the design is sound
+    # importing the finite elements takes half a second, so the design is read first
     from swgjoint.drives.build_map import build_map
 
     return build_map(design, model=args.model, progress=args.progress)
 
 
 def _measured(args: argparse.Namespace) -> DriveMap:
-    """The map of a measured loop."""
+    """Fit the map of a measured loop."""
     if args.model is not None:
-        raise InputError(f"--model {args.model} with a measured loop; leave it out")
+        raise InputError(
+            f"--model {args.model} with a measured loop; accepted: with a design"
+        )
     if args.measured_teeth is None or args.measured_rated is None:
         raise InputError(
             f"{args.design}: a measured loop needs --measured-teeth FS/CS and"
@@ -152,13 +160,13 @@ def _measured(args: argparse.Namespace) -> DriveMap:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Key figures and where the file is."""
+    """Format the key figures of the map, its validation and the name of the file."""
     low, high = result["torque_range_Nm"]
     rows = [
         ("level", result["level"]),
         ("harmonics", len(result["harmonics"])),
-        ("stiffness to rated torque [N·m/rad]", result["stiffness_Nm_rad"]),
-        ("sampled torque [N·m]", f"{low:.4g} to {high:.4g}"),
+        ("mean stiffness up to rated torque [N·m/rad]", result["stiffness_Nm_rad"]),
+        ("sampled output torque [N·m]", f"{low:.4g} to {high:.4g}"),
         *_flat("residual", result["residual"]),
         *_flat("energy check", result["energy_check"]),
         ("wall time [s]", result["wall_s"]),
@@ -177,13 +185,14 @@ def report(result: dict[str, Any]) -> str:
             for key, pair in fit.items()
             if isinstance(pair, dict)
         ]
-        pairs.append(("rms between the loops", None, fit["rms_arcmin"]))
-        lines.append(table(pairs, header=("arcmin", "measured", "map")))
+        pairs.append(("rms difference of the loops", None, fit["rms_arcmin"]))
+        lines.append(table(pairs, header=("[arcmin]", "measured", "map")))
         lines += [f"warning: {line}" for line in fit["warnings"]]
     return "\n".join(lines)
 
 
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
+    """Rows of a table for a nested object, named by the path of keys."""
     if isinstance(value, dict):
         return [row for key, v in value.items() for row in _flat(f"{name} {key}", v)]
     return [] if value is None else [(name, value)]

@@ -1,4 +1,4 @@
-"""``swgjoint meshing``: the simulation of meshing of a design."""
+"""``swgjoint meshing``: simulate the meshing of a design over an input turn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from swgjoint.json_text import plain
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Design, torque, positions of the wave generator, kind of model."""
+    """Add the arguments: design, torque, positions, kind of model, output folder."""
     parser.add_argument("design", metavar="DESIGN", help="design file or bundled name")
     parser.add_argument(
         "--model",
@@ -25,21 +25,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--torque",
         type=float,
         metavar="NM",
-        help="torque that the drive exerts on the output; default: rated torque",
+        help="torque that the drive exerts on the output [N·m]; default: rated torque",
     )
     parser.add_argument(
         "--steps",
         type=int,
         metavar="N",
-        help="wave-generator positions k TURNS/N, k = 0 to N-1; default 35, or the"
-        " nearest number whose positions spread over the tooth pitch",
+        help="number of wave-generator positions k TURNS/N, k = 0 to N-1; default 35, or"
+        " the nearest number whose positions cover the tooth pitch evenly",
     )
     parser.add_argument(
         "--turn",
         type=float,
         default=0.5,
         metavar="TURNS",
-        help="turns of the input; default 0.5",
+        help="simulated rotation of the input [turns]; default 0.5",
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
@@ -47,36 +47,50 @@ def configure(parser: argparse.ArgumentParser) -> None:
         dest="nonlinear",
         action="store_true",
         default=True,
-        help="large rotations (default)",
+        help="account for large rotations (default)",
     )
     kind.add_argument(
-        "--linear", dest="nonlinear", action="store_false", help="small displacements"
+        "--linear",
+        dest="nonlinear",
+        action="store_false",
+        help="assume small displacements",
     )
     parser.add_argument(
-        "--half", action="store_true", help="half model: perfect geometry, even teeth"
+        "--half",
+        action="store_true",
+        help="model half of the drive, which requires perfect geometry and even numbers"
+        " of teeth",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write meshing.json and pictures there; a 3d run also keeps its states,"
-        " from which the same command resumes after an interruption",
+        help="write meshing.json and plots to this folder; a 3D run also stores its"
+        " states, from which the same command resumes after an interruption",
     )
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="require an interrupted 3d run in --out DIR and resume it; without this"
-        " option, a run with the same design and options is resumed as well",
+        help="require an interrupted 3D run in --out DIR and resume it; without this"
+        " option, a run with the same design and options is resumed if there is one",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Run the simulation; the result has the keys of ``MeshingRun.to_json``."""
+    """Run the simulation.
+
+    Returns:
+        The keys of ``MeshingRun.to_json``, and ``files``.
+
+    Raises:
+        InputError: If a number is out of range, or ``--resume`` lacks a 3D model or
+            ``--out``.
+    """
     _check(args)
     folder = output_folder(args.out) if args.out else None
     from swgjoint.gear.design.design import Design
 
     design = Design.load(args.design)
-    # the finite elements take half a second to import: not before the design is sound
+    # importing the finite elements takes half a second, so the design is read first
     from swgjoint.fe.meshing import simulate_meshing
     from swgjoint.gear.catalogue import ratings_of
 
@@ -85,7 +99,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     model = args.model or default_model(design)
     if args.resume and (folder is None or model != "3d"):
-        raise InputError("--resume needs a 3d model and --out DIR of the run")
+        raise InputError(
+            "--resume; accepted: with a 3D model and with --out DIR of the run"
+        )
     meshing = simulate_meshing(
         design,
         model=model,
@@ -123,25 +139,27 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuse options outside their range before anything is computed."""
+    """Reject options outside their range before anything is computed."""
     faults = []
     if args.torque is not None and not abs(args.torque) <= 1e6:
         faults.append(f"--torque {args.torque:g} N·m; accepted: -1e6 to 1e6 N·m")
     if args.steps is not None and not 1 <= args.steps <= 100_000:
         faults.append(f"--steps {args.steps}; accepted: 1 to 100000")
     if not math.isfinite(args.turn) or not 0 < abs(args.turn) <= 1000:
-        faults.append(f"--turn {args.turn:g} turns; accepted: up to 1000, not 0")
+        faults.append(
+            f"--turn {args.turn:g} turns; accepted: -1000 to 1000 turns except 0"
+        )
     if faults:
         raise InputError("\n".join(faults))
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where a position could not be solved."""
+    """Return 1 if a position could not be solved, else 0."""
     return int(result["outcome"] != "converged")
 
 
 def report(result: dict[str, Any]) -> str:
-    """Stresses of the set-up and over the turn, what the run was, its outcome."""
+    """Format the size of the run, its validity, the stresses and the outcome."""
     kinds = ("tensile", "compressive", "von_mises")
     rows = []
     label = result.get("label") or {}
@@ -153,7 +171,7 @@ def report(result: dict[str, Any]) -> str:
                 rows.append((f"{member} {state['state']}", *values))
         mean = result.get(member) and result[member].get("average_max_MPa")
         values = [mean.get(kind) for kind in kinds] if mean else []
-        if any(value is not None for value in values):  # null while it is rigid
+        if any(value is not None for value in values):  # null for a rigid member
             rows.append((f"{member} mean of the maxima{where}", *values))
     lines = [
         f"meshing of {result.get('design', 'the design')}:"
@@ -178,7 +196,7 @@ def report(result: dict[str, Any]) -> str:
     for state in result.get("coning_mm") or []:
         cone = "; ".join(
             f"{axis} axis {state[axis]['open_edge']:.4f} at the open edge,"
-            f" {state[axis]['closed_edge']:.4f} at the closed one"
+            f" {state[axis]['closed_edge']:.4f} at the closed edge"
             for axis in ("major", "minor")
         )
         lines.append(f"radial displacement [mm], {state['state']}: {cone}")

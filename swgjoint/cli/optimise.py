@@ -1,4 +1,4 @@
-"""``swgjoint optimise``: designs that are good in several figures at once."""
+"""``swgjoint optimise``: search for Pareto-optimal designs."""
 
 from __future__ import annotations
 
@@ -16,31 +16,33 @@ if TYPE_CHECKING:
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """File of the search, where it is computed, where results are kept."""
+    """Add the arguments: optimisation file, executor, store of the results."""
     parser.epilog = (
-        "A search that was stopped goes on with the same command: designs that were"
-        " computed are kept. Seed, population and number of designs are in FILE."
+        "Repeat the same command to resume an interrupted search; results of designs"
+        " that were already computed are reused. Seed, population and number of designs"
+        " are set in FILE."
     )
     parser.add_argument(
         "file", metavar="FILE", help="optimisation file or bundled name"
     )
     configure_places(
         parser,
-        out="keep results there, with the designs of the front (front-01.toml, ...),"
-        " tried.csv, optimise.png and optimise.json",
+        out="store the results in this folder, and write the Pareto-optimal designs"
+        " (front-01.toml, ...), tried.csv, optimise.png and optimise.json",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Search, and compute some of the front again with more care.
+    """Search, and recompute some designs of the front more accurately.
 
     Returns:
-        ``front`` (designs that no other one beats, by the first objective: values of
-        the parameters, figures, ``confirmed`` figures or null, ``not_worse_than``, in
-        every objective, of the designs beside), ``evaluations``, ``failed``,
-        ``generations``, ``reused``, ``computed``, ``workers``, ``work_s``, ``wall_s``,
-        ``objectives``, ``parameters``, ``figures``, ``validity``, ``start``,
-        ``beside``, ``rows`` (all that were tried), ``files``.
+        ``front`` (Pareto-optimal designs, sorted by the first objective: values of the
+        parameters, figures, ``confirmed`` figures or null, and ``not_worse_than``, the
+        names of compared designs that are not better in any objective),
+        ``evaluations``, ``failed``, ``generations``, ``reused``, ``computed``,
+        ``workers``, ``work_s``, ``wall_s``, ``objectives``, ``parameters``,
+        ``figures``, ``validity``, ``start``, ``beside`` (compared designs), ``rows``
+        (all designs that were tried), ``files``.
     """
     from swgjoint.explore.optimise.file import OptimisationFile
     from swgjoint.explore.optimise.optimise import optimise
@@ -48,15 +50,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     place, executor_of = places_of(args)
     file = OptimisationFile.load(args.file)
     with executor_of(file) as executor:
-        found = optimise(file, executor=executor, place=place, progress=args.progress)
-    result = {"optimisation": args.file, **found.to_json(), "files": []}
+        optimum = optimise(file, executor=executor, place=place, progress=args.progress)
+    result = {"optimisation": args.file, **optimum.to_json(), "files": []}
     if args.out is not None and place is not None:
-        result["files"] = _write(place, found, result)
+        result["files"] = _write(place, optimum, result)
     return result
 
 
-def _write(place: ResultStore, found: Optimum, result: dict[str, Any]) -> list[str]:
-    """Designs of the front, all that were tried, the picture, the whole as JSON."""
+def _write(place: ResultStore, optimum: Optimum, result: dict[str, Any]) -> list[str]:
+    """Write the designs of the front, the table of all designs, a plot and JSON."""
     from swgjoint.explore.sweep.results import write_to
     from swgjoint.view.plots.optimise import optimum_picture
 
@@ -64,32 +66,32 @@ def _write(place: ResultStore, found: Optimum, result: dict[str, Any]) -> list[s
         {key: value for key, value in row.items() if key != "confirmed"}
         for row in result["rows"]
     ]
-    designs = found.designs(result["optimisation"])
+    designs = optimum.designs(result["optimisation"])
     files = write_to(
         place,
         {_front(k): design.to_toml().encode for k, design in enumerate(designs)}
         | {
             "tried.csv": csv_text(rows).encode,
-            "optimise.png": lambda: optimum_picture(found),
+            "optimise.png": lambda: optimum_picture(optimum),
         },
     )
-    # a longer front that an earlier search left there is none of this one
+    # remove files of a longer front that an earlier search left in the folder
     left = len(designs)
     while place.read(_front(left)) is not None:
         place.remove(_front(left))
         left += 1
-    last = "optimise.json"  # which names them all
+    last = "optimise.json"  # written last, because it lists the other files
     content = {**result, "files": [*files, place.path_of(last)]}
     return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 
 def _front(k: int) -> str:
-    """File of a design of the front, counted from 0."""
+    """File name of a design of the front; ``k`` counts from 0."""
     return f"front-{k + 1:02d}.toml"
 
 
 def report(result: dict[str, Any]) -> str:
-    """The start and the compared designs, the Pareto front, and all designs tried."""
+    """Format the compared designs, the Pareto front, remarks and the counts."""
     names, figures = result["parameters"], result["figures"]
     rivals = [result["start"], *result["beside"]]
     header = ("", *short_headers(names), *short_headers(figures))
@@ -103,7 +105,9 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         ", ".join(goals),
         table(rows, header=header),
-        "*: confirmed; the rest as the search has seen it" if care else "",
+        "*: recomputed more accurately (confirmed); other values are from the search"
+        if care
+        else "",
     ]
     named = [(row["design"], row) for row in rivals]
     named += [(f"front {k + 1}", row) for k, row in enumerate(result["front"])]
@@ -113,18 +117,20 @@ def report(result: dict[str, Any]) -> str:
         if (record := row["confirmed"] or row)["outcome"] != "ok"
     ]
     lines += [
-        f"{name}: confirmed, it misses the limit of {', '.join(row['missed'])}"
+        f"{name}: its confirmed values miss the limit of {', '.join(row['missed'])}"
         for name, row in named
         if row["missed"]
     ]
     for k, row in enumerate(result["front"]):
         if row["not_worse_than"]:
-            told = ", ".join(row["not_worse_than"])
-            lines.append(f"front {k + 1} is in no objective worse than {told}")
+            others = ", ".join(row["not_worse_than"])
+            lines.append(
+                f"front {k + 1} is at least as good in all objectives as {others}"
+            )
     for task, label in result["validity"].items():
-        absent = [f"{part}: {what}" for part, what in label["not_modelled"].items()]
-        told = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
-        lines.append(f"validity of {task}: {told}")
+        absent = [f"{part}: {why}" for part, why in label["not_modelled"].items()]
+        text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
+        lines.append(f"validity of {task}: {text}")
     lines.append(
         f"{result['evaluations']} designs tried in {result['generations']} generations,"
         f" {result['failed']} of them without figures; {result['computed']} computed,"
@@ -136,7 +142,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _best(row: dict[str, Any], figures: list[str]) -> list[str]:
-    """Figures of a design, with a star where they are confirmed."""
+    """Figures of a design as text, with a star if they are confirmed."""
     confirmed = row["confirmed"]
     ok = confirmed is not None and confirmed["outcome"] == "ok"
     best, mark = (confirmed, "*") if ok else (row, "")

@@ -1,4 +1,4 @@
-"""``swgjoint profile``: the teeth of a design as numbers and as a picture."""
+"""``swgjoint profile``: dimensions, checks and plot of the tooth profiles."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ MEMBERS = ("flexspline", "circular_spline")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Design and output folder."""
+    """Add the arguments: design, output folder."""
     parser.add_argument("design", metavar="DESIGN", help="design file or bundled name")
     parser.add_argument(
-        "--out", metavar="DIR", help="write profile.json and profile.png there"
+        "--out", metavar="DIR", help="write profile.json and profile.png to this folder"
     )
 
 
@@ -27,8 +27,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Build and check both tooth profiles.
 
     Returns:
-        Per member ``straight_length_mm``, radii, widths and ``segments``; ``points``
-        of both right flanks from tip to root [mm]; ``checks``; ``files``.
+        For each member ``teeth``, ``straight_length_mm``, radii, thickness at the pitch
+        circle and ``segments``; ``points`` of both right flanks from tip to root [mm],
+        shape (n, 2); ``checks``; ``files``.
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.gear.design.design import Design
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """One column per member, then the checks."""
+    """Format the dimensions, one column per member, then the checks."""
     keys = [key for key in result["flexspline"] if key != "segments"]
     rows = [(key, *(result[member][key] for member in MEMBERS)) for key in keys]
     names = dict.fromkeys(s["name"] for m in MEMBERS for s in result[m]["segments"])
@@ -78,7 +79,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if a check failed."""
+    """Return 1 if a check failed, else 0."""
     return 0 if all(check["ok"] for check in result["checks"]) else 1
 
 
@@ -119,7 +120,7 @@ def _width_at_pitch(profile: ToothProfile) -> float:
 
 
 def _points(profile: ToothProfile, per_segment: int = 24) -> list[list[float]]:
-    """Flank points [mm], every junction among them."""
+    """Points of the flank, including every junction [mm]. Shape (n, 2)."""
     import numpy as np
 
     from swgjoint.units import mm
@@ -133,7 +134,7 @@ def _points(profile: ToothProfile, per_segment: int = 24) -> list[list[float]]:
 
 
 def _checks(profile: ToothProfile) -> list[dict[str, Any]]:
-    """Closed and tangent at every junction, nothing of negative length."""
+    """Check that the segments meet, are tangent and have positive lengths."""
     import numpy as np
 
     from swgjoint.gear.teeth.profile import TANGENCY_RAD
