@@ -31,8 +31,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--steps",
         type=int,
         metavar="N",
-        help="number of wave-generator positions k TURNS/N, k = 0 to N-1; default 35, or"
-        " the nearest number whose positions cover the tooth pitch evenly",
+        help="number of wave-generator positions k TURNS/N, k = 0 to N-1; default 35,"
+        " or the nearest number whose positions cover the tooth pitch evenly",
     )
     parser.add_argument(
         "--turn",

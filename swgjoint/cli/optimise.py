@@ -105,7 +105,7 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         ", ".join(goals),
         table(rows, header=header),
-        "*: recomputed more accurately (confirmed); other values are from the search"
+        "*: confirmed by a more accurate computation; others: as found by the search"
         if care
         else "",
     ]
@@ -133,7 +133,7 @@ def report(result: dict[str, Any]) -> str:
         lines.append(f"validity of {task}: {text}")
     lines.append(
         f"{result['evaluations']} designs tried in {result['generations']} generations,"
-        f" {result['failed']} of them without figures; {result['computed']} computed,"
+        f" {result['failed']} failed; {result['computed']} computed,"
         f" {result['reused']} reused, {result['wall_s']:.0f} s"
     )
     return "\n".join(

@@ -23,21 +23,22 @@ JOINT_HEADER = (
     "unresolved",
 )
 JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
+"""Units of the columns of :data:`JOINT_HEADER`."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Scene or arm, drive, changes, output folder."""
+    """Add the arguments: scene or arm, drive, changes, output, options of an arm."""
     parser.add_argument(
         "scene",
         metavar="SCENE|ARM",
-        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets"
-        " a gentle sweep motion and, unless --drive is given, default drives",
+        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm is moved"
+        " through a slow sweep and gets default drives unless --drive is specified",
     )
     parser.add_argument(
         "--drive",
         metavar="NAME",
-        help="design, map or catalogue drive for all joints; for one joint use --set"
-        " joints.JOINT.drive=NAME",
+        help="design, map or catalogue drive for all joints; for a single joint use"
+        " --set joints.JOINT.drive=NAME",
     )
     parser.add_argument(
         "--set",
@@ -50,8 +51,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write run.rrd there, and scene.toml for an arm; by default nothing is"
-        " written",
+        help="write run.rrd (and scene.toml for an arm) to this folder; default: write"
+        " no files",
     )
     parser.add_argument(
         "--model",
@@ -61,20 +62,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="also end with exit status 1 if a figure is doubtful: a drive above its"
-        " ratings, a ripple that is a lower bound or uncertain, a link that"
-        " does not follow its command",
+        help="return exit status 1 also if a result is doubtful: a drive exceeds its"
+        " ratings, a ripple is a lower bound or uncertain, or a link does not follow"
+        " its command",
     )
     parser.add_argument(
-        "--report", action="store_true", help="also write report.html to DIR"
+        "--report", action="store_true", help="also write report.html to --out DIR"
     )
     parser.add_argument(
         "--live",
         metavar="URL",
         nargs="?",
         const="",
-        help="send the run to a viewer on this machine in real time; without URL, a"
-        " viewer is started",
+        help="after the simulation, send the run in real time to a viewer on this"
+        " machine; without URL, a viewer is started",
     )
     add_arm_arguments(parser)
 
@@ -83,11 +84,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Simulate the scene.
 
     Returns:
-        ``joints``, ``tool``, ``steps_per_s``, ``contains``, ``files``, ``arm`` and the
-        rest of :meth:`swgjoint.sim.run.Run.metrics`.
+        ``scene``, ``arm``, ``drive_choice``, ``contains``, ``files``, ``live`` and the
+        keys of :meth:`swgjoint.sim.run.Run.metrics`, such as ``joints``, ``tool`` and
+        ``steps_per_s``.
+
+    Raises:
+        InputError: If ``--report`` lacks ``--out``, or the URL of ``--live`` is not on
+            this machine.
     """
     if args.report and not args.out:
-        raise InputError("--report needs a folder; accepted: --out DIR")
+        raise InputError("--report needs a folder; accepted: with --out DIR")
     if args.live:
         from swgjoint.view.recording.live import loopback_port
 
@@ -138,7 +144,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if the run is invalid or, with ``--strict``, if any value is marked."""
+    """Return 1 if the run is not valid or, with ``--strict``, doubtful, else 0."""
     from swgjoint.sim.figures.verdict import VALID
     from swgjoint.view.validity import warnings_of
 
@@ -148,11 +154,11 @@ def status(result: dict[str, Any]) -> int:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Verdict, table of the joints, error of the tool, what the model contains."""
+    """Format the verdict, the joints, the tool error and the content of the model."""
     contains = result["contains"]
     lines = [
         *verdict_lines(result),
-        f"scene {result['scene']}, {result['window_of']} from"
+        f"scene {result['scene']}, values from the period of {result['window_of']},"
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
@@ -174,64 +180,65 @@ def report(result: dict[str, Any]) -> str:
 
 
 def verdict_lines(metrics: dict[str, Any]) -> list[str]:
-    """Whether the figures describe the scene, and why not."""
+    """Format the verdict: whether the results describe the scene, and why not."""
     from swgjoint.sim.figures.verdict import VALID
 
     if metrics["verdict"] == VALID:
         return [metrics["verdict"]]
     return [
-        f"{metrics['verdict']}: the figures below do not describe this scene",
+        f"{metrics['verdict']}: the results below do not describe this scene",
         *(f"  {reason}" for reason in metrics["reasons"]),
     ]
 
 
 def assumed_lines(contains: dict[str, Any]) -> list[str]:
-    """Assumed kinematic errors, grouped by joints that share them."""
-    found: dict[str, list[str]] = {}
+    """Format assumed kinematic errors, grouped by joints that share them."""
+    names_by_error: dict[str, list[str]] = {}
     for name, joint in contains["joints"].items():
-        what, _, _ = str(joint["kinematic_error"]).partition(", joint ")
-        if what.startswith("assumed"):
-            found.setdefault(what, []).append(name)
+        error, _, _ = str(joint["kinematic_error"]).partition(", joint ")
+        if error.startswith("assumed"):
+            names_by_error.setdefault(error, []).append(name)
     return [
-        f"kinematic error {what}"
+        f"kinematic error {error}"
         + ("" if len(names) == len(contains["joints"]) else f" ({', '.join(names)})")
-        for what, names in found.items()
+        for error, names in names_by_error.items()
     ]
 
 
 def left_out_lines(contains: dict[str, Any]) -> list[str]:
-    """What the model leaves out and why, joints with the same together."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Format what the model omits and why, grouped by joints with the same omission."""
+    joints_by_part: dict[tuple[str, str], list[str]] = {}
     for item in contains["left_out"]:
-        found.setdefault((item["part"], item["reason"]), []).append(item["joint"])
+        key = (item["part"], item["reason"])
+        joints_by_part.setdefault(key, []).append(item["joint"])
     count = len(contains["joints"])
     return [
         f"not simulated: {part}: {reason}"
         + ("" if len(joints) == count else f" ({', '.join(joints)})")
-        for (part, reason), joints in found.items()
+        for (part, reason), joints in joints_by_part.items()
     ]
 
 
 def sub_step_line(contains: dict[str, Any]) -> str:
-    """Why the steps were cut, and into how many parts; empty if they were not."""
+    """State the number of sub-steps per step and its reason; empty if it is 1."""
     if contains["sub_steps"] == 1:
         return ""
     why = ", ".join(
-        f"{name}: {what}" for name, what in contains["sub_stepped_for"].items()
+        f"{name}: {reason}" for name, reason in contains["sub_stepped_for"].items()
     )
     return (
-        f"every step in {contains['sub_steps']} sub-steps, because its own length is"
-        f" outside the region of the integrator ({why})"
+        f"every step is divided into {contains['sub_steps']} sub-steps, because the"
+        f" full step is outside the stability region of the integrator ({why})"
     )
 
 
 def joint_table(joints: dict[str, Any]) -> str:
-    """One line per joint: torsion, transmission error, ripple, orders."""
+    """Format one line per joint: torsion, transmission error, ripple, orders."""
     return table([JOINT_UNITS, *map(joint_row, joints.items())], header=JOINT_HEADER)
 
 
 def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
-    """Figures of one joint as the table shows them."""
+    """Cells of one joint in the table; ``item`` is its name and its figures."""
     from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark
 
     name, joint = item
@@ -259,9 +266,14 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
 
 
 def ripple_cell(joint: dict[str, Any], key: str) -> str:
-    """A figure of the ripple: a dash for none, marked where it says less.
+    """Format a ripple figure with its marks, or a dash if it is missing.
 
-    > where it is a lower bound, ~ and ! where the map differs from unseen solves.
+    The mark ``>`` means a lower bound; ``~`` and ``!`` mean that the map differs from
+    unseen solves.
+
+    Args:
+        joint: Figures of the joint.
+        key: Key of the ripple figure [% of rated torque].
     """
     from swgjoint.maps.sheet.validity_marks import joint_mark
 
@@ -272,16 +284,22 @@ def ripple_cell(joint: dict[str, Any], key: str) -> str:
 
 
 def _signed(sign: str, text: str) -> str:
+    """Text with a mark in front, unless there is no mark or no figure."""
     return text if not sign or text == "-" else f"{sign} {text}"
 
 
 def format_fixed(value: float, digits: int = 3) -> str:
-    """A number with fixed digits, without a sign on zero."""
+    """Format a number with fixed decimals, without a sign on zero.
+
+    Args:
+        value: Number in any unit.
+        digits: Number of decimals.
+    """
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def notes(joints: dict[str, Any]) -> list[str]:
-    """What marks in the table mean, and warnings about the validity of figures."""
+    """Explain the marks in the table of joints, and list warnings on the validity."""
     from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
     from swgjoint.view.validity import warnings_of
 
@@ -294,34 +312,39 @@ def notes(joints: dict[str, Any]) -> list[str]:
     }
     if marks - {""}:
         lines.insert(0, mark_legend(marks))
-    lines += [f"-: no figure for the torque ripple: {why}" for why in sorted(whys)]
+    lines += [f"-: no value for the torque ripple: {why}" for why in sorted(whys)]
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.insert(
             0,
-            "* no order of this joint's drive: vibration, modulation or another joint",
+            "* not an order of this joint's drive: vibration, modulation or another"
+            " joint",
         )
     return lines
 
 
 def tool_line(tool: dict[str, Any], *, random: bool) -> str:
-    """Errors of the tool in one line, those that the motion has.
+    """Format the tool errors that are defined for the motion in one line.
 
     Args:
-        tool: Figures of the tool.
-        random: Whether anything in the scene differs from cycle to cycle; without it a
-            repeatability tells nothing.
+        tool: Figures of the tool [mm].
+        random: Whether the scene contains random effects that differ from cycle to
+            cycle; without them the repeatability is meaningless and is not shown.
     """
     parts = []
     if tool["path_rms_mm"] is not None:
         parts.append(
-            f"against the commanded path {tool['path_rms_mm']:.4f} mm rms,"
-            f" {tool['path_max_mm']:.4f} mm at most"
+            f"deviation from the commanded path {tool['path_rms_mm']:.4f} mm rms,"
+            f" {tool['path_max_mm']:.4f} mm maximum"
         )
     if tool["rp_mm"] is not None:
-        repeats = f"{tool['rp_mm']:.4f} mm" if random else "- (nothing is random)"
+        repeats = (
+            f"{tool['rp_mm']:.4f} mm"
+            if random
+            else "- (the scene has no random effects)"
+        )
         parts.append(f"AP {tool['ap_mm']:.4f} mm, RP {repeats}")
     elif tool["ap_mm"] is not None:
-        parts.append(f"{tool['ap_mm']:.4f} mm at the end")
+        parts.append(f"error at the end {tool['ap_mm']:.4f} mm")
     for key, name in (("at_mm", "AT"), ("rt_mm", "RT")):
         if tool.get(key) is not None:
             parts.append(f"{name} {tool[key]:.4f} mm")
@@ -329,6 +352,6 @@ def tool_line(tool: dict[str, Any], *, random: bool) -> str:
 
 
 def _orders(unresolved: list[dict[str, Any]]) -> str:
-    """Orders that were left out, the first few."""
+    """The first three orders that the step does not resolve, as text."""
     names = [f"{left['order']:.4g}" for left in unresolved]
     return " ".join(names[:3] + (["..."] if len(names) > 3 else [])) or "-"

@@ -1,4 +1,4 @@
-"""``swgjoint schema``: every key of an input file."""
+"""``swgjoint schema``: list every key of an input file."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from typing import Any
 
 KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
 WIDTH = 88
+"""Width of the list in characters."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Kind of file."""
+    """Add the kind of file."""
     parser.epilog = (
-        "With --json: the JSON Schema (draft 2020-12), for editors and checkers of"
-        " TOML; units are under 'unit'. Without: the keys as a list."
+        "With --json, the output is a JSON Schema (draft 2020-12) for TOML editors and"
+        " validators, with the unit of each key under 'unit'. Without --json, the keys"
+        " are listed as text."
     )
     parser.add_argument(
         "kind",
         choices=KINDS,
-        help="spec: limits for compare; lot: limits for lot; optimise: search file",
+        help="kind of file; spec: limits for compare; lot: limits for lot; optimise:"
+        " search file for optimise",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """The schema.
+    """Return the schema of one kind of file.
 
     Returns:
         JSON Schema with ``unit``, range, ``default`` and ``description`` of each key.
@@ -35,7 +38,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """One line for each key, its meaning below."""
+    """Format one line per key, followed by its meaning."""
     from swgjoint.explore.schema import described_keys
     from swgjoint.json_text import json_text
 
@@ -47,8 +50,8 @@ def report(result: dict[str, Any]) -> str:
             parts.append("required")
         elif default is not None:
             parts.append(f"default {json_text(default, indent=None)}")
-        of = f" (kind {one['of_kind']})" if one["of_kind"] else ""
-        lines.append(f"{one['key']}{of}: {', '.join(filter(None, parts))}")
+        kind = f" (kind {one['of_kind']})" if one["of_kind"] else ""
+        lines.append(f"{one['key']}{kind}: {', '.join(filter(None, parts))}")
         lines += textwrap.wrap(
             one["meaning"], WIDTH, initial_indent="    ", subsequent_indent="    "
         )

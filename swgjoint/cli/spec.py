@@ -1,4 +1,4 @@
-"""``swgjoint spec``: catalogue-style sheet of a design, map or catalogue drive."""
+"""``swgjoint spec``: data sheet of a design, a map or a catalogue drive."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ if TYPE_CHECKING:
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 _SHOWN_ORDERS = 6
+"""Largest number of orders in the table."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Drive, fidelity, keys, output folder."""
+    """Add the arguments: drive, fidelity, keys, measured loop, output folder."""
     parser.add_argument(
         "drive",
         metavar="FILE|DESIGN|NAME",
-        help="map (.swg), design file or bundled name, catalogue name (CSG-25-100)",
+        help="map (.swg), design file, bundled name, or catalogue name (CSG-25-100)",
     )
     parser.add_argument(
         "--model",
@@ -32,45 +33,45 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only",
         metavar="KEY,...",
-        help="compute only what these keys need: ratings need no finite elements;"
-        " stiffness, hysteresis loss and lost motion need few positions and no"
-        " manufacturing errors; radial stiffness and fatigue safety factor need"
-        " the 3D model; the ratcheting torque is computed only if it is named"
-        " here",
+        help="compute only these keys: ratings need no finite elements; stiffness,"
+        " hysteresis loss and lost motion need few positions and no manufacturing"
+        " errors; radial stiffness and fatigue safety factor need the 3D model; the"
+        " ratcheting torque is computed only if it is listed here",
     )
     parser.add_argument(
         "--measured",
         metavar="LOOP.csv",
-        help="compare the prediction with a measured torque-torsion loop (input"
-        " locked); columns torque_Nm and torsion_arcmin or torsion_rad",
+        help="compare the prediction with a torque-torsion loop that was measured with"
+        " the input locked; columns torque_Nm and torsion_arcmin or torsion_rad",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write spec.json and spec.png there, with --measured also measured.png",
+        help="write spec.json, spec.png and, with --measured, measured.png to this"
+        " folder",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Find or build the map and measure it.
+    """Load or build the map and evaluate it.
 
     Returns:
-        What :func:`swgjoint.drives.spec_sheet.spec_sheet` says, and ``files``.
+        The result of :func:`swgjoint.drives.spec_sheet.measure_drive`, and ``files``.
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.drives.spec_sheet import measure_drive
 
-    found = measure_drive(
+    measured = measure_drive(
         args.drive,
         model=args.model,
         only=[] if args.only is None else [k.strip() for k in args.only.split(",")],
         measured=args.measured,
         progress=args.progress,
     )
-    wall = found.result.pop("wall_s")
-    result = {**found.result, "files": [], "wall_s": wall}
+    wall = measured.result.pop("wall_s")
+    result = {**measured.result, "files": [], "wall_s": wall}
     if folder is not None:
-        _write(folder, result, found.sheet, found.overlay)
+        _write(folder, result, measured.sheet, measured.overlay)
     return result
 
 
@@ -92,7 +93,7 @@ def _write(
 
 
 def report(result: dict[str, Any]) -> str:
-    """Values with units, the strongest orders, and missing values with reasons."""
+    """Format the values, the strongest orders, remarks and missing values."""
     from swgjoint.gear.catalogue_stated import LOSS_KEYS
     from swgjoint.maps.sheet.spec_sheet import KEYS, TURN_KEYS
 
@@ -113,7 +114,7 @@ def report(result: dict[str, Any]) -> str:
             "transmission_error_arcmin",
             "ripple_percent",
         )
-        lines.append("strongest orders per input turn, zero to peak:")
+        lines.append("strongest orders per input turn, amplitude zero to peak:")
         lines.append(
             table(
                 [
@@ -125,14 +126,14 @@ def report(result: dict[str, Any]) -> str:
         )
     error = result["validity"].get("kinematic_error", "none")
     if error not in ("none", "given") and any(key in result for key in TURN_KEYS):
-        lines.append(f"kinematic error, of which accuracy and ripple follow, {error}")
+        lines.append(f"kinematic error (determines accuracy and ripple): {error}")
     friction = result["validity"].get("friction", "none")
     if friction != "none" and any(key in result for key in LOSS_KEYS):
         speed = result["validity"]["running_speed_rpm"]
         lines.append(
-            "losses at the input, back driving at the output; running torque and"
-            f" efficiency at {speed:g} rpm, efficiency at rated torque; friction from"
-            f" {friction}"
+            "losses are stated at the input, the back-driving torque at the output;"
+            f" running torque and efficiency are at {speed:g} rpm, the efficiency at"
+            f" rated torque; source of the friction: {friction}"
         )
     lines += [*result["validation_notes"], *doubts(result)]
     lines += _details(result)
@@ -147,52 +148,53 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _details(result: dict[str, Any]) -> list[str]:
-    """Background of the values computed with the 3D model."""
+    """Format the details of stiffness, ratcheting, running torque and fatigue."""
     lines = []
     if radial := result.get("radial_stiffness"):
         bent = radial["large_rotations"]
         lines.append(
-            "radial stiffness at mid-face, boss clamped; open edge"
-            f" {radial['open_edge_N_mm']:.4g}, load spread over the face width"
-            f" {radial['spread_over_face_width_N_mm']:.4g}, large rotations"
-            f" {bent['outward_N_mm']:.4g} pulled and {bent['inward_N_mm']:.4g} pressed"
-            f" by {bent['force_N']:.3g} N, finer displacements"
+            "radial stiffness: load at mid-face, boss clamped; for comparison [N/mm]:"
+            f" open edge {radial['open_edge_N_mm']:.4g}, load distributed over the face"
+            f" width {radial['spread_over_face_width_N_mm']:.4g}, large rotations under"
+            f" {bent['force_N']:.3g} N {bent['outward_N_mm']:.4g} outward and"
+            f" {bent['inward_N_mm']:.4g} inward, higher-order displacements"
             f" {radial['finer_displacements_N_mm']:.4g}, half the elements"
-            f" {radial['half_the_elements_N_mm']:.4g}, smooth shell"
-            f" {radial['smooth_shell_N_mm']:.4g} N/mm"
+            f" {radial['half_the_elements_N_mm']:.4g}, smooth shell without teeth"
+            f" {radial['smooth_shell_N_mm']:.4g}"
         )
     if path := result.get("ratcheting"):
-        so_far = "" if path["passed"] else "the search ended with the "
+        end = "" if path["passed"] else "; the search ended before a maximum"
         lines.append(
-            f"ratcheting: {so_far}torque largest after"
-            f" {path['at_largest_pitches']:.3g} of a pitch with"
-            f" {path['at_largest_pairs']} teeth in contact, wave generator rigid and"
-            " locked, 2D model"
+            "ratcheting: the torque is largest after"
+            f" {path['at_largest_pitches']:.3g} of a pitch, with"
+            f" {path['at_largest_pairs']} teeth in contact; 2D model with a rigid and"
+            f" locked wave generator{end}"
         )
     if slow := result.get("running"):
         lines.append(
-            "running and starting torque: slow, Coulomb friction"
-            f" {slow['coefficient']:g} of the teeth ({100.0 * slow['teeth_share']:.3g}"
-            " %) and of the rim on its race, a lower bound; left out:"
-            f" {slow['left_out']}"
+            "running and starting torque: a lower bound for slow rotation, from Coulomb"
+            f" friction ({slow['coefficient']:g}) at the teeth"
+            f" ({100.0 * slow['teeth_share']:.3g} %) and between rim and race; not"
+            f" included: {slow['left_out']}"
         )
-    if found := result.get("fatigue"):
-        worst, middle = found["worst_section"], found["mid_face"]
+    if fatigue := result.get("fatigue"):
+        worst, middle = fatigue["worst_section"], fatigue["mid_face"]
         lines.append(
-            f"fatigue at {found['torque_Nm']:.4g} N·m, nominal stress at the roots"
-            f" times concentration factors: least at z = {worst['z_mm']:.3g} mm"
-            f" ({worst['normal_amplitude_MPa']:.3g} MPa around), {middle['S']:.3g} at"
-            f" mid-face ({middle['normal_amplitude_MPa']:.3g} MPa); without factors,"
-            f" from the peak there {found['S_without_factors_mid_face']:.3g};"
-            f" shell theory {found['shell_theory']['S']:.3g}"
+            f"fatigue safety factor at {fatigue['torque_Nm']:.4g} N·m, from nominal"
+            " root stress times concentration factors: smallest at"
+            f" z = {worst['z_mm']:.3g} mm (circumferential stress amplitude"
+            f" {worst['normal_amplitude_MPa']:.3g} MPa); {middle['S']:.3g} at mid-face"
+            f" ({middle['normal_amplitude_MPa']:.3g} MPa), there"
+            f" {fatigue['S_without_factors_mid_face']:.3g} from the peak stress without"
+            f" factors; shell theory {fatigue['shell_theory']['S']:.3g}"
         )
     return lines
 
 
 def _laid(found: dict[str, Any]) -> list[str]:
-    """The measured loop compared with the prediction."""
+    """Format the comparison of the measured loop with the prediction."""
     low, high = found["torque_range_Nm"]
-    beyond = "; it leaves the torques of the map" if found["beyond_range"] else ""
+    beyond = ", beyond the torque range of the map" if found["beyond_range"] else ""
     rows = [
         (
             f"{row['segment']}, {row['from_Nm']:.4g} to {row['to_Nm']:.4g} N·m",
@@ -222,20 +224,23 @@ def _laid(found: dict[str, Any]) -> list[str]:
         (words(key)[0], *(found[key][which] for which in ("measured", "predicted")))
         for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin")
     ]
-    lines.append(table(pairs, header=("arcmin", "measured", "predicted")))
+    lines.append(table(pairs, header=("[arcmin]", "measured", "predicted")))
     return [*lines, *(f"warning: {line}" for line in found["warnings"])]
 
 
 def _source(result: dict[str, Any]) -> str:
+    """Level, validation and restrictions of the map, as text."""
     validity = result["validity"]
     text = f"level {validity['level']}"
     if result["validation"] is None and validity["level"] != "design":
         text += f"; {result['validation_reason'].partition(':')[0]}"
     if validity.get("beyond_range"):
         low, high = validity["torque_range_Nm"]
-        text += f"; loop leaves the sampled {low:.4g} to {high:.4g} N·m: continued"
+        text += (
+            f"; loop extrapolated beyond the sampled range, {low:.4g} to {high:.4g} N·m"
+        )
     if "stress_state" in validity:
         text += f"; {validity['stress_state']}"
     if "manufacturing_errors" in validity:
-        text += "; manufacturing errors left out"
+        text += "; without manufacturing errors"
     return text

@@ -1,4 +1,4 @@
-"""``swgjoint stability``: the joint on stiff and extreme cases."""
+"""``swgjoint stability``: numerical stability of stiff and extreme joints."""
 
 from __future__ import annotations
 
@@ -13,17 +13,21 @@ MAX_JOBS = 256
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Size of the grid, processes, output folder."""
+    """Add the arguments: size of the grid, processes, output folder."""
     parser.add_argument(
         "--full",
         action="store_true",
-        help="the whole grid of stiffness, inertias and steps instead of a part",
+        help="run the whole grid of stiffnesses, inertias and steps instead of a part",
     )
     parser.add_argument(
-        "--jobs", type=int, default=2, metavar="N", help="processes; default 2"
+        "--jobs",
+        type=int,
+        default=2,
+        metavar="N",
+        help="number of processes; default 2",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write the table and the picture there"
+        "--out", metavar="DIR", help="write the table and the plot to this folder"
     )
 
 
@@ -31,7 +35,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the study.
 
     Returns:
-        See :func:`swgjoint.bench.stability.stability.run_stability`.
+        The result of :func:`swgjoint.bench.stability.stability.run_stability`.
+
+    Raises:
+        InputError: If ``--jobs`` is out of range.
     """
     if not 1 <= args.jobs <= MAX_JOBS:
         raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
@@ -44,7 +51,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Outcomes by situation and scheme, then what they add up to."""
+    """Format the number of outcomes by situation and scheme, then a summary."""
     from swgjoint.bench.stability.rows import OUTCOMES
     from swgjoint.bench.stability.stability import summary
 
@@ -59,5 +66,5 @@ def report(result: dict[str, Any]) -> str:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if a run failed without reporting it."""
+    """Return 1 if a run failed without reporting it, else 0."""
     return int(bool(result["unexplained"]))

@@ -13,53 +13,62 @@ from swgjoint.validation.runner import STUDIES, run_study
 
 MAX_JOBS = 256
 LEAST_INERTIA, MOST_INERTIA = 1e-9, 1e6
-"""Of a rotor or a load [kg·m²]."""
+"""Bounds on the inertia of a rotor or a load [kg·m²]."""
 MAX_SEEDS = 10_000
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Study, its parts, processes, output folder."""
+    """Add the arguments: study, parts, options of single studies, output folder."""
     listing = "; ".join(f"{name}: {study.title}" for name, study in STUDIES.items())
     parser.add_argument("name", metavar="NAME", choices=STUDIES, help=listing)
     parser.add_argument(
         "--only",
         metavar="PART,...",
-        help="run these sections or tables of the source; response and control:"
-        " these drives",
+        help="run only these sections or tables of the source; for response and"
+        " control: only these drives",
     )
     parser.add_argument(
-        "--model", choices=("2d", "3d"), help="fidelity; default: that of the study"
+        "--model",
+        choices=("2d", "3d"),
+        help="fidelity; the default depends on the study",
     )
     parser.add_argument(
-        "--jobs", type=int, default=2, metavar="N", help="processes; default 2"
+        "--jobs",
+        type=int,
+        default=2,
+        metavar="N",
+        help="number of processes; default 2",
     )
     parser.add_argument(
         "--load-inertia",
         type=float,
         metavar="KGM2",
-        help="response: of the load about the output [kg·m²]; default: the rotor's,"
-        " seen from there",
+        help="response: inertia of the load about the output [kg·m²]; default: inertia"
+        " of the rotor reflected to the output",
     )
     parser.add_argument(
         "--rotor-inertia",
         type=float,
         metavar="KGM2",
-        help="response: of motor rotor and wave generator about the input [kg·m²];"
-        " default 1e-4",
+        help="response: inertia of motor rotor and wave generator about the input"
+        " [kg·m²]; default 1e-4",
     )
     parser.add_argument(
         "--closed-form",
         action="store_true",
-        help="response: frequencies from stiffness and inertias alone, at once",
+        help="response: only compute the frequencies in closed form from stiffness and"
+        " inertias, without simulation",
     )
     parser.add_argument(
         "--seeds",
         type=int,
         metavar="N",
-        help="control: specimens of a drive; default 10, a minute each",
+        help="control: number of specimens of each drive; default 10, a minute each",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write the tables, the report and the plots there"
+        "--out",
+        metavar="DIR",
+        help="write the tables, the report and the plots to this folder",
     )
 
 
@@ -68,8 +77,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``study``, ``rows`` (each with ``case``, ``quantity``, ``unit``,
-        ``source_value``, ``ours``, ``converged``, ``reason`` and the study's own
-        columns), the study's own keys, ``summary``, ``files``, ``wall_s``.
+        ``source_value``, ``ours``, ``converged``, ``reason`` and columns of the single
+        study), keys of the single study, ``summary``, ``files``, ``wall_s``.
+
+    Raises:
+        InputError: If an option is out of range or does not apply to the study.
     """
     start = time.perf_counter()
     if not 1 <= args.jobs <= MAX_JOBS:
@@ -77,7 +89,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     _check_response_options(args)
     if args.seeds is not None and args.name != "control":
         raise InputError(
-            f"--seeds {args.seeds} of study {args.name}, which draws no specimens;"
+            f"--seeds {args.seeds} with study {args.name}, which draws no specimens;"
             " accepted: with study control"
         )
     if args.seeds is not None and not 1 <= args.seeds <= MAX_SEEDS:
@@ -85,7 +97,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.validation.rows import StudyOptions
 
-    found = run_study(
+    study = run_study(
         args.name,
         StudyOptions(
             only=tuple(p.strip() for p in (args.only or "").split(",") if p.strip()),
@@ -101,16 +113,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     )
     return {
         "study": args.name,
-        "rows": [row.to_json() for row in found.rows],
-        **found.more,
-        "summary": list(found.summary),
-        "files": list(found.files),
+        "rows": [row.to_json() for row in study.rows],
+        **study.more,
+        "summary": list(study.summary),
+        "files": list(study.files),
         "wall_s": time.perf_counter() - start,
     }
 
 
 def _check_response_options(args: argparse.Namespace) -> None:
-    """Inertias are positive, and options of the response belong to it."""
+    """Check that options of ``response`` are used with it and are in range."""
     given = {
         "load-inertia": args.load_inertia,
         "rotor-inertia": args.rotor_inertia,
@@ -118,7 +130,9 @@ def _check_response_options(args: argparse.Namespace) -> None:
     }
     named = [key for key, value in given.items() if value is not None]
     if named and args.name != "response":
-        raise InputError(f"--{named[0]} with {args.name}; accepted: with response")
+        raise InputError(
+            f"--{named[0]} with study {args.name}; accepted: with study response"
+        )
     for key in named:
         value = given[key]
         if value is not True and not LEAST_INERTIA <= value <= MOST_INERTIA:
@@ -129,9 +143,9 @@ def _check_response_options(args: argparse.Namespace) -> None:
 
 
 def report(result: dict[str, Any]) -> str:
-    """All rows, then what they add up to."""
+    """Format all rows, then the summary."""
     keys = ("case", "quantity", "unit", "source_value", "ours", "converged")
-    header = ("case", "quantity", "unit", "source", "ours", "converged")
+    header = ("case", "quantity", "unit", "source", "swgjoint", "converged")
     rows = [[row[key] for key in keys] for row in result["rows"]]
     lines = [table(rows, header=header), "", *result["summary"]]
     lines += [f"wrote {name}" for name in result["files"]]

@@ -1,4 +1,4 @@
-"""``swgjoint sweep``: evaluate many designs and keep each result."""
+"""``swgjoint sweep``: evaluate many designs and store each result."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ if TYPE_CHECKING:
     from swgjoint.explore.sweep.sweep import SweepResult
 
 SHOWN = 40
-"""Rows of the table in the terminal."""
+"""Largest number of rows of the table in the terminal."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Sweep file, where it is computed, where results are kept."""
+    """Add the arguments: sweep file, executor, store of the results."""
     parser.epilog = "Repeat the same command to resume an interrupted sweep."
     parser.add_argument("file", metavar="FILE", help="sweep file or bundled name")
     configure_places(
         parser,
-        out="keep results there, with sweep.csv, sweep.parquet, sweep.png and"
-        " sweep.json",
+        out="store the results in this folder, and write sweep.csv, sweep.parquet,"
+        " sweep.png and sweep.json",
     )
     parser.add_argument(
         "--retry-failed",
         action="store_true",
-        help="recompute designs that failed in an earlier run; designs lost with a"
-        " terminated process are always recomputed",
+        help="recompute designs that failed in an earlier run; designs whose process"
+        " was terminated are always recomputed",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Compute what is not kept yet.
+    """Compute the designs whose results are not stored yet.
 
     Returns:
-        ``designs``, ``done`` (with figures), ``failed`` (without), ``reused`` (of
-        both, kept from earlier runs), ``computed`` in this run, ``workers``,
-        ``work_s``, ``wall_s``, ``efficiency`` (work over wall time and workers),
-        ``parameters``, ``figures``, ``validity`` (by task), ``rows``, ``files``.
+        Numbers of designs: ``designs`` (all), ``done`` (with figures), ``failed``
+        (without figures), ``reused`` (stored by earlier runs, failed or not) and
+        ``computed`` (in this run). Also ``workers``, ``work_s``, ``wall_s``,
+        ``efficiency`` (work divided by wall time and workers), ``parameters``,
+        ``figures``, ``validity`` (by task), ``rows``, ``files``.
     """
     from swgjoint.explore.sweep.file import SweepFile
     from swgjoint.explore.sweep.sweep import run_sweep
@@ -50,45 +51,47 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     place, executor_of = places_of(args)
     file = SweepFile.load(args.file)
     with executor_of(file) as executor:
-        found = run_sweep(
+        outcome = run_sweep(
             file,
             executor=executor,
             place=place,
             retry_failed=args.retry_failed,
             progress=args.progress,
         )
-    result = {"sweep": args.file, **found.to_json(), "files": []}
+    result = {"sweep": args.file, **outcome.to_json(), "files": []}
     if args.out is not None and place is not None:
-        result["files"] = _write(place, found, result)
+        result["files"] = _write(place, outcome, result)
     return result
 
 
-def _write(place: ResultStore, found: SweepResult, result: dict[str, Any]) -> list[str]:
-    """One row a design as tables, the picture, and the whole as JSON."""
+def _write(
+    place: ResultStore, outcome: SweepResult, result: dict[str, Any]
+) -> list[str]:
+    """Write the tables with one row per design, a plot and JSON."""
     from swgjoint.explore.sweep.results import parquet_bytes, write_to
     from swgjoint.view.plots.sweep import sweep_picture
 
-    rows = found.rows()
+    rows = outcome.rows()
     files = write_to(
         place,
         {
             "sweep.csv": csv_text(rows).encode,
             "sweep.parquet": lambda: parquet_bytes(rows),
-            "sweep.png": lambda: sweep_picture(found),
+            "sweep.png": lambda: sweep_picture(outcome),
         },
     )
-    last = "sweep.json"  # which names them all
+    last = "sweep.json"  # written last, because it lists the other files
     content = {**result, "files": [*files, place.path_of(last)]}
     return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where no design at all has figures; single failures are rows."""
+    """Return 1 if no design has figures, else 0; single failures are only reported."""
     return int(result["done"] == 0)
 
 
 def report(result: dict[str, Any]) -> str:
-    """One line a design, failures with their reason, then the counts."""
+    """Format one line per design, ranges, failures with reasons, and the counts."""
     names = [*result["parameters"], *result["figures"]]
     rows = result["rows"]
     shown = rows if len(rows) <= SHOWN else rows[: SHOWN - 1]
@@ -107,7 +110,9 @@ def report(result: dict[str, Any]) -> str:
         )
     ]
     if len(shown) < len(rows):
-        lines.append(f"... and {len(rows) - len(shown)} more, all with --out DIR")
+        lines.append(
+            f"... and {len(rows) - len(shown)} more rows; --out DIR writes all of them"
+        )
     lines += _ranges(result)
     reasons: dict[str, list[int]] = {}
     for k, row in enumerate(rows):
@@ -117,11 +122,15 @@ def report(result: dict[str, Any]) -> str:
         more = ", ..." if len(numbers) > 8 else ""
         lines.append(f"{', '.join(map(str, numbers[:8]))}{more}: {reason}")
     for task, label in result["validity"].items():
-        absent = [f"{part}: {what}" for part, what in label["not_modelled"].items()]
-        told = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
-        lines.append(f"validity of {task}: {told}")
+        absent = [f"{part}: {why}" for part, why in label["not_modelled"].items()]
+        text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
+        lines.append(f"validity of {task}: {text}")
     share = result["efficiency"]
-    busy = "" if share is None else f", {100 * share:.0f} % of {result['workers']} busy"
+    busy = ""
+    if share is not None:
+        busy = (
+            f"; {result['workers']} workers were busy {100 * share:.0f} % of the time"
+        )
     lines.append(
         f"{result['done']} designs done, {result['failed']} failed; {result['reused']}"
         f" of them reused, {result['computed']} computed in {result['wall_s']:.1f} s"
@@ -135,13 +144,13 @@ def _short(value: Any) -> Any:
 
 
 def _ranges(result: dict[str, Any]) -> list[str]:
-    """Least and largest value of every figure, and the rows that have them."""
-    found = []
+    """Format the smallest and largest value of every figure with their rows."""
+    ranges = []
     for name in result["figures"]:
         values = [(r[name], k + 1) for k, r in enumerate(result["rows"])]
         numbers = [(v, k) for v, k in values if v is not None]
         if len(numbers) > 1:
             (low, at_low), (high, at_high) = min(numbers), max(numbers)
-            found.append((name, low, at_low, high, at_high))
-    header = ("", "least", "in row", "largest", "in row")
-    return ["", table(found, header=header), ""] if found else []
+            ranges.append((name, low, at_low, high, at_high))
+    header = ("", "smallest", "in row", "largest", "in row")
+    return ["", table(ranges, header=header), ""] if ranges else []

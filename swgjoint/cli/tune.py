@@ -1,4 +1,4 @@
-"""``swgjoint tune``: gains of a controller, against a textbook rule."""
+"""``swgjoint tune``: tune controller gains and compare them with a textbook rule."""
 
 from __future__ import annotations
 
@@ -10,30 +10,32 @@ from swgjoint.files import output_folder
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Environment, controller, optimiser, budget and where results go."""
+    """Add the arguments: environment, controller, optimiser, budget, output folder."""
     parser.add_argument(
-        "environment", metavar="ENV", help="environment: JointTracking-v0"
+        "environment", metavar="ENV", help="environment, such as JointTracking-v0"
     )
     parser.add_argument(
         "--controller",
         metavar="NAME",
         default="pd-flexible",
-        help="pd, pd-feedforward or pd-flexible (default)",
+        help="controller to tune: pd, pd-feedforward or pd-flexible (default)",
     )
     parser.add_argument(
         "--optimiser",
         metavar="NAME",
         default="de",
-        help="de: differential evolution (default); cma: CMA-ES; optuna: TPE",
+        help="optimiser: de (differential evolution, default), cma (CMA-ES) or optuna"
+        " (TPE)",
     )
     parser.add_argument(
-        "--minutes", type=float, metavar="M", help="wall time; default 3"
+        "--minutes", type=float, metavar="M", help="wall time [min]; default 3"
     )
     parser.add_argument(
         "--evaluations",
         type=int,
         metavar="N",
-        help="candidates instead of minutes: the same result on every machine",
+        help="number of candidates; replaces --minutes and makes the result independent"
+        " of the speed of the machine",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="S", help="random seed; default 0"
@@ -44,30 +46,31 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="overrides",
-        help="an argument of the environment, e.g. drive=CSG-20-100 or"
+        help="set an argument of the environment, e.g. drive=CSG-20-100 or"
         " randomise=false; repeatable",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write report.html, tune.png, tune.json there, and tune.npz after every"
-        " generation, from which the same command goes on after a stop",
+        help="write report.html, tune.png and tune.json to this folder, and after every"
+        " generation tune.npz, from which the same command resumes after an"
+        " interruption",
     )
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="require tune.npz in --out and resume from it; without this option, a"
-        " tune.npz with the same settings is resumed as well",
+        help="require tune.npz in --out DIR and resume from it; without this option, a"
+        " tune.npz with the same settings is resumed if there is one",
     )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Tune.
+    """Tune the gains.
 
     Returns:
         ``best`` and ``baseline`` (``parameters``, ``gains``, ``held_out_cost_arcmin``
-        and more), ``evaluations``, ``improvement_percent``, ``candidates`` (also PD
-        with its gains alone tuned, and the controller without tuning), ``summary``,
+        and more), ``evaluations``, ``improvement_percent``, ``candidates`` (including
+        PD with only its gains tuned, and the untuned controller), ``summary``,
         ``seeds``, ``bounds``, ``files``, ``wall_s`` and the settings.
     """
     folder = output_folder(args.out) if args.out else None
@@ -85,13 +88,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         seed=args.seed,
         arguments=dict(map(parse_override, args.overrides)),
     )
-    found = tune(settings, folder=folder, resume=args.resume, progress=args.progress)
-    files = write_files(found, folder) if folder is not None else []
-    return found.to_json() | {"summary": claims(found), "files": files}
+    tuned = tune(settings, folder=folder, resume=args.resume, progress=args.progress)
+    files = write_files(tuned, folder) if folder is not None else []
+    return tuned.to_json() | {"summary": claims(tuned), "files": files}
 
 
 def report(result: dict[str, Any]) -> str:
-    """The candidates, their gains, and what they add up to."""
+    """Format the candidates, the best gains and the summary."""
     rows = [
         (
             one["name"],
@@ -102,7 +105,13 @@ def report(result: dict[str, Any]) -> str:
         )
         for one in result["candidates"]
     ]
-    header = ("", "held-out [arcmin]", "spread", "training [arcmin]", "less [%]")
+    header = (
+        "",
+        "held-out cost [arcmin]",
+        "spread [arcmin]",
+        "training cost [arcmin]",
+        "improvement [%]",
+    )
     best = result["best"]
     gains = [*best["parameters"].items(), *best["gains"].items()]
     lines = [

@@ -1,4 +1,4 @@
-"""``swgjoint view``: open a recording, native or as a page on this machine."""
+"""``swgjoint view``: open a recording in the native viewer or a web page."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from urllib.parse import quote
 from swgjoint.errors import InputError
 
 RRD_MAGIC = (b"RRF", b"RRIO")
-"""First bytes of a recording, compressed or not."""
+"""First bytes of a recording, compressed or uncompressed."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Recording, and where to show it."""
-    parser.add_argument("file", metavar="FILE.rrd", help="recording")
+    """Add the arguments: recording, kind of viewer."""
+    parser.add_argument("file", metavar="FILE.rrd", help="recording to open")
     parser.add_argument(
         "--web",
         action="store_true",
-        help="serve a page on loopback; default where there is no display",
+        help="serve the viewer as a web page on the loopback interface; default on a"
+        " machine without display",
     )
 
 
@@ -29,8 +30,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Start the viewer in the background.
 
     Returns:
-        ``url`` (None for the native viewer) and ``pid`` of the viewer; ending that
-        process ends the page.
+        ``file``, ``url`` (None for the native viewer) and ``pid``, the process ID of
+        the viewer. Ending that process ends the viewer.
+
+    Raises:
+        InputError: If the file cannot be read or is no recording.
     """
     path = _recording(args.file)
     from swgjoint.view.recording.viewer import (
@@ -56,12 +60,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Where to look, and how to end it."""
+    """Format where the recording is shown and how to end the viewer."""
     where = result["url"] or "the rerun viewer"
-    return f"{result['file']}: {where}\nend it with: kill {result['pid']}"
+    return f"{result['file']}: {where}\nto end the viewer: kill {result['pid']}"
 
 
 def _recording(name: str) -> Path:
+    """Path of a recording that exists and has the right format."""
     path = Path(name)
     try:
         with path.open("rb") as file:

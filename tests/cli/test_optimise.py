@@ -86,9 +86,7 @@ def test_json_and_files(file, tmp_path, capsys):
     found = {path.name for path in out.glob("front*")}
     assert found == {*fronts, "front-ours.toml"}
     told = capsys.readouterr().out
-    assert (
-        "12 designs tried in 2 generations, 0 of them without figures; 0 comp" in told
-    )
+    assert "12 designs tried in 2 generations, 0 failed; 0 comp" in told
     assert "volume_cm3: minimise, length_mm: maximise" in told
     assert "*: confirmed" in told
 

@@ -155,7 +155,7 @@ def test_a_run_says_into_how_many_parts_its_steps_are_cut(bench):
     [(joint, what)] = run.contains["sub_stepped_for"].items()
     assert joint == "joint" and "fastest torsion frequency under RK4" in what
     result = {"scene": "s", **run.metrics(), "contains": run.contains, "files": []}
-    assert f"every step in {n} sub-steps" in report(result)
+    assert f"every step is divided into {n} sub-steps" in report(result)
     json.dumps(result)
     inside = bench(STIFF)
     assert inside.contains["sub_steps"] == 1

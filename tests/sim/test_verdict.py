@@ -218,7 +218,7 @@ def test_a_ripple_that_the_step_cannot_carry_is_unknown_rather_than_none(
     joints["joint"]["ripple_missing"] = "the step resolves none of its orders"
     (line,) = [text for text in notes(joints) if text.startswith("-:")]
     assert line == (
-        "-: no figure for the torque ripple: the step resolves none of its orders"
+        "-: no value for the torque ripple: the step resolves none of its orders"
     )
 
 
