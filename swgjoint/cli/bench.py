@@ -32,12 +32,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=(*PARTS, "all"),
         default="fe",
-        help=f"{listing}; all: all parts in turn; default %(default)s",
+        help=f"{listing}; all: all parts in turn; default: %(default)s",
     )
     parser.add_argument(
         "--design",
         metavar="DESIGN",
-        help=f"fe: design with a cup; default {DESIGN}; for other designs the slow"
+        help=f"fe: design with a cup; default: {DESIGN}; for other designs the slow"
         " settings are skipped",
     )
     parser.add_argument(

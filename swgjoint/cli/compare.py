@@ -15,7 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: drives or levels, scene, sorting, limits, output folder."""
     parser.add_argument(
         "arguments",
-        metavar="A",
+        metavar="DRIVE|LEVEL",
         nargs="+",
         help="drives (designs, .swg maps, catalogue names) or model levels such as"
         " full",
@@ -26,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="bench",
         help="scene file, MJCF or URDF file of an arm, or bundled name; an arm is moved"
         " through a slow sweep and gets default drives in the joints that are not"
-        " compared; default bench",
+        " compared; default: bench",
     )
     parser.add_argument(
         "--joints",
@@ -46,7 +46,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="change a key of the scene; repeatable",
     )
     parser.add_argument(
-        "--model", choices=("ring", "2d", "3d"), help="fidelity of designs"
+        "--model",
+        choices=("ring", "2d", "3d"),
+        help="fidelity of designs: ring (thin ring, fastest), 2d or 3d (finite"
+        " elements); default: 3d for a design with a cup, else 2d",
     )
     parser.add_argument(
         "--sort", metavar="KEY", help="sort by this quantity, best first"

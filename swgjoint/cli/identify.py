@@ -68,7 +68,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--window",
         type=float,
         metavar="S",
-        help="time over which samples are averaged [s]; default 0.005",
+        help="time over which samples are averaged [s]; default: 0.005",
     )
     parser.add_argument(
         "--out",

@@ -26,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=500,
         metavar="N",
-        help="number of drives in the lot; default %(default)s",
+        help="number of drives in the lot; default: %(default)s",
     )
     parser.add_argument(
         "--sizes",
@@ -39,7 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=int,
         default=1,
-        help="random seed of the first drive; default %(default)s",
+        help="random seed of the first drive; default: %(default)s",
     )
     parser.add_argument(
         "--spec",
@@ -52,7 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=2,
         metavar="N",
-        help="number of processes; default 2",
+        help="number of processes; default: 2",
     )
     parser.add_argument(
         "--out",

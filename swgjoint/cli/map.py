@@ -33,7 +33,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         choices=("ring", "2d", "3d"),
-        help="fidelity; default 3d for a design with a cup, else 2d",
+        help="fidelity: ring (thin ring, fastest), 2d or 3d (finite elements); default:"
+        " 3d for a design with a cup, else 2d",
     )
     parser.add_argument(
         "--no-fields",

@@ -19,7 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         choices=("2d", "3d"),
-        help="fidelity; default 3d for a design with a cup, else 2d",
+        help="finite-element model; default: 3d for a design with a cup, else 2d",
     )
     parser.add_argument(
         "--torque",
@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--steps",
         type=int,
         metavar="N",
-        help="number of wave-generator positions k TURNS/N, k = 0 to N-1; default 35,"
+        help="number of wave-generator positions k TURNS/N, k = 0 to N-1; default: 35,"
         " or the nearest number whose positions cover the tooth pitch evenly",
     )
     parser.add_argument(
@@ -39,7 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.5,
         metavar="TURNS",
-        help="simulated rotation of the input [turns]; default 0.5",
+        help="simulated rotation of the input [turns]; default: 0.5",
     )
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     model = args.model or default_model(design)
     if args.resume and (folder is None or model != "3d"):
         raise InputError(
-            "--resume; accepted: with a 3D model and with --out DIR of the run"
+            "--resume; accepted: with --model 3d and with --out DIR of the run"
         )
     meshing = simulate_meshing(
         design,

@@ -28,7 +28,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         choices=("ring", "2d", "3d"),
-        help="fidelity for a design; default 3d for a design with a cup, else 2d",
+        help="fidelity of a design: ring (thin ring, fastest), 2d or 3d (finite"
+        " elements); default: 3d for a design with a cup, else 2d",
     )
     parser.add_argument(
         "--only",

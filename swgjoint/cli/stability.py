@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=2,
         metavar="N",
-        help="number of processes; default 2",
+        help="number of processes; default: 2",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="write the table and the plot to this folder"

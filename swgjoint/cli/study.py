@@ -20,6 +20,11 @@ MAX_SEEDS = 10_000
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: study, parts, options of single studies, output folder."""
     listing = "; ".join(f"{name}: {study.title}" for name, study in STUDIES.items())
+    parser.epilog = (
+        "The thesis is E. Yague-Spaude, Computational Design, Simulation of Meshing,"
+        " and Stress Analysis of Strain Wave Gear Drives, Rochester Institute of"
+        " Technology, 2021."
+    )
     parser.add_argument("name", metavar="NAME", choices=STUDIES, help=listing)
     parser.add_argument(
         "--only",
@@ -37,7 +42,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=2,
         metavar="N",
-        help="number of processes; default 2",
+        help="number of processes; default: 2",
     )
     parser.add_argument(
         "--load-inertia",
@@ -51,7 +56,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="KGM2",
         help="response: inertia of motor rotor and wave generator about the input"
-        " [kg·m²]; default 1e-4",
+        " [kg·m²]; default: 1e-4",
     )
     parser.add_argument(
         "--closed-form",
@@ -63,7 +68,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--seeds",
         type=int,
         metavar="N",
-        help="control: number of specimens of each drive; default 10, a minute each",
+        help="control: number of specimens of each drive; default: 10, a minute each",
     )
     parser.add_argument(
         "--out",

@@ -28,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " (TPE)",
     )
     parser.add_argument(
-        "--minutes", type=float, metavar="M", help="wall time [min]; default 3"
+        "--minutes", type=float, metavar="M", help="wall time [min]; default: 3"
     )
     parser.add_argument(
         "--evaluations",
@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " of the speed of the machine",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="random seed; default 0"
+        "--seed", type=int, default=0, metavar="S", help="random seed; default: 0"
     )
     parser.add_argument(
         "--set",

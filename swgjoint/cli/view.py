@@ -21,7 +21,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--web",
         action="store_true",
-        help="serve the viewer as a web page on the loopback interface; default on a"
+        help="serve the viewer as a web page on the loopback interface; default: on a"
         " machine without display",
     )
 

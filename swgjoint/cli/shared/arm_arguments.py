@@ -24,7 +24,7 @@ OF_AN_ARM = {
 
 def add_arm_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that select joints, start pose and motion of an arm."""
-    group = parser.add_argument_group("for an arm, an MJCF or URDF file")
+    group = parser.add_argument_group("options for an arm (MJCF or URDF file)")
     group.add_argument(
         "--joints",
         metavar="NAME,PATTERN,...",
