@@ -121,6 +121,6 @@ def test_a_viewer_that_is_not_there_is_told():
 
 def test_a_pace_must_be_positive(run):
     """Zero and less are refused before anything starts."""
-    with pytest.raises(InputError, match=naming("pace 0", "> 0")):
+    with pytest.raises(InputError, match=naming("pace = 0", "> 0")):
         stream_runs({"": run}, pace=0.0)
     assert STARTED == []

@@ -1,1 +1,1 @@
-"""Runs as recordings for the rerun viewer."""
+"""Recordings of runs for the rerun viewer."""

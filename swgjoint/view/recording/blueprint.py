@@ -1,4 +1,4 @@
-"""Default layout of a recording: the arm, and tabs with plots of one joint each."""
+"""Default layout of a recording: a view of the arm and one tab of plots per joint."""
 
 from __future__ import annotations
 
@@ -18,28 +18,34 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 BACKGROUND = (30, 33, 38)
+"""RGB colour behind the arm."""
 TITLES = {
     "torsion_arcmin": "torsion [arcmin]",
     "transmission_error_arcmin": "transmission error [arcmin]",
     "output_torque_Nm": "output torque [N·m]",
-    "torque_deviation_Nm": "torque less that of the rigid arm [N·m]",
+    "torque_deviation_Nm": "torque minus that of the rigid arm [N·m]",
     "motor_torque_Nm": "motor torque [N·m]",
     "position_deg": "link angle [deg]",
     "reference_deg": "commanded angle [deg]",
 }
-"""Of the plots, by signal."""
+"""Titles of the plots by signal."""
 ZERO = ("torsion_arcmin", "transmission_error_arcmin", "torque_deviation_Nm")
-"""Signals that are a line at zero for a rigid arm, which would set the scale."""
+"""Signals that are zero for a rigid arm, which is therefore not drawn."""
 SPACING = 0.75
 """Distance between the arms of several runs [m]."""
 
 
 def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
-    """Layout for runs of one motion, see :mod:`swgjoint.view.recording.entities`.
+    """Layout for runs of one motion.
+
+    The entity paths are those of :mod:`swgjoint.view.recording.entities`.
 
     Args:
-        scenes: What was or will be run, by the name of the run.
-        joints: In the order of their tabs.
+        scenes: Scenes by name of the run.
+        joints: Names of the joints in the order of their tabs.
+
+    Returns:
+        A rerun blueprint.
     """
     import rerun.blueprint as rrb
 
@@ -134,16 +140,16 @@ def all_rigid(assembly: Assembly) -> bool:
 
 
 def has_torsion(transmission: Transmission) -> bool:
-    """Whether there is a spring between motor and link."""
+    """Whether a joint has compliance between motor and link."""
     return transmission.law is not None
 
 
 def joints_shown(scenes: Mapping[str, Assembly]) -> list[str]:
-    """Joints of the scene's layout; else all, the one most loaded first.
+    """Joints of the scene's layout; if it names none, all joints, most loaded first.
 
     The load is the largest torque of the rigid arm on the commanded motion over the
-    rated torque. A joint whose strongest order is left out comes after those that show
-    theirs. All of this is known before a run.
+    rated torque. Joints whose strongest order is not resolved come last. The order is
+    known before a run.
     """
     first = next(iter(scenes.values()))
     if first.scene.recording.joints:
@@ -162,9 +168,9 @@ def joints_shown(scenes: Mapping[str, Assembly]) -> list[str]:
 
 
 def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
-    """Joints, the one with the largest ripple first.
+    """All joints, sorted by decreasing ripple.
 
-    A joint whose strongest order is left out comes after those that show theirs.
+    Joints whose strongest order is not resolved come last.
     """
     first = next(iter(runs.values()))
     window = first.steady
@@ -182,12 +188,12 @@ def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
 
 
 def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
-    """Lines over time.
+    """View of lines over time.
 
     Args:
-        title: Of the view.
-        paths: One for each line.
-        signal: Component that is drawn; None for ``Scalars``.
+        title: Title of the view.
+        paths: Entity paths, one per line.
+        signal: Component to draw; None for ``Scalars``.
     """
     import rerun as rr
     import rerun.blueprint as rrb
@@ -204,7 +210,7 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
             source_component=signal,
         )
         drawn = {p: rr.SeriesLines().visualizer(mappings=[source]) for p in paths}
-    # where it comes by default if there is one line: what it says is in the title
+    # a single line keeps the default legend, because the title describes the line
     legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop) if len(paths) > 1 else None
     return rrb.TimeSeriesView(
         name=title,
@@ -216,7 +222,7 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
 
 
 def _drive(assembly: Assembly, joint: str, label: str) -> Any:
-    """The drive of a joint, seen along its axis."""
+    """View of the drive of a joint along its axis."""
     import rerun.blueprint as rrb
 
     fields = fields_of(assembly, joint)
@@ -233,7 +239,7 @@ def _drive(assembly: Assembly, joint: str, label: str) -> Any:
 
 
 def _eye(scenes: Mapping[str, Assembly]) -> Any:
-    """Camera that sees all arms: from the front, a little to the side and above."""
+    """Camera that shows all arms from the front, slightly from the side and above."""
     import rerun.blueprint as rrb
 
     model = next(iter(scenes.values())).arm.model

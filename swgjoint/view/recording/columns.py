@@ -1,7 +1,7 @@
-"""Columns of a recording, handed to the encoder as they are.
+"""Columns of a recording that are passed to the encoder without conversion.
 
-The ``columns`` methods of rerun's archetypes convert, copy and partition what they are
-given, which takes longer than encoding it.
+The ``columns`` methods of the rerun archetypes convert, copy and partition their
+arguments, which takes longer than the encoding.
 """
 
 from __future__ import annotations
@@ -14,29 +14,31 @@ from numpy.typing import NDArray
 
 
 class Column:
-    """Values of one component at the rows of a ``send_columns``."""
+    """Values of one component for the rows of a call of ``send_columns``."""
 
     def __init__(
         self, descriptor: Any, values: NDArray[Any], dtype: Any, *, each: int = 1
     ) -> None:
-        """Keep the values in the type of the component.
+        """Store the values in the number type of the component.
 
         Args:
-            descriptor: Of the component, such as ``rr.Scalars.descriptor_scalars()``.
-            values: Numbers (n_rows * each,), or vectors (n_rows * each, size).
-            dtype: Of the component's numbers.
-            each: Values in every row.
+            descriptor: Descriptor of the component, such as
+                ``rr.Scalars.descriptor_scalars()``.
+            values: Numbers of shape (n_rows * each,), or vectors of shape
+                (n_rows * each, size).
+            dtype: Number type of the component.
+            each: Number of values per row.
         """
         self._descriptor = descriptor
         self._values = np.ascontiguousarray(values, dtype=dtype)
         self._each = each
 
     def component_descriptor(self) -> Any:
-        """Which component it is, as rerun asks for it."""
+        """Descriptor of the component, part of the column protocol of rerun."""
         return self._descriptor
 
     def as_arrow_array(self) -> Any:
-        """One list a row, as rerun asks for it."""
+        """One list per row, part of the column protocol of rerun."""
         import pyarrow as pa
 
         array = pa.array(self._values.ravel())
@@ -54,11 +56,11 @@ class Numbers:
     """A row of numbers as one tensor, for a bar chart."""
 
     def __init__(self, values: NDArray[np.float64]) -> None:
-        """Keep the numbers, shape (n,)."""
+        """Store the numbers of shape (n,)."""
         self._values = np.ascontiguousarray(values, dtype=np.float64)
 
     def as_arrow_array(self) -> Any:
-        """One tensor, as rerun asks for it."""
+        """One tensor, part of the component protocol of rerun."""
         import pyarrow as pa
 
         fields, names, kinds, number, union = _empty_tensor()
@@ -81,10 +83,11 @@ class Numbers:
 
 @cache
 def _empty_tensor() -> tuple[list[Any], Any, list[Any], int, list[Any]]:
-    """Rerun's tensor without numbers.
+    """Parts of an empty rerun tensor.
 
-    Fields, names, arrays of the kinds of numbers, which of them holds 64-bit floats,
-    buffers of the union of the kinds.
+    Returns:
+        Fields, names, arrays by number type, index of the array for 64-bit floats, and
+        buffers of the union of the number types.
     """
     import rerun as rr
 

@@ -1,7 +1,8 @@
-"""Drives on the arm: a collar about every joint, coloured by its torque.
+"""Markers of the drives on the arm: a disc at every joint, coloured by its torque.
 
-Green without load, yellow at half of the repeated peak torque, red from there on. A
-collar stands out of the housing that it would else lie in; it is no drawing of a drive.
+A disc is green without load, yellow at half of the repeated peak torque and red from
+the full one. It is larger than the housing of the joint, so that it is visible; it does
+not show the size of the drive.
 """
 
 from __future__ import annotations
@@ -20,21 +21,21 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 RADIUS = 0.03
-"""Of a collar where no housing is found [m]."""
+"""Radius of a disc if no housing is found [m]."""
 PROUD = 1.12
-"""Radius of a collar over that of the housing."""
+"""Radius of a disc over that of the housing [-]."""
 WIDTH = 0.35
-"""Of a collar over its radius."""
+"""Width of a disc over its radius [-]."""
 _SCALE = np.array([[44, 160, 44], [240, 200, 30], [214, 39, 40]], dtype=float)
 
 
 def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
-    """A collar for every driven joint, on the body that the joint moves.
+    """Log a disc for every driven joint, attached to the body that the joint moves.
 
     Args:
-        stream: The recording.
-        prefix: Path of the run, with a slash at its end or empty.
-        assembly: Of the run.
+        stream: Rerun recording stream.
+        prefix: Path of the run with a trailing slash, or empty.
+        assembly: The scene of the run.
     """
     import rerun as rr
 
@@ -59,14 +60,14 @@ def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
 def send_loads(
     stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
 ) -> None:
-    """Colours of the collars at some samples.
+    """Send the colours of the discs at some samples.
 
     Args:
-        stream: The recording.
-        prefix: Path of the run.
+        stream: Rerun recording stream.
+        prefix: Path of the run with a trailing slash, or empty.
         run: The run.
         time: Time column of the rows.
-        rows: Samples whose colour is recorded.
+        rows: Samples whose colour is recorded, shape (n,).
     """
     import rerun as rr
 
@@ -87,15 +88,16 @@ def _paths(prefix: str, assembly: Assembly) -> list[str]:
 
 
 def housing_radius(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> float:
-    """Radius of what lies about a joint [m].
+    """Radius of the housing around a joint [m].
 
-    The largest cylinder or capsule about its axis, of the body that it moves or the one
-    before; of meshes the vertices in the plane of the joint.
+    It is the largest radius of the geoms of the moved body and its parent: cylinders
+    and capsules that are coaxial with the joint, and meshes, whose radius is the median
+    distance from the axis of the vertices within 1 cm of the joint along its axis.
 
     Args:
-        model: The arm.
-        data: Its kinematics in any pose.
-        joint: Number of the joint.
+        model: Compiled model of the arm.
+        data: Kinematics in any pose.
+        joint: Index of the joint.
     """
     body = int(model.jnt_bodyid[joint])
     anchor, axis = data.xanchor[joint], data.xaxis[joint]
@@ -122,7 +124,7 @@ def housing_radius(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> fl
 
 
 def load_color(share: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Colours of torque over repeated peak torque, 0xRRGGBBAA. Shape (n,)."""
+    """Colours of torque over repeated peak torque as 0xRRGGBBAA. Shape (n,)."""
     place = np.clip(share, 0.0, 1.0)
     parts = [np.interp(place, [0.0, 0.5, 1.0], column) for column in _SCALE.T]
     red, green, blue = (np.rint(part).astype(np.uint32) for part in parts)
@@ -130,7 +132,7 @@ def load_color(share: NDArray[np.float64]) -> NDArray[np.uint32]:
 
 
 def rotation_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn of the z axis into a direction, x, y, z, w. Shape (4,)."""
+    """Quaternion (x, y, z, w) that rotates the z axis to a direction. Shape (4,)."""
     wxyz = np.zeros(4)
     mujoco.mju_quatZ2Vec(wxyz, np.asarray(axis, dtype=float))
     return quaternion_xyzw(wxyz)

@@ -1,17 +1,17 @@
-"""The drive of a joint while the arm moves: its flexspline with stress and forces.
+"""Drawing of a drive during a run: flexspline with stress and contact forces.
 
-Finite elements are not run again: the map's fields are interpolated to the recorded
-angles and torque. The deflection is drawn as it is. A few hundred frames cover a run,
-however long, so that a recording stays small.
+The fields of the map are interpolated to the recorded angles and torque; no finite
+elements are solved. The deflection is drawn to scale. At most :data:`FRAMES` frames
+cover a run of any length, so that a recording stays small.
 
 =================================  ================================================
 ``drive/<joint>/<run>/flexspline``  surface, coloured by the von Mises stress
-``.../tooth``                       one tooth of it, to see it turn
+``.../tooth``                       mark on one of its teeth, to show its rotation
 ``.../circular_spline``             outline
 ``.../wave_generator``              outline
-``.../scale``                       label that says what the colours are
-``.../tooth_forces``                of the circular spline on the flexspline
-``.../bore_forces``                 of the wave generator on the flexspline
+``.../scale``                       label that explains the colours
+``.../tooth_forces``                forces of the circular spline on the flexspline
+``.../bore_forces``                 forces of the wave generator on the flexspline
 =================================  ================================================
 """
 
@@ -35,41 +35,62 @@ if TYPE_CHECKING:
 
 
 FRAMES = 100
-"""Most of one drive in a recording."""
+"""Largest number of frames of one drive in a recording."""
 BYTES = 6_000_000
-"""Of one drive in a recording, about; half of them where its lobes are alike."""
+"""Approximate largest size of one drive in a recording [bytes]; half of it if the two
+lobes are identical."""
 ARROW = 0.2
-"""Length of the largest force in radii of the flexspline."""
+"""Length of the largest force arrow over the radius of the flexspline [-]."""
 LIFT = 0.004
-"""How far in front of the flexspline outlines and forces are drawn, in radii."""
+"""Distance of outlines and forces in front of the flexspline over its radius [-]."""
 
 
 def drives_shown(scenes: Mapping[str, Assembly], joints: list[str]) -> dict[str, str]:
-    """The joint whose drive is drawn, by run: the first of these that has fields."""
+    """Select the joint whose drive is drawn: the first one whose map has fields.
+
+    Args:
+        scenes: Scenes by name of the run.
+        joints: Names of the joints in order of preference.
+
+    Returns:
+        The same joint by name of each run in which its map has fields; empty if no map
+        has fields.
+    """
     for joint in joints:
-        found = {
+        shown = {
             label: joint
             for label, assembly in scenes.items()
             if fields_of(assembly, joint) is not None
         }
-        if found:
-            return found
+        if shown:
+            return shown
     return {}
 
 
 def fields_of(assembly: Assembly, joint: str) -> DriveFields | None:
-    """Fields of the drive of a joint; None where its map has none, or it is rigid."""
+    """Fields of the drive of a joint.
+
+    Args:
+        assembly: The scene.
+        joint: Name of the joint.
+
+    Returns:
+        The fields; None if the map has no fields or the joint is rigid.
+    """
     transmission = assembly.transmissions[assembly.joints.index(joint)]
     return None if transmission.level == "rigid" else transmission.drive.fields
 
 
 def frames_of(run: Run, joint: str, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Samples at which the drive is drawn, of those at which the arm is.
+    """Select the samples at which the drive is drawn.
 
     Args:
         run: The run.
-        joint: One whose drive has fields.
-        rows: Samples at which the arm is drawn.
+        joint: Name of a joint whose drive has fields.
+        rows: Samples at which the arm is drawn, shape (n,).
+
+    Returns:
+        Equally spaced elements of ``rows``.
     """
     fields = fields_of(run.assembly, joint)
     assert fields is not None
@@ -84,9 +105,9 @@ def angles(layout: str, theta: Array, psi: Array) -> tuple[Array, Array, Array]:
     """Rotations of flexspline, circular spline and wave generator [rad].
 
     Args:
-        layout: Of the drive.
-        theta: Of the input against the fixed member [rad].
-        psi: Of the output [rad].
+        layout: Layout of the drive, which names the fixed member.
+        theta: Rotation of the input relative to the fixed member [rad].
+        psi: Rotation of the output relative to the fixed member [rad].
     """
     still = np.zeros_like(theta)
     return {
@@ -97,10 +118,18 @@ def angles(layout: str, theta: Array, psi: Array) -> tuple[Array, Array, Array]:
 
 
 def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
-    """What of a drive does not change; arguments as for :func:`send_drive`."""
+    """Log the static entities of a drive: mesh, outlines, colours and styles.
+
+    Args:
+        stream: Rerun recording stream.
+        path: Entity path of the drive, from
+            :func:`swgjoint.view.recording.paths.drive_path`.
+        assembly: The scene.
+        joint: Name of a joint whose drive has fields.
+    """
     import rerun as rr
 
-    _turbo()  # loads what the colours need while there is time
+    _turbo()  # load the colour map before the run ends
     drive = assembly.transmissions[assembly.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
@@ -157,15 +186,16 @@ def send_drive(
     time: Any,
     rows: NDArray[np.intp],
 ) -> None:
-    """What of a drive changes.
+    """Send everything of a drive that changes with time.
 
     Args:
-        stream: The recording.
-        path: From :func:`drive_path`.
+        stream: Rerun recording stream.
+        path: Entity path of the drive, from
+            :func:`swgjoint.view.recording.paths.drive_path`.
         run: The run.
-        joint: One whose drive has fields.
+        joint: Name of a joint whose drive has fields.
         time: Time column of the rows.
-        rows: Samples, from :func:`frames_of`.
+        rows: Samples from :func:`frames_of`.
     """
     import rerun as rr
 
@@ -196,7 +226,7 @@ def send_drive(
             ),
         ],
     )
-    # the tip of the tooth that stood on +y
+    # the tip of the tooth that is on the +y axis at rest
     tip = int(np.hypot(*fields.points[:, :2].T).argmax())
     place = Column(
         rr.Points3D.descriptor_positions(), shape.points[:, 0, tip], np.float32
@@ -218,7 +248,7 @@ def _send_forces(
     time: Any,
     parts: int,
 ) -> None:
-    """Arrows at the tips of the teeth and at the bore, one scale for both."""
+    """Send force arrows at the tooth tips and at the bore, both with the same scale."""
     import rerun as rr
 
     largest = max(
@@ -236,7 +266,7 @@ def _send_forces(
     ):
         vectors = all_around(np.float32(scale) * forces, parts)
         vectors[..., 2] = 0.0
-        # arrows end where they push
+        # the head of an arrow is at the point of application
         origins = all_around(shape.points[:, :, node], parts) - vectors
         origins[..., 2] = z
         teeth = vectors.shape[1]
@@ -254,11 +284,11 @@ def _send_forces(
 
 
 def eye(fields: DriveFields) -> Any:
-    """Camera that looks along the axis, into the open end of a cup."""
+    """Camera that looks along the axis, into the open end of a cup if there is one."""
     import rerun.blueprint as rrb
 
     side, r = float(np.sign(front_planes(fields))), radius(fields)
-    # aslant if there is a depth to show
+    # oblique for a cup, to show its depth
     down = -0.6 * r if side < 0.0 else 0.0
     return rrb.EyeControls3D(
         position=[0.0, down, side * 1.9 * r],
@@ -268,10 +298,10 @@ def eye(fields: DriveFields) -> Any:
 
 
 def front_planes(fields: DriveFields) -> float:
-    """Where along z outlines and forces lie [m].
+    """Coordinate z at which outlines and forces are drawn [m].
 
-    Before the open edge, above a model of the plane; hardly, so that nothing shifts
-    when it is seen aslant.
+    They are slightly in front of the open edge of a cup and slightly above a 2D model.
+    The distance is small, so that an oblique view does not displace them visibly.
     """
     z = fields.points[:, 2]
     flat = float(np.ptp(z)) == 0.0
@@ -279,18 +309,31 @@ def front_planes(fields: DriveFields) -> float:
 
 
 def radius(fields: DriveFields) -> float:
-    """Largest of the flexspline at rest [m]."""
+    """Largest radius of the flexspline at rest [m]."""
     return float(np.hypot(*fields.points[:, :2].T).max())
 
 
 def rotate_points(points: Array, angle: float) -> Array:
-    """Points of the plane turned about the axis (n, 2)."""
+    """Rotate points in the x-y plane about the z axis.
+
+    Args:
+        points: Points of shape (..., 2) [m].
+        angle: Angle of rotation [rad].
+    """
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
 def all_around(vectors: Table, parts: int) -> Table:
-    """Those of the other parts, too, that look like the first (n, n_teeth, 3)."""
+    """Repeat the vectors of one sector in all identical sectors of the circle.
+
+    Args:
+        vectors: Vectors of the first sector, shape (n, n_teeth / parts, 3).
+        parts: Number of sectors.
+
+    Returns:
+        Vectors of all sectors, shape (n, n_teeth, 3).
+    """
     turns = 2.0 * np.pi / parts * np.arange(parts, dtype=float)
     around = [vectors.copy() for _ in turns]
     for part, angle in zip(around, turns, strict=True):
@@ -299,19 +342,19 @@ def all_around(vectors: Table, parts: int) -> Table:
 
 
 def about_z(angle: Array) -> Array:
-    """Quaternions x, y, z, w of turns about the axis (n, 4)."""
+    """Quaternions (x, y, z, w) of rotations about the z axis [rad]. Shape (n, 4)."""
     half, still = 0.5 * angle, np.zeros_like(angle)
     return np.stack([still, still, np.sin(half), np.cos(half)], axis=-1)
 
 
 def stress_color(share: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
-    """Colours of the stress over its largest, 0xRRGGBBAA, shape of the share."""
+    """Colours of stress over largest stress as 0xRRGGBBAA. Shape as ``share``."""
     return np.asarray(_turbo()[np.clip(256.0 * share, 0.0, 255.0).astype(np.uint8)])
 
 
 @cache
 def _turbo() -> NDArray[np.uint32]:
-    """Colours from the least to the largest (256,)."""
+    """Colours from the smallest to the largest value. Shape (256,)."""
     from matplotlib import colormaps
 
     rgba = colormaps["turbo"](np.arange(256) / 255.0, bytes=True).astype(np.uint32)

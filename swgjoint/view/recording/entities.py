@@ -1,28 +1,29 @@
-"""What of a run goes into a recording.
+"""Entities of a recording.
 
-Entity paths, below ``<run>/`` where a recording holds several runs:
+Entity paths, prefixed by ``<run>/`` if a recording contains several runs:
 
 =====================================  ============================================
 ``arm/<body>``                         pose in the world, at the scene's pose rate
-``arm/<body>/<geom>``                  shape, once
-``arm/<body>/drive/<joint>``           disc, coloured by the use of the rating
-``tool/path``                          commanded path of the tool, once
-``joint/<joint>``                      signals of the joint, a component each:
+``arm/<body>/<geom>``                  shape, static
+``arm/<body>/drive/<joint>``           disc, coloured by torque over rating
+``tool/path``                          commanded path of the tool, static
+``joint/<joint>``                      signals of the joint, one component each:
   ``output_torque_Nm``                 torque of the drive on the link
-  ``torque_deviation_Nm``              the same less that of the rigid arm
+  ``torque_deviation_Nm``              output torque minus that of the rigid arm
   ``motor_torque_Nm``
   ``torsion_arcmin``
   ``transmission_error_arcmin``
-  ``position_deg``                     link
-  ``reference_deg``                    commanded
-``joint/<joint>/ripple_orders``        bars over the order per input turn, once
+  ``position_deg``                     link angle
+  ``reference_deg``                    commanded angle
+``joint/<joint>/ripple_orders``        amplitude over order per input turn, static
 ``tool/error_mm``                      distance from the commanded path, or from the
-                                       rigid arm where the recording holds its run
+                                       rigid arm if its run is in the recording
 =====================================  ============================================
 
-Signals are at every step, on the timeline ``time``. Beside the runs lies the drive of
-one joint, see :mod:`swgjoint.view.recording.drive_view`. Torque against torsion lies at
-``phase/<joint>/<run>``, beside the runs: scaled to a picture, with a point that moves.
+Signals are recorded at every step on the timeline ``time``. Outside the path of the
+runs, a recording contains the drive of one joint (see
+:mod:`swgjoint.view.recording.drive_view`) and, at ``phase/<joint>/<run>``, a plot of
+torque against torsion with a point at the current state.
 """
 
 from __future__ import annotations
@@ -66,17 +67,20 @@ if TYPE_CHECKING:
 
 TIMELINE = "time"
 COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))
-"""One for each run, in pictures too."""
+"""RGB colours of the runs, also used in plots."""
 LABEL_COLOR = 0xFAFAFAFF
 
 
 def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
-    """Signals of one joint under the names and in the units of the recording.
+    """Signals of one joint by the names and in the units of the recording.
 
     Args:
         run: The run.
-        j: Number of the joint.
-        part: Samples, all by default.
+        j: Index of the joint.
+        part: Samples to return; all by default.
+
+    Returns:
+        Arrays of shape (n_samples,).
     """
     return {
         "output_torque_Nm": run.output_torque[part, j],
@@ -90,7 +94,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
 
 
 def signal(name: str) -> Any:
-    """Component of a joint that holds one of the :data:`SIGNALS`."""
+    """Component of a joint for one signal of :func:`signals_of`."""
     import rerun as rr
 
     return rr.ComponentDescriptor(name, component_type="rerun.components.Scalar")
@@ -99,19 +103,20 @@ def signal(name: str) -> Any:
 def log_known(
     stream: Any, scenes: Mapping[str, Assembly], *, drives: Mapping[str, str]
 ) -> None:
-    """What is known before the runs: shapes, style of the lines.
+    """Log everything that is known before the runs: shapes and styles of lines.
 
     Args:
-        stream: The recording.
-        scenes: By the name of the run.
-        drives: Of :func:`swgjoint.view.recording.drive_view.drives_shown`.
+        stream: Rerun recording stream.
+        scenes: Scenes by name of the run.
+        drives: Joint with a drawn drive by name of the run, from
+            :func:`swgjoint.view.recording.drive_view.drives_shown`.
     """
     import rerun as rr
 
     for k, (label, assembly) in enumerate(scenes.items()):
         prefix, color = prefix_of(label), color_of_run(k)
         if len(scenes) > 1:
-            # side by side: their differences are far below what an overlay could show
+            # side by side, because an overlay would not show the small differences
             place = [0.0, SPACING * (0.5 * (len(scenes) - 1) - k), 0.0]
             stream.log(
                 part_of_path(label), rr.Transform3D(translation=place), static=True
@@ -144,12 +149,12 @@ def log_known(
 
 
 def log_measured(stream: Any, runs: Mapping[str, Run], scales: Scales) -> None:
-    """What does not change and follows from the runs: paths and spectra.
+    """Log static results of the runs: paths and spectra.
 
     Args:
-        stream: The recording.
+        stream: Rerun recording stream.
         runs: Runs by name.
-        scales: Of :func:`swgjoint.view.recording.joint_pictures.phase_scales`.
+        scales: From :func:`swgjoint.view.recording.joint_pictures.phase_scales`.
     """
     import rerun as rr
 
@@ -180,15 +185,16 @@ def log_moving(
     rigid: Run | None = None,
     part: slice = slice(None),
 ) -> None:
-    """What changes with time: signals, poses, loads of the drives.
+    """Send everything that changes with time: signals, poses, loads of the drives.
 
     Args:
-        stream: The recording.
+        stream: Rerun recording stream.
         runs: Runs by name.
-        scales: Of :func:`swgjoint.view.recording.joint_pictures.phase_scales`.
-        drives: Of :func:`swgjoint.view.recording.drive_view.drives_shown`.
-        rigid: See :func:`write_recording`.
-        part: Samples that are sent, all by default.
+        scales: From :func:`swgjoint.view.recording.joint_pictures.phase_scales`.
+        drives: Joint with a drawn drive by name of the run, from
+            :func:`swgjoint.view.recording.drive_view.drives_shown`.
+        rigid: Run from which tool errors are measured; None for the commanded path.
+        part: Samples to send; all by default.
     """
     import rerun as rr
 
@@ -199,7 +205,7 @@ def log_moving(
     rows = pose_rows(first)
     rows = rows[inside[rows]]
     at_rows = rr.TimeColumn(TIMELINE, duration=first.time[rows])
-    # the bulk first: rerun encodes it while the rest is put together
+    # the largest part first: rerun encodes it while the rest is prepared
     for label, run in runs.items():
         for j, joint in enumerate(run.joints):
             columns = [
@@ -234,7 +240,7 @@ def log_moving(
 
 
 def color_of_run(k: int) -> int:
-    """Colour of the run of this number, 0xRRGGBBAA: rerun takes numbers fastest."""
+    """Colour of run ``k`` as 0xRRGGBBAA, the form that rerun reads fastest."""
     return int.from_bytes(bytes((*COLORS[k % len(COLORS)], 255)), "big")
 
 
@@ -245,13 +251,13 @@ def _style(name: str, color: int) -> Any:
         names=[name],
         colors=[color],
         widths=[1.2],
-        # zoomed out, a mean of neighbours would hide the ripple
+        # averaging neighbours in a zoomed-out view would hide the ripple
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
 
 
 def _log_shapes(stream: Any, prefix: str, assembly: Assembly) -> None:
-    """Shapes of the arm and its drives."""
+    """Log the shapes of the arm and its drives."""
     import rerun as rr
 
     model = assembly.arm.model
@@ -272,7 +278,7 @@ def _log_shapes(stream: Any, prefix: str, assembly: Assembly) -> None:
 def _send_poses(
     stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
 ) -> None:
-    """Poses of the bodies at some samples; those fixed to the world are static."""
+    """Send poses of the bodies at some samples; those of fixed bodies are static."""
     import rerun as rr
 
     arm, model = run.assembly.arm, run.assembly.arm.model
@@ -292,7 +298,7 @@ def _send_poses(
 
 
 def pose_rows(run: Run) -> NDArray[np.intp]:
-    """Samples whose poses are recorded, first and last included. Shape (n_poses,)."""
+    """Samples whose poses are recorded, including first and last. Shape (n_poses,)."""
     scene = run.assembly.scene
     stride = round(1.0 / (scene.recording.pose_rate_Hz * scene.simulation.step_s))
     rows = np.arange(0, run.time.size, max(1, stride))

@@ -1,4 +1,4 @@
-"""Shapes of an arm as rerun archetypes, from the geoms of its compiled model."""
+"""Geometry of an arm: geoms of the compiled MuJoCo model as rerun archetypes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ _GEOM = mujoco.mjtGeom
 
 
 def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
-    """One geom in its own frame, None for a kind that is not drawn.
+    """Convert a geom to a rerun archetype in the frame of the geom.
 
-    Cylinders, capsules, spheres, ellipsoids, boxes and meshes are drawn; planes and
-    height fields are scenery.
+    Cylinders, capsules, spheres, ellipsoids, boxes and meshes are converted. Planes and
+    height fields are part of the surroundings and are not drawn.
+
+    Args:
+        model: Compiled model of the arm.
+        geom: Index of the geom.
+
+    Returns:
+        The archetype; None for a kind that is not drawn.
     """
     import rerun as rr
 
@@ -25,7 +32,7 @@ def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
         case _GEOM.mjGEOM_CYLINDER:
             return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], **solid)
         case _GEOM.mjGEOM_CAPSULE:
-            # rerun's capsule starts at its origin, MuJoCo's is centred
+            # a rerun capsule starts at its origin, a MuJoCo capsule is centred on it
             return rr.Capsules3D(
                 lengths=[2.0 * size[1]],
                 radii=[size[0]],
@@ -44,7 +51,12 @@ def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
 
 
 def color_of(model: mujoco.MjModel, geom: int) -> int:
-    """Colour of a geom, of its material where it has one, 0xRRGGBBAA."""
+    """Colour of a geom as 0xRRGGBBAA, taken from its material if it has one.
+
+    Args:
+        model: Compiled model of the arm.
+        geom: Index of the geom.
+    """
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
     parts = np.rint(255.0 * np.clip(rgba, 0.0, 1.0)).astype(np.uint8)
@@ -52,7 +64,7 @@ def color_of(model: mujoco.MjModel, geom: int) -> int:
 
 
 def quaternion_xyzw(wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """MuJoCo's quaternions in rerun's order. Shape (..., 4)."""
+    """Reorder MuJoCo quaternions (w, x, y, z) to (x, y, z, w). Shape (..., 4)."""
     return np.roll(wxyz, -1, axis=-1)
 
 

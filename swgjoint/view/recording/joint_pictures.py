@@ -1,4 +1,4 @@
-"""Pictures of a joint in a recording: orders of its ripple, torque against torsion."""
+"""Plots of a joint in a recording: ripple spectrum, torque against torsion."""
 
 from __future__ import annotations
 
@@ -18,21 +18,27 @@ if TYPE_CHECKING:
 
 
 BARS = 400
-"""Bars of a spectrum at most; each is the largest amplitude of its part."""
+"""Largest number of bars of a spectrum; a bar is the largest amplitude in its range."""
 WIDTH = 1.6
-"""Of the phase picture, its height from the middle is 1."""
+"""Half width of the plot of torque against torsion over its half height [-]."""
 Scales = dict[str, tuple[float, float] | None]
+"""Largest torsion [arcmin] and torque [N·m] by joint; None without torsion."""
 _POINTS = 2000
 _FRAME = 0x787878FF
 
 
 def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
-    """Orders and amplitudes of the torque ripple of one joint.
+    """Spectrum of the torque ripple of one joint.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
 
     Returns:
-        Middle of every bar [cycles per turn of the input] and largest amplitude in it,
-        zero to peak [% of rated torque]; both of shape (n,). None for a joint that
-        stands still.
+        Mean order of every bar [cycles per input turn] and largest amplitude in it,
+        zero to peak [% of rated torque], both of shape (n,). None if the joint does not
+        move at constant speed, turns its input by less than half a turn, or has no
+        order that the step resolves.
     """
     from scipy.fft import next_fast_len
 
@@ -44,8 +50,8 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     if travel.size < 16 or travel[-1] < np.pi:
         return None
     rated = run.assembly.transmissions[j].drive.ratings.rated_torque
-    # a picture: straight lines between the samples lower the highest orders by 2 %,
-    # the splines of the metrics would take half of the time of a recording
+    # linear interpolation lowers the highest orders by 2 %, which is accurate enough
+    # for a plot; the splines of the metrics would take half of the recording time
     grid = np.linspace(0.0, travel[-1], travel.size)
     ripple = np.interp(grid, travel, torque_ripple(run, j)) * np.hanning(grid.size)
     size = next_fast_len(2 * grid.size, real=True)
@@ -62,10 +68,17 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
 
 
 def log_ripple(stream: Any, path: str, bars: tuple[Array, Array], color: int) -> None:
-    """Spectrum of a joint's ripple, from :func:`ripple_bars`."""
+    """Log the ripple spectrum of a joint as a bar chart.
+
+    Args:
+        stream: Rerun recording stream.
+        path: Entity path of the joint.
+        bars: Orders and amplitudes from :func:`ripple_bars`.
+        color: Colour of the run, 0xRRGGBBAA.
+    """
     import rerun as rr
 
-    # as rr.BarChart would have it, which takes longer than the spectrum
+    # the components of rr.BarChart, whose constructor takes longer than the spectrum
     chart = (
         (Numbers(bars[1]), rr.BarChart.descriptor_values()),
         (Numbers(bars[0]), rr.BarChart.descriptor_abscissa()),
@@ -97,20 +110,28 @@ def phase_points(
     scales: tuple[float, float],
     rows: slice | NDArray[np.intp] = slice(None),
 ) -> Array:
-    """Torsion to the right, torque upwards, in the units of the picture. (n, 2).
+    """Points of torque (upwards) against torsion (to the right) in plot coordinates.
 
     Args:
         run: The run.
-        j: Number of the joint.
-        scales: Of :func:`phase_scales`.
-        rows: Samples, all by default.
+        j: Index of the joint.
+        scales: Largest torsion [arcmin] and torque [N·m] from :func:`phase_scales`.
+        rows: Samples to return; all by default.
+
+    Returns:
+        Points of shape (n, 2).
     """
     x = WIDTH * run.torsion[rows, j] / (scales[0] * arcmin)
     return np.column_stack([x, -run.output_torque[rows, j] / scales[1]])
 
 
 def log_phase_axes(stream: Any, joint: str) -> None:
-    """Axes of the picture of one joint."""
+    """Log the axes of torque against torsion.
+
+    Args:
+        stream: Rerun recording stream.
+        joint: Name of the joint.
+    """
     import rerun as rr
 
     axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
@@ -119,7 +140,13 @@ def log_phase_axes(stream: Any, joint: str) -> None:
 
 
 def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None:
-    """Values at the ends of the axes."""
+    """Log the values at the ends of the axes of torque against torsion.
+
+    Args:
+        stream: Rerun recording stream.
+        joint: Name of the joint.
+        scales: Largest torsion [arcmin] and torque [N·m] from :func:`phase_scales`.
+    """
     import rerun as rr
 
     torsion, torque = scales
@@ -144,7 +171,16 @@ def log_phase_path(
     scales: tuple[float, float],
     color: int,
 ) -> None:
-    """Torque against torsion of one run."""
+    """Log the curve of torque against torsion of one run.
+
+    Args:
+        stream: Rerun recording stream.
+        path: Entity path from :func:`swgjoint.view.recording.paths.phase_path`.
+        run: The run.
+        j: Index of the joint.
+        scales: Largest torsion [arcmin] and torque [N·m] from :func:`phase_scales`.
+        color: Colour of the run, 0xRRGGBBAA.
+    """
     import rerun as rr
 
     thinned = slice(None, None, -(-run.time.size // _POINTS))
@@ -154,7 +190,13 @@ def log_phase_path(
 
 
 def log_phase_point(stream: Any, path: str, color: int) -> None:
-    """Look of the point that moves."""
+    """Log the style of the point that shows the current state.
+
+    Args:
+        stream: Rerun recording stream.
+        path: Entity path from :func:`swgjoint.view.recording.paths.phase_path`.
+        color: Colour of the run, 0xRRGGBBAA.
+    """
     import rerun as rr
 
     point = rr.Points2D.from_fields(radii=[0.03], colors=[color])
@@ -162,7 +204,14 @@ def log_phase_point(stream: Any, path: str, color: int) -> None:
 
 
 def send_phase(stream: Any, path: str, points: Array, time: Any) -> None:
-    """Where the run is at some samples. Points of shape (n, 2)."""
+    """Send the point that shows the current state at some samples.
+
+    Args:
+        stream: Rerun recording stream.
+        path: Entity path from :func:`swgjoint.view.recording.paths.phase_path`.
+        points: Points from :func:`phase_points`, shape (n, 2).
+        time: Time column of the samples.
+    """
     import rerun as rr
 
     column = Column(rr.Points2D.descriptor_positions(), points, np.float32)

@@ -1,8 +1,9 @@
-"""Runs sent to a viewer that is open, on this machine only.
+"""Send runs to an open viewer on this machine.
 
-The viewer's own server would listen on every interface of the machine: one is started
-that is bound to loopback, and addresses elsewhere are refused. A run is simulated far
-faster than real time, so it is sent when it is done, at once or at the pace of a clock.
+By default the server of the viewer would listen on all network interfaces. It is
+therefore started on the loopback interface, and other addresses are rejected. A run is
+simulated much faster than real time, so it is sent after the simulation, either at once
+or in real time.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 DEFAULT_PORT = 9876
-"""At which a viewer listens that the user has opened."""
+"""Port on which a viewer listens by default."""
 PART_S = 0.1
-"""Time between two parcels of a paced stream [s]."""
+"""Real time between two parts of a paced stream [s]."""
 
 
 def stream_runs(
@@ -41,26 +42,26 @@ def stream_runs(
     rigid: Run | None = None,
     pace: float | None = None,
 ) -> str:
-    """Send runs of one motion to a viewer; returns when all is sent.
+    """Send runs of one motion to a viewer; return when everything is sent.
 
     Args:
-        runs: Runs by the name that the viewer shows; a lone run may be called ``""``.
-        url: Of a viewer that is open, ``rerun+http://127.0.0.1:9876/proxy``; None
-            starts one.
-        rigid: The run that tool errors refer to; None for the commanded path.
-        pace: Simulated seconds per second of the clock; None sends all at once.
+        runs: Runs by the name that the viewer shows; a single run may be called ``""``.
+        url: Address of an open viewer, such as ``rerun+http://127.0.0.1:9876/proxy``;
+            None starts a viewer.
+        rigid: Run from which tool errors are measured; None for the commanded path.
+        pace: Simulated time per real time [-]; None sends everything at once.
 
     Returns:
-        The address.
+        Address of the viewer.
 
     Raises:
-        InputError: If the address is not on this machine, or the pace not positive.
+        InputError: If the address is not on this machine, or the pace is not positive.
         ComputationError: If no viewer answers.
     """
     import rerun as rr
 
     if pace is not None and not 0.0 < pace < np.inf:
-        raise InputError(f"pace {pace:g}; accepted: > 0")
+        raise InputError(f"pace = {pace:g}; accepted: > 0")
     process = None
     if url is None:
         process, url = start_viewer()
@@ -86,10 +87,10 @@ def stream_runs(
 
 
 def loopback_port(url: str) -> int:
-    """Port of an address on this machine.
+    """Port of a viewer address on this machine.
 
     Raises:
-        InputError: If it is none, or is elsewhere.
+        InputError: If the address is malformed or on another machine.
     """
     try:
         parts = urlsplit(url)
@@ -106,7 +107,7 @@ def loopback_port(url: str) -> int:
 
 
 def _parcels(times: NDArray[np.float64], length: float | None) -> list[slice]:
-    """Parts of the samples that go out together."""
+    """Divide the samples into parts that are sent together, one per ``length`` [s]."""
     if length is None:
         return [slice(0, times.size)]
     count = max(1, round(float(times[-1] - times[0]) / length))

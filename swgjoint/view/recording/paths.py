@@ -4,22 +4,32 @@ from __future__ import annotations
 
 
 def part_of_path(label: str) -> str:
-    """Name of a run, which may be that of a file, as one part of a path."""
+    """Escape the name of a run, which may be a file name, as one part of a path."""
     import rerun as rr
 
     return str(rr.escape_entity_path_part(label))
 
 
 def prefix_of(label: str) -> str:
-    """Path of a run, with a slash at its end; empty for a lone run."""
+    """Path prefix of a run with a trailing slash; empty for a single, unnamed run."""
     return f"{part_of_path(label)}/" if label else ""
 
 
 def drive_path(joint: str, label: str) -> str:
-    """Where the drive of a joint is drawn."""
+    """Entity path of the drawing of a joint's drive.
+
+    Args:
+        joint: Name of the joint.
+        label: Name of the run; empty for a single run.
+    """
     return f"drive/{joint}/{part_of_path(label)}" if label else f"drive/{joint}"
 
 
 def phase_path(joint: str, label: str) -> str:
-    """Where torque against torsion of one run lies."""
+    """Entity path of the plot of torque against torsion of one run.
+
+    Args:
+        joint: Name of the joint.
+        label: Name of the run; empty for a single run.
+    """
     return f"phase/{joint}/{part_of_path(label or 'run')}"

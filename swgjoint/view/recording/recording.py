@@ -1,4 +1,7 @@
-"""Runs as a recording for the rerun viewer, made of the entities beside this module."""
+"""Write runs to a recording file for the rerun viewer.
+
+The module :mod:`swgjoint.view.recording.entities` lists the entities of a recording.
+"""
 
 from __future__ import annotations
 
@@ -21,25 +24,28 @@ if TYPE_CHECKING:
 
 
 PART = 100_000
-"""Samples that are sent at a time: a long run needs no more memory for its recording
-than a short one."""
+"""Number of samples that are sent at a time, which bounds the memory that the
+recording of a long run needs."""
 
 FLUSH = 120.0
-"""Longest wait until a part is in its file [s]."""
+"""Longest time to wait until a part is written to the file [s]."""
 
 
 def write_recording(
     runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
 ) -> Path:
-    """Write runs of one motion into one ``.rrd`` file, whole or not at all.
+    """Write runs of one motion to a ``.rrd`` file, which is complete or absent.
 
     Args:
-        runs: Runs by the name that the viewer shows; a lone run may be called ``""``.
-        path: File to write; its folder is made.
-        rigid: The run that tool errors refer to; None for the commanded path.
+        runs: Runs by the name that the viewer shows; a single run may be called ``""``.
+        path: File to write; its folder is created if necessary.
+        rigid: Run from which tool errors are measured; None for the commanded path.
 
     Returns:
-        The path.
+        Path of the file.
+
+    Raises:
+        ComputationError: If the file cannot be written.
     """
     with recording_file(Path(path)) as beside:
         scenes = {label: run.assembly for label, run in runs.items()}
@@ -49,78 +55,86 @@ def write_recording(
 
 
 class Recorder:
-    """A recording of one run that begins while the run goes on.
+    """Recording of one run that is started while the simulation is still running.
 
-    Layout and shapes are known before: they are sent beside the steps, which the engine
-    takes without Python. Used as a context, the file is there whole after it, or not at
-    all.
+    Layout and shapes are known in advance. A thread sends them during the simulation,
+    which does not occupy the Python interpreter. The recorder is a context manager; at
+    its end the file is complete, or absent after a failure.
     """
 
     def __init__(self, assembly: Assembly, path: str | Path) -> None:
-        """Nothing is written yet.
+        """Store the arguments; nothing is written yet.
 
         Args:
-            assembly: The scene that is going to be run.
-            path: File to write; its folder is made.
+            assembly: The scene that is going to be simulated.
+            path: File to write; its folder is created if necessary.
         """
         self._scenes = {"": assembly}
         self._stack = contextlib.ExitStack()
         self._path = Path(path)
 
     def __enter__(self) -> Recorder:
-        """Make the file."""
+        """Create the temporary file and the thread."""
         self._beside = self._stack.enter_context(recording_file(self._path))
         self._begun: Future[tuple[Any, dict[str, str]]] | None = None
         self._thread = self._stack.enter_context(ThreadPoolExecutor(1))
         return self
 
     def begin(self) -> None:
-        """Start to send what is known; once, however often it is called."""
+        """Start to send what is known before the run; further calls have no effect."""
         if self._begun is None:
             self._begun = self._thread.submit(_begin, self._beside, self._scenes)
 
     def finish(self, run: Run) -> None:
-        """Send the rest when the run is done."""
+        """Send the results of the finished run and complete the file.
+
+        Raises:
+            ComputationError: If the file cannot be written.
+        """
         self.begin()
         assert self._begun is not None
         stream, drives = self._begun.result()
         _end(stream, self._path, {"": run}, drives)
 
     def __exit__(self, *failure: Any) -> bool | None:
-        """Put the file in its place, or remove it after a failure."""
+        """Move the file to its final path, or remove it after a failure."""
         return self._stack.__exit__(*failure)
 
 
 @contextlib.contextmanager
 def recording_file(path: Path) -> Iterator[Path]:
-    """A file beside the path that takes its place at the end if nothing fails."""
+    """Yield a temporary file that replaces ``path`` at the end if nothing fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as beside:
         yield beside
 
 
 def end_stream(stream: Any, path: str | Path) -> None:
-    """Wait until all of a recording is in its file, and close it.
+    """Wait until a recording is written completely, and close it.
+
+    Args:
+        stream: Rerun recording stream.
+        path: File named in the error message.
 
     Raises:
-        ComputationError: If it cannot be written.
+        ComputationError: If the file cannot be written.
     """
     _flush(stream, path)
     stream.disconnect()
 
 
 def _flush(stream: Any, path: str | Path) -> None:
-    """Wait until what was sent so far is in the file of a recording."""
+    """Wait until everything sent so far is written to the file."""
     try:
-        stream.flush(timeout_sec=FLUSH)  # a writer that died need not answer
-    except RuntimeError as error:  # the thread that writes has given up
+        stream.flush(timeout_sec=FLUSH)  # a writer thread that died may never answer
+    except RuntimeError as error:  # the writer thread has given up
         raise ComputationError(
             f"cannot write the recording {path}: {error}; the disk may be full"
         ) from None
 
 
 def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, str]]:
-    """The recording with what is known before the runs, and the drives it shows."""
+    """Start a recording; return its stream and the joint with a drawn drive by run."""
     import rerun as rr
 
     stream = rr.RecordingStream(stream_name(scenes))
@@ -138,11 +152,11 @@ def _end(
     drives: Mapping[str, str],
     rigid: Run | None = None,
 ) -> None:
-    """What follows from the runs, and the end of the file."""
+    """Send the results of the runs and complete the file."""
     scales = phase_scales(runs)
     samples = next(iter(runs.values())).time.size
     for first in range(0, samples, PART):
-        if first:  # what was sent is in the file before more is put together
+        if first:  # write the previous part before the next one is assembled
             _flush(stream, path)
         part = slice(first, min(first + PART, samples))
         log_moving(stream, runs, scales, drives=drives, rigid=rigid, part=part)
@@ -151,5 +165,5 @@ def _end(
 
 
 def stream_name(scenes: Mapping[str, Assembly]) -> str:
-    """What the viewer calls a recording of these scenes."""
+    """Name of the recording of these scenes in the viewer."""
     return f"swgjoint {next(iter(scenes.values())).scene.name}"

@@ -1,4 +1,4 @@
-"""The rerun viewer as a process of this machine that listens on loopback only."""
+"""Start the rerun viewer as a process that listens on the loopback interface only."""
 
 from __future__ import annotations
 
@@ -13,37 +13,41 @@ from swgjoint.errors import ComputationError
 
 LOOPBACK = "127.0.0.1"
 STARTED: list[subprocess.Popen[bytes]] = []
-"""Python would complain about a process that it forgets."""
+"""Started processes; Python would warn if a running one were garbage-collected."""
 
 
 def start_viewer(
     *options: str, port: int | None = None
 ) -> tuple[subprocess.Popen[bytes], str]:
-    """Start a viewer, or a server of it, that outlives this process.
+    """Start a viewer, or its server, that keeps running after this process ends.
 
     Args:
-        *options: Of the viewer's program: files, ``--serve-web``, ``--serve-grpc``.
-        port: At which it takes streams; a free one if None.
+        *options: Command-line arguments of the viewer: files, ``--serve-web``,
+            ``--serve-grpc``.
+        port: Port that receives streams; None selects a free one.
 
     Returns:
         The process and the address for streams.
+
+    Raises:
+        ComputationError: If the viewer is not installed.
     """
     port = free_port() if port is None else port
-    # without --bind it would listen on every interface
+    # without --bind it would listen on all network interfaces
     command = [str(viewer_program()), "--bind", LOOPBACK, "--port", str(port)]
     return _start([*command, *options]), f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
 def viewer_program() -> Path:
-    """The viewer's own program inside the rerun package.
+    """Path of the viewer's executable in the rerun package.
 
     Raises:
-        ComputationError: If it is not there.
+        ComputationError: If the executable is missing.
     """
-    found = find_spec("rerun_cli")
-    if found is None or found.origin is None:
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
         raise ComputationError("the rerun viewer is missing: pip install rerun-sdk")
-    folder = Path(found.origin).parent
+    folder = Path(package.origin).parent
     for name in ("rerun", "rerun.exe"):
         if (folder / name).is_file():
             return folder / name
@@ -54,7 +58,7 @@ def viewer_program() -> Path:
 
 
 def free_port() -> int:
-    """A port of loopback on which nothing listens now."""
+    """Return a loopback port on which nothing listens at present."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])
@@ -66,21 +70,21 @@ def wait_for(
     *,
     limit: float = 60.0,
 ) -> None:
-    """Return when something listens at a port of loopback.
+    """Wait until a process listens on a loopback port.
 
     Args:
-        port: Of loopback.
-        process: Who should listen there; ended where it does not in time.
-        limit: Of the wait [s].
+        port: Loopback port.
+        process: Process that should listen; it is terminated if it does not in time.
+        limit: Longest waiting time [s].
 
     Raises:
-        ComputationError: If nothing does, or the process ends.
+        ComputationError: If nothing listens in time, or the process ends.
     """
     end = time.monotonic() + limit
     while time.monotonic() < end:
         if process is not None and process.poll() is not None:
             raise ComputationError(
-                f"the rerun viewer ended at once with status {process.returncode}"
+                f"the rerun viewer exited during start with status {process.returncode}"
             )
         with socket.socket() as probe:
             if probe.connect_ex((LOOPBACK, port)) == 0:
@@ -89,7 +93,7 @@ def wait_for(
     if process is not None:
         process.terminate()
     raise ComputationError(
-        f"no rerun viewer answers at port {port} of this machine within {limit:.0f} s"
+        f"no rerun viewer answered on port {port} of this machine within {limit:.0f} s"
     )
 
 
