@@ -131,9 +131,9 @@ def _top(arguments: list[str]) -> int:
     near = get_close_matches(args.command, COMMANDS, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
     if args.command in COMMANDS:
-        parser.error(f"options follow the command: swgjoint {args.command} ...")
+        parser.error(f"options belong after the command: swgjoint {args.command} ...")
     command = args.command if len(args.command) <= 40 else f"{args.command[:37]}..."
-    parser.error(f"unknown command {command!r}; {hint}one of {', '.join(COMMANDS)}")
+    parser.error(f"unknown command {command!r}; {hint}accepted: {', '.join(COMMANDS)}")
 
 
 def _command(name: str, arguments: list[str]) -> int:

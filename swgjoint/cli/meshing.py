@@ -168,11 +168,13 @@ def report(result: dict[str, Any]) -> str:
         for state in result["setup_MPa"]:
             if state.get(member):
                 values = [state[member].get(kind) for kind in kinds]
-                rows.append((f"{member} {state['state']}", *values))
+                text = f"{member}, {state['state']}".replace("_", " ")
+                rows.append((text, *values))
         mean = result.get(member) and result[member].get("average_max_MPa")
         values = [mean.get(kind) for kind in kinds] if mean else []
         if any(value is not None for value in values):  # null for a rigid member
-            rows.append((f"{member} mean of the maxima{where}", *values))
+            name = member.replace("_", " ")
+            rows.append((f"{name}, mean of the maxima{where}", *values))
     lines = [
         f"meshing of {result.get('design', 'the design')}:"
         f" {result['nodes']} nodes, {result['elements']} elements,"

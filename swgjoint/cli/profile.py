@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> str:
     """Format the dimensions, one column per member, then the checks."""
     keys = [key for key in result["flexspline"] if key != "segments"]
-    rows = [(key, *(result[member][key] for member in MEMBERS)) for key in keys]
+    rows = [(_label(key), *(result[m][key] for m in MEMBERS)) for key in keys]
     names = dict.fromkeys(s["name"] for m in MEMBERS for s in result[m]["segments"])
     for name in names:
         lengths = [
@@ -67,15 +67,21 @@ def report(result: dict[str, Any]) -> str:
             )
             for m in MEMBERS
         ]
-        rows.append((f"length of {name} [mm]", *lengths))
+        rows.append((f"length of {_label(name)} [mm]", *lengths))
     text = table(rows, header=("", "flexspline", "circular spline"))
     checks = [
-        f"{'ok ' if check['ok'] else 'BAD'} {check['member']}: {check['name']}"
+        f"{'ok ' if check['ok'] else 'BAD'} {_label(check['member'])}: {check['name']}"
         f" ({check['value']:.4g} {check['unit']})"
         for check in result["checks"]
     ]
     files = [f"wrote {name}" for name in result["files"]]
     return "\n".join([f"tooth profile of {result['design']}", text, *checks, *files])
+
+
+def _label(key: str) -> str:
+    """A key in words, with the unit of a length in brackets."""
+    unit = " [mm]" if key.endswith("_mm") else ""
+    return key.removesuffix("_mm").replace("_", " ") + unit
 
 
 def status(result: dict[str, Any]) -> int:

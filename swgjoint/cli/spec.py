@@ -122,7 +122,12 @@ def report(result: dict[str, Any]) -> str:
                     (f"{line['order']:.6g}", *(line[key] for key in columns))
                     for line in result["orders"][:_SHOWN_ORDERS]
                 ],
-                header=("", "no load [arcmin]", "rated load [arcmin]", "ripple [%]"),
+                header=(
+                    "order",
+                    "no load [arcmin]",
+                    "rated load [arcmin]",
+                    "ripple [%]",
+                ),
             )
         )
     error = result["validity"].get("kinematic_error", "none")

@@ -187,7 +187,7 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     told = result["stored"]
     assert told["drift"] == pytest.approx(0.01) and not told["of_this_code"]
     assert told["pace"] == pytest.approx(1.5)
-    assert "times of a machine 1.5 times as fast" in bench_fe.report(result)
+    assert "times measured on a machine 1.5 times as fast" in bench_fe.report(result)
 
 
 def test_what_is_long_and_not_stored_is_left_out(solve):

@@ -48,12 +48,12 @@ def report(result: dict[str, Any]) -> str:
         header = (
             name + positions * quantity.startswith("kinematic_error"),
             quantity.rpartition("pp_")[2] if "pp_" in quantity else quantity,
-            f"error {unit}",
+            f"error [{unit}]",
             "same kind",
             "next level",
-            "CPU s",
-            "wall s",
-            "MB",
+            "CPU [s]",
+            "wall [s]",
+            "memory [MB]",
             "",
         )
         text += ["", table(body, header=header)]
@@ -73,7 +73,11 @@ def _stored(stored: dict[str, Any]) -> str:
     drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
     state = "valid for this code" if stored["of_this_code"] else "from ANOTHER code"
     pace = stored["pace"]
-    times = "" if pace is None else f", times of a machine {pace:.2g} times as fast"
+    times = (
+        ""
+        if pace is None
+        else f", times measured on a machine {pace:.2g} times as fast"
+    )
     return (
         f"read from the stored file: {'; '.join(stored['settings'])}, commit"
         f" {stored['provenance']['commit']}, {state} (relative change of"

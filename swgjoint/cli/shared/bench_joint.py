@@ -19,7 +19,7 @@ def report(result: dict[str, Any]) -> str:
         key = (row["scene"], row["model"], row["setting"])
         lines.setdefault(key, {})[row["quantity"]] = row
     header = ["scene", "level", "setting", "outcome", "cost"]
-    header += [f"{name} {unit}" for name, unit in units.items()]
+    header += [f"{name} [{unit}]" for name, unit in units.items()]
     body = []
     for names, line in lines.items():
         row = line["link_angle"]
