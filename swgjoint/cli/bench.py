@@ -91,8 +91,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _check(args: argparse.Namespace) -> None:
     """Reject bad options before the first part runs, not after an hour of work."""
     for option, part in OPTIONS.items():
-        given = getattr(args, option) not in (None, False)
-        if given and args.part not in (part, "all"):
+        is_set = getattr(args, option) not in (None, False)
+        if is_set and args.part not in (part, "all"):
             raise InputError(
                 f"--{option} does not apply to bench {args.part}; accepted with bench"
                 f" {part} or bench all"

@@ -146,8 +146,8 @@ def _limits(args: argparse.Namespace) -> dict[str, float] | None:
     if not args.spec and not args.limit:
         return None
     limits = read_spec(args.spec) if args.spec else {}
-    given = dict(map(parse_override, args.limit))
-    return limits | checked_limits(given, where="--limit ")
+    from_options = dict(map(parse_override, args.limit))
+    return limits | checked_limits(from_options, where="--limit ")
 
 
 def _write(

@@ -83,9 +83,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         InputError: If an option does not fit the action.
         DesignError: If a design to show, export or scale is not feasible.
     """
-    given = [name for name in ONLY_NEW if getattr(args, name)]
-    if args.action != "new" and given:
-        option = {"overrides": "set"}.get(given[0], given[0])
+    new_options = [name for name in ONLY_NEW if getattr(args, name)]
+    if args.action != "new" and new_options:
+        option = {"overrides": "set"}.get(new_options[0], new_options[0])
         raise InputError(
             f"--{option} with design {args.action}; accepted: with design new"
         )

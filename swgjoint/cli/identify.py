@@ -133,16 +133,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def result_of(found: Identified) -> dict[str, Any]:
+def result_of(identified: Identified) -> dict[str, Any]:
     """Convert an identification to the JSON object of the command, without files."""
     from swgjoint.identify.identification import rms
 
-    measured = found.model.measured_torques()
-    drive = found.drive
+    measured = identified.model.measured_torques()
+    drive = identified.drive
     return {
         "estimates": {
             e.name: {"value": e.value, "unit": e.unit, "low": e.low, "high": e.high}
-            for e in found.estimates.values()
+            for e in identified.estimates.values()
         },
         "kinematic_error": [
             {"alpha": int(p), "beta": int(q), "error_arcmin": float(size) / arcmin}
@@ -157,12 +157,12 @@ def result_of(found: Identified) -> dict[str, Any]:
                 "rms_Nm": rms(rest),
                 "share": rms(rest) / rms(measured[key]),
             }
-            for key, rest in found.residuals.items()
+            for key, rest in identified.residuals.items()
         },
         "samples": len(next(iter(measured.values()))),
-        "correlation": found.correlation,
-        "notes": list(found.notes),
-        "doubts": list(found.doubts),
+        "correlation": identified.correlation,
+        "notes": list(identified.notes),
+        "doubts": list(identified.doubts),
     }
 
 

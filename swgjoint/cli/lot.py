@@ -106,9 +106,9 @@ def report(result: dict[str, Any]) -> str:
     """Format the percentiles of every figure, then the yield."""
     columns = ("p1", "p5", "p50", "p95", "p99", "mean", "std")
     rows = [
-        [key, *(found[column] for column in columns)]
-        for key, found in result["figures"].items()
-        if found is not None
+        [key, *(figure[column] for column in columns)]
+        for key, figure in result["figures"].items()
+        if figure is not None
     ]
     count = len(result["rows"])
     lines = [table(rows, header=("", *columns)), ""] if rows else []

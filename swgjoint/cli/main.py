@@ -174,8 +174,8 @@ def _command(name: str, arguments: list[str]) -> int:
     except BrokenPipeError:
         raise
     except OSError as exc:  # disk full, no permission: no bug in swgjoint
-        what = f"{exc.filename}: " if exc.filename else ""
-        return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
+        prefix = f"{exc.filename}: " if exc.filename else ""
+        return _refuse(name, f"{prefix}{exc.strerror or exc}", FAILED)
     except Exception as exc:
         if out_of_memory(exc):
             return _refuse(name, "out of memory: use a smaller refinement", FAILED)

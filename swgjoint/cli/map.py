@@ -117,10 +117,11 @@ def _sampled(drive: DriveMap) -> tuple[float, float]:
 
 def _built(args: argparse.Namespace) -> DriveMap:
     """Build the map of a design."""
-    given = [name for name in _MEASURED if getattr(args, name) is not None]
-    if given:
+    options = [name for name in _MEASURED if getattr(args, name) is not None]
+    if options:
         raise InputError(
-            f"--{given[0].replace('_', '-')} with a design; accepted: with a .csv file"
+            f"--{options[0].replace('_', '-')} with a design; accepted: with a .csv"
+            " file"
         )
     from swgjoint.gear.design.design import Design
 

@@ -62,17 +62,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.drives.spec_sheet import measure_drive
 
-    measured = measure_drive(
+    evaluated = measure_drive(
         args.drive,
         model=args.model,
         only=[] if args.only is None else [k.strip() for k in args.only.split(",")],
         measured=args.measured,
         progress=args.progress,
     )
-    wall = measured.result.pop("wall_s")
-    result = {**measured.result, "files": [], "wall_s": wall}
+    wall = evaluated.result.pop("wall_s")
+    result = {**evaluated.result, "files": [], "wall_s": wall}
     if folder is not None:
-        _write(folder, result, measured.sheet, measured.overlay)
+        _write(folder, result, evaluated.sheet, evaluated.overlay)
     return result
 
 
@@ -80,16 +80,18 @@ def _write(
     folder: Any,
     result: dict[str, Any],
     sheet: SpecSheet,
-    laid: Overlay | None,
+    overlay: Overlay | None,
 ) -> None:
     from swgjoint.view.plots.spec import spec_picture
 
     outputs = Outputs(folder)
     outputs.write("spec.png", lambda: spec_picture(result["design"], sheet))
-    if laid is not None:
+    if overlay is not None:
         from swgjoint.view.plots.overlay import overlay_picture
 
-        outputs.write("measured.png", lambda: overlay_picture(result["design"], laid))
+        outputs.write(
+            "measured.png", lambda: overlay_picture(result["design"], overlay)
+        )
     outputs.write_json("spec.json", result)
 
 
@@ -144,7 +146,7 @@ def report(result: dict[str, Any]) -> str:
     lines += [*result["validation_notes"], *doubts(result)]
     lines += _details(result)
     if "measured" in result:
-        lines += _laid(result["measured"])
+        lines += _comparison(result["measured"])
     reasons: dict[str, list[str]] = {}
     for key, reason in result["missing"].items():
         reasons.setdefault(reason, []).append(words(key)[0])
@@ -197,10 +199,10 @@ def _details(result: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _laid(found: dict[str, Any]) -> list[str]:
+def _comparison(measured: dict[str, Any]) -> list[str]:
     """Format the comparison of the measured loop with the prediction."""
-    low, high = found["torque_range_Nm"]
-    beyond = ", beyond the torque range of the map" if found["beyond_range"] else ""
+    low, high = measured["torque_range_Nm"]
+    beyond = ", beyond the torque range of the map" if measured["beyond_range"] else ""
     rows = [
         (
             f"{row['segment']}, {row['from_Nm']:.4g} to {row['to_Nm']:.4g} N·m",
@@ -209,12 +211,13 @@ def _laid(found: dict[str, Any]) -> list[str]:
             row["rms_arcmin"],
             row["largest_arcmin"],
         )
-        for row in found["segments"]
+        for row in measured["segments"]
     ]
     lines = [
-        f"measured loop {found['file']}: {found['samples']} samples, {low:.4g} to"
-        f" {high:.4g} N·m{beyond}; drive {found['history']}; residual rms"
-        f" {found['rms_arcmin']:.3g}, largest {found['largest_arcmin']:.3g} arcmin",
+        f"measured loop {measured['file']}: {measured['samples']} samples, {low:.4g} to"
+        f" {high:.4g} N·m{beyond}; drive {measured['history']}; residual rms"
+        f" {measured['rms_arcmin']:.3g}, largest"
+        f" {measured['largest_arcmin']:.3g} arcmin",
         table(
             rows,
             header=(
@@ -227,11 +230,11 @@ def _laid(found: dict[str, Any]) -> list[str]:
         ),
     ]
     pairs = [
-        (words(key)[0], *(found[key][which] for which in ("measured", "predicted")))
+        (words(key)[0], *(measured[key][which] for which in ("measured", "predicted")))
         for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin")
     ]
     lines.append(table(pairs, header=("[arcmin]", "measured", "predicted")))
-    return [*lines, *(f"warning: {line}" for line in found["warnings"])]
+    return [*lines, *(f"warning: {line}" for line in measured["warnings"])]
 
 
 def _source(result: dict[str, Any]) -> str:

@@ -128,18 +128,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _check_response_options(args: argparse.Namespace) -> None:
     """Check that options of ``response`` are used with it and are in range."""
-    given = {
+    options = {
         "load-inertia": args.load_inertia,
         "rotor-inertia": args.rotor_inertia,
         "closed-form": args.closed_form or None,
     }
-    named = [key for key, value in given.items() if value is not None]
+    named = [key for key, value in options.items() if value is not None]
     if named and args.name != "response":
         raise InputError(
             f"--{named[0]} with study {args.name}; accepted: with study response"
         )
     for key in named:
-        value = given[key]
+        value = options[key]
         if value is not True and not LEAST_INERTIA <= value <= MOST_INERTIA:
             raise InputError(
                 f"--{key} {value:g} kg·m²; accepted: {LEAST_INERTIA:g} to"

@@ -87,11 +87,11 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
         )
         choice: dict[str, DriveChoice] = made.drive_choice
         return made.scene, {name: one.as_json() for name, one in choice.items()}
-    given = [option for name, option in OF_AN_ARM.items() if getattr(args, name)]
-    if given:
+    arm_options = [option for name, option in OF_AN_ARM.items() if getattr(args, name)]
+    if arm_options:
         raise InputError(
-            f"{', '.join(given)} with scene {args.scene!r}; accepted: with an arm (an"
-            " MJCF or URDF file); for a scene, set the keys of the scene instead"
+            f"{', '.join(arm_options)} with scene {args.scene!r}; accepted: with an arm"
+            " (an MJCF or URDF file); for a scene, set the keys of the scene instead"
         )
     if drive:
         scene = Scene.load_file(args.scene).with_drive(drive)

@@ -129,7 +129,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     """
     import rerun as rr
 
-    _turbo()  # load the colour map before the run ends
+    _turbo()  # load the colour map now, while the engine computes
     drive = assembly.transmissions[assembly.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
