@@ -205,7 +205,7 @@ def report(result: dict[str, Any]) -> str:
             row["argument"],
             row["level"],
             *(cell(row, key) for key in columns),
-            *(["MISSED" if row["missed"] else "kept"] if verdict else []),
+            *(["MISSED" if row["missed"] else "met"] if verdict else []),
         )
         for row in result["rows"]
     ]
@@ -224,6 +224,6 @@ def report(result: dict[str, Any]) -> str:
                 f"{row['argument']}: {key} {cell(row, key)}, limit {spec[key]:g}"
             )
     if spec is not None:
-        kept = ", ".join(result["kept_by"])
-        lines.append(f"all limits are kept by: {kept or 'none'}")
+        passing = ", ".join(result["kept_by"])
+        lines.append(f"all limits are met by: {passing or 'none'}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

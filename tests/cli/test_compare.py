@@ -174,10 +174,10 @@ def test_the_picture_and_the_report_show_every_argument(tmp_path, capsys):
     assert main(["compare", *arguments, *SHORT]) == 1
     text = capsys.readouterr().out
     assert re.search(f"^{SOFT}: K1_Nm_rad 47.., limit 10000$", text, re.MULTILINE)
-    assert text.count("MISSED") == 2 and text.count("kept\n") == 1
+    assert text.count("MISSED") == 2 and text.count("met\n") == 1
     files = ["compare.json", "compare.png", "report.html", "run.rrd"]
     assert sorted(p.name for p in out.iterdir()) == files
-    assert names(text, "kept by", STIFF)
+    assert names(text, "met by", STIFF)
     entities = {chunk.entity_path for chunk in RrdReader(out / "run.rrd").stream()}
     again = SOFT + r"\ \(again\ 1\)"
     assert {f"/{run}/joint/joint" for run in (SOFT, STIFF, again)} <= entities
