@@ -1,4 +1,4 @@
-"""``swgjoint.attach``: drives by name, file or design on the hinges of any model."""
+"""``swgjoint.attach``: attach drives, stated by name, file or design, to hinges."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.units import arcmin
 
 DriveSource = DriveMap | Design | str | Path
+"""A map, a design, or the name or path of either."""
 
 
 class AttachOptions(TypedDict, total=False):
@@ -117,9 +118,10 @@ def attach(
             step cannot resolve at this speed are omitted. None keeps all harmonics.
         max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
             [rad].
-        integrator: ``discrete`` replaces Euler, ``implicit`` and ``implicitfast`` (the
-            last two with a warning) and resets iterations and tolerances of the solver
-            that are too coarse; ``keep`` changes neither.
+        integrator: If a level has a rotor, ``discrete`` replaces Euler, ``implicit``
+            and ``implicitfast`` (the last two with a warning), raises iteration limits
+            of the solver below MuJoCo's defaults, and replaces a tolerance that is too
+            coarse; ``keep`` changes none of these.
         model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; None takes
             the default of the design.
         kinematic_error_arcmin: Assumed kinematic error, peak to peak over one output
@@ -132,8 +134,8 @@ def attach(
         of the model.
 
     Raises:
-        InputError: If a joint, a drive or a value cannot be used, with one line for
-            each; the spec is then unchanged.
+        InputError: If a joint, a drive or a value cannot be used; the spec is then
+            unchanged. One message lists all joints that cannot take a drive.
         ComputationError: If the plugin cannot be loaded.
     """
     check_spec(spec)

@@ -33,8 +33,9 @@ def build_map(
     """Compute the drive map of a design with finite elements.
 
     The potential is that of the drive without friction. If the teeth have a friction
-    coefficient, hysteresis elements are fitted to the torque loop with friction, and
-    ``info["friction_loop"]`` compares the two.
+    coefficient, the fidelities ``2d`` and ``3d`` also compute torque loops with
+    friction in 2D and fit hysteresis elements to them; ``info["friction_loop"]``
+    compares the loops with these elements.
 
     Args:
         design: The drive.
@@ -54,7 +55,7 @@ def build_map(
     Raises:
         DesignError: If the design cannot be built or contains something that the model
             does not cover.
-        ComputationError: If the solver converges at no torque at all.
+        ComputationError: If the solver converges at none of the torques.
     """
     model = model or default_model(design)
     if model == "3d":
@@ -96,7 +97,7 @@ def build_map(
 def _with_friction(
     design: Design, drive: DriveMap, progress: Progress, keep: Unfinished | None
 ) -> DriveMap:
-    """The map with the hysteresis of the teeth, or with the reason why it has none."""
+    """The map with hysteresis from tooth friction, or the reason why it has none."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
         loops = friction_loops(design, top=top, progress=progress, keep=keep)
@@ -108,7 +109,7 @@ def _with_friction(
 
 
 def _without_losses(design: Design, drive: DriveMap) -> DriveMap:
-    """The map with the reason why it has no losses at speed."""
+    """The map with the reason why it has no speed-dependent losses."""
     missing = dict.fromkeys(LOSS_KEYS, without_friction(design))
     missing |= drive.info.get("missing", {})
     return replace(drive, info={**drive.info, "missing": missing})

@@ -37,17 +37,17 @@ def drive_of(
     joint: str = "",
     progress: Progress = silent,
 ) -> DriveMap:
-    """The map of a joint's drive; maps that are loaded or built are kept in ``known``.
+    """The map of a joint's drive; ``known`` collects the maps that are loaded or built.
 
-    The map omits hysteresis that the section switches off and, at levels that use
-    harmonics, the harmonics below the tolerance. A catalogue drive gets the kinematic
-    error of its tables or of the section, with different phases at every joint. Maps
-    in ``known`` are used unchanged.
+    The map omits hysteresis if the section switches it off and, at levels that use
+    harmonics, the harmonics below the tolerance of the section. A catalogue drive gets
+    the kinematic error of its tables or of the section, with different phases at every
+    joint. Maps in ``known`` are neither loaded nor built again.
 
     Args:
         section: Settings of the joint, which must have a drive.
-        known: Maps by reference, followed by ``--model MODEL`` if the section sets a
-            fidelity. New maps are added.
+        known: Maps by reference; the key ends with `` --model MODEL`` if the section
+            sets a fidelity. New maps are added.
         joint: Name of the joint.
         progress: Called while a map is built.
 
@@ -159,7 +159,7 @@ def load_drive(
             the meshing cycle of the teeth takes minutes.
         kinematic_error_arcmin: Assumed kinematic error, peak to peak [arcmin], of a
             catalogue drive or of another drive without kinematic error. None takes the
-            value of the catalogue; other drives then get no error.
+            value of the catalogue and leaves other drives unchanged.
         progress: Called while a map is built.
 
     Returns:
@@ -213,9 +213,9 @@ def _named(reference: str | Path | Design | DriveMap) -> str:
 def find_drive(reference: str | Path | Design | DriveMap) -> DriveMap | Design:
     """Resolve a drive reference to a map or a design without building anything.
 
-    A name that ends with ``.swg`` is a map; an existing file or a bundled name is a
-    design; a name that begins with a catalogue series (``CSG-25-100``) is a catalogue
-    drive. A design or map object is returned unchanged.
+    A name that ends with ``.swg`` is a map; an existing file, a bundled name or
+    ``size-NN-RRR`` is a design; a name that begins with a catalogue series
+    (``CSG-25-100``) is a catalogue drive. A design or map object is returned unchanged.
 
     Raises:
         InputError: If the reference is none of these.
@@ -264,7 +264,7 @@ def _unknown(reference: str) -> str:
 
 
 def names_catalogue(reference: str) -> bool:
-    """Whether a reference is a catalogue drive, not a file or a design."""
+    """Whether a reference names a catalogue drive rather than a file or a design."""
     return (
         is_catalogue_name(reference)
         and not reference.endswith(".swg")
@@ -274,7 +274,7 @@ def names_catalogue(reference: str) -> bool:
 
 
 def _may_be_built(reference: str) -> bool:
-    """Whether a reference may be a design."""
+    """Whether a reference may name a design, from which a map can be built."""
     return not reference.endswith(".swg") and not names_catalogue(reference)
 
 

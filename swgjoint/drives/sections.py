@@ -19,15 +19,15 @@ class MotorLimits(Section):
     """Limits of a motor, all at the motor shaft; each limit is optional."""
 
     torque_limit_Nm: Positive | None = None
-    """Largest torque at any speed."""
+    """Largest torque at any speed [N·m]."""
     stall_torque_Nm: Positive | None = None
-    """Largest torque at rest; it falls linearly to zero at the no-load speed."""
+    """Largest torque at rest [N·m]; the limit falls linearly to zero with speed."""
     no_load_speed_rpm: Positive | None = None
-    """Speed at which the torque-speed line reaches zero torque."""
+    """Speed at which that limit reaches zero torque [rpm]."""
     torque_constant_Nm_A: Positive | None = None
-    """Torque per current; if given, the metrics include the motor current."""
+    """Torque per current [N·m/A]; if given, the metrics include the motor current."""
     current_limit_A: Positive | None = None
-    """Largest current; requires the torque constant."""
+    """Largest current [A]; requires the torque constant."""
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
@@ -47,7 +47,7 @@ class MotorLimits(Section):
 
     @property
     def torque(self) -> float | None:
-        """Smaller of torque limit and current limit [N·m]; None if there is neither."""
+        """Smaller of torque limit and current limit [N·m]; None without limits."""
         bounds = [] if self.torque_limit_Nm is None else [self.torque_limit_Nm]
         if self.current_limit_A is not None and self.torque_constant_Nm_A is not None:
             bounds.append(self.current_limit_A * self.torque_constant_Nm_A)
@@ -58,13 +58,13 @@ class LinearDrive(Section):
     """A drive of constant stiffness without kinematic error."""
 
     stiffness_Nm_rad: Positive
-    """Torsional stiffness at the output."""
+    """Torsional stiffness at the output [N·m/rad]."""
     teeth_flexspline: Annotated[int, Field(ge=40, le=400)] = 200
     """Number of teeth of the flexspline."""
     teeth_circular_spline: Annotated[int, Field(ge=42, le=412)] = 202
     """Number of teeth of the circular spline."""
     rated_torque_Nm: Positive = 100.0
-    """Rated torque at the output."""
+    """Rated torque at the output [N·m]."""
 
 
 class JointSection(Section):
@@ -75,35 +75,37 @@ class JointSection(Section):
     linear: LinearDrive | None = None
     """Drive of constant stiffness, instead of ``drive``."""
     model: Literal["ring", "2d", "3d"] | None = None
-    """Finite element model of a design; None: 3d for one with a cup, otherwise 2d."""
+    """Finite element model of a design; None takes 3d if it has a cup, otherwise 2d."""
     kinematic_error_arcmin: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
-    """Assumed kinematic error, peak to peak over one output turn, of a catalogue drive
-    or of another drive without kinematic error; see
+    """Assumed kinematic error, peak to peak over one output turn [arcmin], of a
+    catalogue drive or of another drive without kinematic error; see
     :mod:`swgjoint.maps.fit.error_spectrum`. None takes the transmission accuracy of the
     catalogue. A drive that has its own kinematic error keeps it and accepts only 0."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
-    """Seed of the assumed error, 0 if None; joints with one seed differ by name."""
+    """Seed of the assumed error, 0 if None; joints with equal seeds differ by name."""
     level: Level | None = None
     """Level of detail of the joint model."""
     rotor_inertia_kgm2: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Inertia of rotor and wave generator about the motor axis."""
+    """Inertia of rotor and wave generator about the motor axis [kg·m²]."""
     damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Damping ratio of the torsional vibration; None takes that of the drive."""
+    """Damping ratio of the torsional vibration [-]; None takes that of the drive."""
     hysteresis: bool | None = None
-    """False omits the hysteresis of the drive, which native and full include."""
+    """Whether the levels native and full include the drive's hysteresis; None: yes."""
     friction: bool | None = None
-    """False omits the friction of the drive, which native and full include."""
+    """Whether the levels native and full include the drive's friction; None: yes."""
     harmonics_tolerance_arcmin: Positive | None = None
-    """Drops harmonics of the drive that together turn the output by less than this at
-    constant torque, see :mod:`swgjoint.maps.fit.pruning`; None keeps all. The
-    tolerance has no effect at the levels rigid, linear and native, which have no
-    harmonics. At the other levels, a map is rejected if the variation of its stiffness,
-    summed over the harmonics, exceeds the mean stiffness, because a given torque then
-    does not bound the angle."""
+    """Tolerance for omitting harmonics [arcmin]: at constant torque, the omitted
+    harmonics together turn the output by less than this, see
+    :mod:`swgjoint.maps.fit.pruning`. None keeps all harmonics. The tolerance has no
+    effect at the levels rigid, linear and native, which have no harmonics. At the other
+    levels, a map is rejected if the variation of its stiffness, summed over the
+    harmonics, exceeds the mean stiffness, because a given torque then does not bound
+    the angle."""
     rotor: Literal["gyroscopic", "lumped"] | None = None
-    """``gyroscopic`` (default): a body carried by its link; ``lumped``: an inertia."""
+    """Rotor model: ``gyroscopic`` (default), a body carried by the parent link, or
+    ``lumped``, an inertia that rotates only relative to that link."""
     motor: MotorLimits | None = None
-    """Limits of the motor; None: it delivers whatever the controller commands."""
+    """Limits of the motor; None for a motor that delivers any commanded torque."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

@@ -39,8 +39,9 @@ if TYPE_CHECKING:
     from swgjoint.maps.fit.overlay import Overlay
 
 FEW_ANGLES = 3
-"""Number of wave-generator positions in the map of a design if every requested figure
-is measured with the input locked at the first one, without manufacturing errors."""
+"""Number of wave-generator positions in the map of a design if the requested figures
+need only the first position, where the input is locked; the design is then modelled
+without manufacturing errors."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +112,7 @@ def measure_drive(
     measured: str | Path | None = None,
     progress: Progress = silent,
 ) -> DriveSheet:
-    """Spec sheet of a drive together with the objects that figures are drawn from.
+    """Spec sheet of a drive together with the data behind its figures.
 
     Args:
         drive: See :func:`spec_sheet`.
@@ -119,6 +120,9 @@ def measure_drive(
         only: See :func:`spec_sheet`.
         measured: See :func:`spec_sheet`.
         progress: See :func:`spec_sheet`.
+
+    Returns:
+        The sheet, its dictionary for ``--json``, and the comparison with ``measured``.
     """
     start = time.perf_counter()
     keys, loop = check_keys(only), None
@@ -208,6 +212,7 @@ class _Figures:
     """Figures of a design that a map does not contain."""
 
     values: dict[str, float] = field(default_factory=dict)
+    """Figures by key, in the unit of the key."""
     reasons: dict[str, str] = field(default_factory=dict)
     """Reason why a figure is missing, by key."""
     details: dict[str, Any] = field(default_factory=dict)
@@ -262,10 +267,10 @@ class _Figures:
             )
 
     def add_running(self, design: Design, keys: tuple[str, ...]) -> None:
-        """Add the no-load torque of the friction of teeth and race as a reason.
+        """Report the torque of tooth and race friction as a bound on no-load torque.
 
-        It is a lower bound and only a small part of the no-load torque of a drive, so
-        it explains the missing figure instead of replacing it.
+        This torque is a lower bound and only a small part of the no-load torque of a
+        drive. It is therefore stated in the reason why the figure is missing.
         """
         wanted = [key for key in SLOW_KEYS if key in keys]
         if not wanted:
