@@ -23,19 +23,20 @@ if TYPE_CHECKING:
 
 
 MOVES = 0.05
-"""Link motion that torsion alone cannot cause [rad], three times 60 arcmin."""
+"""Link travel that torsion alone cannot cause [rad], about three times 60 arcmin."""
 TOGETHER = 0.99
-"""Correlation of both angles above which the gear moves the link."""
+"""Correlation of motor and link angle above which the gear moves the link [-]."""
 RATIO_OFF = 0.05
-"""Relative tolerance of the ratio of a log; torsion over link travel shifts it."""
+"""Relative tolerance of the ratio of a log [-]; torsion shifts that ratio slightly."""
 SHARE_LEFT = 0.05
-"""Residual relative to the rms of a torque above which the model does not fit.
+"""Largest accepted residual of a torque relative to its root mean square [-].
 
-Simulated benches of drives within the model leave 0.3 %, those with Bouc-Wen hysteresis
-0.8 %. Link angles with a delay of 0.5 ms leave 20 % if it is not corrected.
+On simulated benches the residual is 0.3 % for drives that the model describes exactly
+and 0.8 % for drives with Bouc-Wen hysteresis. If the link angles have a delay of 0.5 ms
+that is not corrected, it is 20 %.
 """
 SURE = 3.0
-"""Number of standard deviations by which a value must be implausible."""
+"""Number of standard deviations beyond which an implausible value is reported [-]."""
 POSITIVE = (
     "damping",
     "hardening",
@@ -44,10 +45,10 @@ POSITIVE = (
     "friction_viscous",
     "rotor_inertia",
 )
-"""Parameters that are not negative for any drive."""
+"""Parameters that are never negative in a real drive."""
 
 PHASE_STEP = 1.0
-"""Phase change of a harmonic per window above which a note is given [rad].
+"""Phase change of a harmonic per window above which a note is added [rad].
 
 The torques at mean angles then differ from the mean torques: on a simulated bench
 without noise, hysteresis and viscous friction were 0.4 % off at 0.9 rad and 2 % at
@@ -56,9 +57,9 @@ without noise, hysteresis and viscous friction were 0.4 % off at 0.9 rad and 2 %
 
 
 def check_ratio(log: BenchLog, layout: str, teeth: tuple[int, int]) -> None:
-    """Refuse a layout or signs whose ratio differs from that of the log.
+    """Reject a layout or signs whose ratio differs from that of the log.
 
-    The check applies only if the gear moves the link.
+    The check applies only if the gear moves the link, so that the angles have a ratio.
 
     Args:
         log: Log of the bench.
@@ -97,7 +98,10 @@ def check_ratio(log: BenchLog, layout: str, teeth: tuple[int, int]) -> None:
 
 
 def without_skew(log: BenchLog, skew: float) -> BenchLog:
-    """The log with link angles at the instants of the other channels.
+    """The log with its link angles corrected for their delay.
+
+    The link angles are interpolated at the instants of the other channels; samples for
+    which there is none are omitted.
 
     Args:
         log: Recorded log.
@@ -126,7 +130,7 @@ def without_skew(log: BenchLog, skew: float) -> BenchLog:
 def doubts_of(
     estimates: Mapping[str, Estimate], left: Mapping[str, float], window: float
 ) -> list[str]:
-    """Lines on implausible parameters and on torques that the model does not explain.
+    """Doubts about implausible parameters and poorly modelled torques, one line each.
 
     Args:
         estimates: Estimates of all parameters by name.
@@ -138,8 +142,8 @@ def doubts_of(
         e = estimates.get(name)
         if e is not None and e.value + SURE * e.deviation < 0.0:
             lines.append(
-                f"{name} {e.value:.3g} {e.unit} ({e.low:.3g} to {e.high:.3g}) is below"
-                " zero"
+                f"{name} {e.value:.3g} {e.unit} ({e.low:.3g} to {e.high:.3g}) is"
+                " negative"
             )
     first, last = estimates.get("K1"), estimates.get("K3")
     if first is not None and last is not None:
@@ -152,8 +156,8 @@ def doubts_of(
     for name, share in left.items():
         if share > SHARE_LEFT:
             lines.append(
-                f"{name}: the model leaves {share:.1%} of its rms; plausible: at most"
-                f" {SHARE_LEFT:.0%}"
+                f"{name}: the residual of the model is {share:.1%} of its rms;"
+                f" plausible: at most {SHARE_LEFT:.0%}"
             )
     if lines:
         lines[-1] += "; check the clocks of the channels, their signs and the teeth"
@@ -183,14 +187,15 @@ def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> li
     if offset:
         notes.append(
             f"mean of measured minus modelled torque: {', '.join(offset)}; offset of a"
-            " sensor? The intervals do not include it"
+            " sensor? The intervals do not include this offset"
         )
     phase = model.phase_step
     if phase > PHASE_STEP:
         notes.append(
-            f"kinematic error turns by up to {phase:.2g} rad in a window of"
-            f" {model.step:.3g} s, which the intervals do not include; better: at most"
-            f" {PHASE_STEP:g} rad, --window {model.step * PHASE_STEP / phase:.2g}"
+            f"the phase of the kinematic error changes by up to {phase:.2g} rad in a"
+            f" window of {model.step:.3g} s, and the intervals do not include the"
+            f" resulting error; use --window {model.step * PHASE_STEP / phase:.2g} for"
+            f" at most {PHASE_STEP:g} rad"
         )
     rated = drive.ratings.rated_torque
     low, high = TORSION_AT_RATED

@@ -1,38 +1,39 @@
 r"""Parameters of a drive from a log of its motion and torques, with intervals.
 
-A bench logs the angles of motor and link and the motor torque, the output torque or
-both. In the notation of the map, with the slopes :math:`g` of the torsion,
+A bench logs the angles of motor and link, and the motor torque, the output torque or
+both. In the notation of the map, with the derivatives :math:`g` of the torsion,
 
 .. math::
     T &= T_s(\Delta) + q + C\dot\Delta, \quad
     \Delta = \theta/i + e_0(\theta, \psi) - \psi \\
     \tau_{out} &= -g_\psi T - b_\psi F, \qquad
-    \tau_{motor} = J\ddot\theta + g_\theta T + b_\theta F
+    \tau_{motor} = J\ddot\theta + g_\theta T + b_\theta F, \\
+    F &= (f_c + c\,|T/i|)\,\mathrm{sign}\,\nu + \eta\nu
 
 with the spring :math:`T_s` (three lines as in a catalogue, or linear plus cubic), one
-Jenkin element q, and friction :math:`F = (f_c + c\,|T/i|)\,\mathrm{sign}\,\nu +
-\eta\nu`. Samples at which the wave generator may stick are excluded. One least-squares
-fit of the torques estimates all parameters, the harmonics of :math:`e_0` and the zero
-of the motor angle. Each channel is weighted with the root mean square of its own
-residual including the mean, so that a channel with an offset gets a low weight.
+Jenkin element of torque q, and friction F. If the motor torque was logged, samples at
+which the wave generator may stick are excluded. A least-squares fit of the torques
+estimates all parameters, the harmonics of :math:`e_0` and the zero of the motor angle
+together. Each channel is divided by the root mean square of its own residual including
+the mean, so that a channel with an offset gets a low weight.
 
 The clocks of the encoders may differ, so that the link angles are delayed by a time s.
 If the output torque was logged, s is estimated with the other parameters,
-:math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; the log is then corrected by s and
-fitted again. With the motor torque alone s cannot be separated from viscous friction;
-a negative viscous friction is then reported as a doubt. A delayed torque appears as
-damping.
+:math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; a significant s is then corrected in
+the log, which is fitted again. From the motor torque alone, s cannot be separated from
+viscous friction; a negative viscous friction is then reported as a doubt. A delay of a
+torque channel appears as damping.
 
-Samples are first averaged over a window, because encoder noise would otherwise push the
-slider of the element, and acceleration is a difference of averages. Intervals follow
-from the Gauss-Newton covariance
+Samples are first averaged over a window, because encoder noise would otherwise move the
+slider of the element, and accelerations are differences of these averages. Intervals
+follow from the Gauss-Newton covariance
 
-.. math:: \mathrm{cov} = \kappa\,(J^T J)^{-1}, \qquad \kappa = 1 + 2\sum_k \rho_k,
+.. math:: \mathrm{cov} = \kappa\,(D^T D)^{-1}, \qquad \kappa = 1 + 2\sum_k \rho_k,
 
-with J weighted by the deviation of the residuals. :math:`\kappa` accounts for the
-information lost by correlation between samples, which is mostly ripple outside the
-model. The intervals are valid if the model is; the share of each torque that remains as
-residual indicates how well it fits.
+with the Jacobian D of these weighted residuals and their autocorrelation :math:`\rho_k`
+at a lag of k samples. The factor :math:`\kappa` accounts for correlated residuals,
+which are mostly ripple outside the model. The intervals are valid only if the model
+fits; the root mean square of a residual relative to that of the torque is a measure.
 
 Source:
     Ljung (1999), "System identification: theory for the user", 2nd ed., ch. 9.
@@ -59,36 +60,36 @@ from swgjoint.typing import Array
 WINDOW = 0.005
 """Duration of an averaging window [s]."""
 ORDERS: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0), (0, 2), (0, 4), (1, -1))
-"""Orders (p, q) of p alpha + q beta that are fitted to a log over an output turn."""
+"""Orders (p, q), phase p alpha + q beta, that are fitted to a log of a whole turn."""
 ORDERS_OF_PART: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0))
-"""Orders for less than one output turn, which cannot separate both gear angles."""
+"""Orders for less than an output turn, which cannot separate alpha from beta."""
 DEVIATIONS = 1.96
 """Half width of an interval in standard deviations: 95 % of a normal distribution."""
-_TURN = 0.95  # fraction of an output turn that counts as a whole one
+_TURN = 0.95  # fraction of an output turn that counts as a whole turn
 _ROUNDS = 2  # fits, each with updated weights
-_CORRELATED = 200  # largest lag of the correlation [samples]
-_SINGULAR = 1e-10  # least reciprocal condition of the information
-_SKEW_LEAST = 1e-6  # s, below which a skew moves no torque
+_CORRELATED = 200  # largest lag of the autocorrelation [samples]
+_SINGULAR = 1e-10  # smallest reciprocal condition number of D'D
+_SKEW_LEAST = 1e-6  # delay that has no effect on the torques [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """One parameter with its 95 % interval."""
+    """One parameter with its 95 % interval; ``value`` is in ``unit``."""
 
     name: str
     unit: str
     value: float
     deviation: float
-    """Standard deviation in the unit of the parameter."""
+    """Standard deviation of the value, in the same unit."""
 
     @property
     def low(self) -> float:
-        """Lower end of the interval."""
+        """Lower end of the 95 % interval, in ``unit``."""
         return self.value - DEVIATIONS * self.deviation
 
     @property
     def high(self) -> float:
-        """Upper end of the interval."""
+        """Upper end of the 95 % interval, in ``unit``."""
         return self.value + DEVIATIONS * self.deviation
 
 
@@ -98,9 +99,9 @@ class Identified:
 
     estimates: Mapping[str, Estimate]
     drive: DriveMap
-    """Map with these parameters; motor angles are counted from zero torsion."""
+    """Map with these parameters; its motor angle is zero at zero torsion."""
     samples: Averaged
-    """Averaged samples of the fit."""
+    """Window means of the log to which the model was fitted."""
     model: Model
     residuals: Mapping[str, Array]
     """Measured minus modelled torque of each channel [N·m]. Shape (n,)."""
@@ -117,7 +118,7 @@ class Identified:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Options:
-    """Options of :func:`identify`, with the parameters that a fit may leave out."""
+    """Options of :func:`identify`, and whether to estimate the delay (``skew``)."""
 
     teeth: tuple[int, int]
     ratings: Ratings | float
@@ -147,7 +148,7 @@ def identify(
     window: float = WINDOW,
     name: str = "identified",
 ) -> Identified:
-    """Identify the parameters of a drive.
+    """Parameters of a drive, its map, and remarks on both.
 
     Args:
         log: Log with both signs of the torque. The kinematic error needs motion over an
@@ -161,15 +162,15 @@ def identify(
         spring: ``three_lines`` with the corners of the ratings, or ``cubic``.
         rotor_inertia: Inertia of motor and wave generator [kg·m²]; estimated if None.
             Like friction, it matters only if the motor torque was logged.
-        orders: (p, q) of the kinematic error; None chooses them by the travel of the
-            log.
+        orders: Orders (p, q) of the kinematic error; None takes :data:`ORDERS`, or
+            :data:`ORDERS_OF_PART` if the link travels less than a turn.
         hysteresis: Whether to fit a Jenkin element.
         window: Duration of an averaging window [s].
         name: Name of the map.
 
     Raises:
-        InputError: If the log does not determine the parameters.
-        ComputationError: If the least squares diverge.
+        InputError: If an option is invalid or the log does not determine a parameter.
+        ComputationError: If the least-squares fit diverges.
     """
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
@@ -257,14 +258,14 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
 
 
 def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
-    """The model of the log; refuses repeated orders and too few moving samples."""
+    """The model of the log; rejects repeated orders and too few slipping samples."""
     orders = options.orders
     if orders is None:
         whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
         orders = ORDERS if whole_turn else ORDERS_OF_PART
     if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
         shown = ", ".join(f"{p}:{q}" for p, q in orders)
-        raise InputError(f"orders {shown}; accepted: each once, not 0:0")
+        raise InputError(f"orders {shown}; accepted: each order once, and not 0:0")
     model = Model.from_log(
         log,
         samples,
@@ -281,14 +282,14 @@ def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
     if model.kept.sum() < FEWEST:
         raise InputError(
             f"{log.where}: the wave generator turns in {model.kept.sum()} of"
-            f" {model.kept.size} averages; accepted: at least {FEWEST}, or leave"
-            " motor_torque_Nm out"
+            f" {model.kept.size} averages; accepted: at least {FEWEST}, or a log"
+            " without motor_torque_Nm"
         )
     return model
 
 
 def _undetermined(model: Model, information: Array) -> str | None:
-    """Name of the parameter that the log determines worst, if it is singular."""
+    """Name of the least determined parameter; None if all are determined."""
     names = [p.name for p in model.unknowns]
     scale = np.sqrt(np.diag(information))
     if not scale.all():
@@ -316,7 +317,7 @@ def _estimates(model: Model, values: Array, covariance: Array) -> dict[str, Esti
 
 
 def _without(name: str, log: BenchLog, options: _Options) -> Identified:
-    """The result of a model without an optional parameter that is not determined."""
+    """The result of a model without the undetermined parameter, if it is optional."""
     if name == "link_skew":
         return _identified(log, replace(options, skew=False))
     if name.startswith("hysteresis"):
@@ -385,7 +386,7 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
 
 
 def _correlation(residual: Array) -> float:
-    """1 + 2 times the sum of the autocorrelation, up to where noise hides it."""
+    """Factor kappa; the sum ends where the autocorrelation disappears in noise."""
     x = residual - residual.mean()
     n = len(x)
     power = float(x @ x)

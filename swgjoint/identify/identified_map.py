@@ -23,13 +23,16 @@ _PIECES = 16  # intervals of the cubic spring
 def map_of(
     model: Model, values: Array, *, name: str, source: str
 ) -> tuple[DriveMap, tuple[str, ...]]:
-    """The map with identified parameters, and notes on parameters it cannot contain.
+    """The map with identified parameters, and notes on those that it cannot contain.
 
     Args:
         model: The fitted model.
         values: Parameter values in the order of ``model.unknowns``.
         name: Name of the map.
-        source: Name of the log, for the record of the map.
+        source: Name of the log, recorded in the map.
+
+    Returns:
+        The map, and one note for each parameter that it cannot contain.
     """
     names = [x.name for x in model.unknowns]
     p = {name: float(v) for name, v in zip(names, values, strict=True)}
@@ -88,7 +91,7 @@ def _friction(p: Mapping[str, float], source: str) -> tuple[Friction | None, lis
     if "friction_coulomb" not in p:
         return None, []
     notes = [
-        f"friction_{key} {p[f'friction_{key}']:.3g} is below zero: the map has none"
+        f"friction_{key} {p[f'friction_{key}']:.3g} is negative: the map omits it"
         for key in ("coulomb", "load", "viscous")
         if p[f"friction_{key}"] < 0.0
     ]
@@ -110,7 +113,7 @@ def _friction(p: Mapping[str, float], source: str) -> tuple[Friction | None, lis
 def _cubic(
     model: Model, p: Mapping[str, Any], n_harmonics: int
 ) -> tuple[Array, Array, Array]:
-    """Knots over the torsion of the log and the exact quartics between them."""
+    """Knots over the torsion range of the log, exact quartics, and end stiffness."""
     reach = float(np.abs(model.torsion + p["zero"]).max())
     knots = np.linspace(-reach, reach, _PIECES + 1)
     energy = np.polynomial.Polynomial(

@@ -26,13 +26,15 @@ TORQUES = {
     "output_torque": {"output_torque_Nm": 1.0},
     "motor_torque": {"motor_torque_Nm": 1.0},
 }
+"""Accepted columns of each channel and their factors to SI units; ``TORQUES`` are those
+of which at least one is required."""
 FEWEST = 200
 """Smallest number of averaged samples for a fit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Averaged:
-    """Means over windows of equal duration; arrays of shape (n,)."""
+    """Means of a log over n windows of equal duration; arrays of shape (n,)."""
 
     time: Array
     """Mean time of the samples in a window [s]."""
@@ -66,11 +68,11 @@ class BenchLog:
     link_angle: Array
     """Angle psi of the output member [rad]."""
     output_torque: Array | None = None
-    """Torque of the drive on the output [N·m]."""
+    """Torque of the drive on the output [N·m]; None if it was not logged."""
     motor_torque: Array | None = None
-    """Torque of the motor on the input [N·m]."""
+    """Torque of the motor on the input [N·m]; None if it was not logged."""
     where: str = "log"
-    """Name of the log for messages."""
+    """File or name of the log in messages."""
 
     def __post_init__(self) -> None:
         if self.output_torque is None and self.motor_torque is None:
@@ -90,7 +92,7 @@ class BenchLog:
         if back.size:
             raise InputError(
                 f"{self.where}: time_s {self.time[back[0] + 1]:g} after"
-                f" {self.time[back[0]]:g}; accepted: increasing"
+                f" {self.time[back[0]]:g}; accepted: increasing times"
             )
 
     def average(self, window: float) -> Averaged:
@@ -100,7 +102,8 @@ class BenchLog:
             window: Duration of a window [s].
 
         Raises:
-            InputError: If a window is invalid or empty, or there are too few windows.
+            InputError: If the window is invalid, if a window contains no sample, or if
+                there are too few windows.
         """
         if not (np.isfinite(window) and window > 0.0):
             raise InputError(f"window {window:g} s; accepted: > 0 s")
@@ -117,14 +120,14 @@ class BenchLog:
             at = float(self.time[np.diff(bins).argmax()])
             raise InputError(
                 f"{self.where}: no sample for {gap * window:g} s after {at:g} s;"
-                f" accepted: one in every {window:g} s"
+                f" accepted: at least one sample in every {window:g} s"
             )
         _, place, counts = np.unique(bins, return_inverse=True, return_counts=True)
         if counts.size < FEWEST:
             raise InputError(
                 f"{self.where}: {len(self.time)} samples over"
-                f" {np.ptp(self.time):g} s are {counts.size} averages over {window:g}"
-                f" s; accepted: at least {FEWEST}"
+                f" {np.ptp(self.time):g} s give {counts.size} windows of {window:g} s;"
+                f" accepted: at least {FEWEST}"
             )
 
         def mean(values: Array | None) -> Array | None:
@@ -147,9 +150,9 @@ class BenchLog:
 def read_log(path: str | Path) -> BenchLog:
     """A log from a CSV file.
 
-    The columns are ``time_s``, ``motor_angle_deg`` and ``link_angle_deg`` (or
-    ``_rad``), and ``output_torque_Nm``, ``motor_torque_Nm`` or both. Other columns are
-    ignored.
+    The columns are ``time_s``, ``motor_angle_deg`` (or ``_rad``), ``link_angle_deg``
+    (or ``_rad``, ``_arcmin``), and ``output_torque_Nm``, ``motor_torque_Nm`` or both.
+    Other columns are ignored.
 
     Raises:
         InputError: If the file cannot be used; the message names file, line and column.
@@ -161,10 +164,10 @@ def read_log(path: str | Path) -> BenchLog:
 
 
 def mean_rate(means: Array, step: float) -> Array:
-    """Mean rate over windows from the means of a signal, of fourth order.
+    """Mean rate in each window from window means of a signal, fourth-order accurate.
 
-    The value at each border between windows is interpolated from the four means around
-    it.
+    The value at each border between windows is interpolated from the two means on
+    either side. The two windows at each end use lower-order differences.
 
     Args:
         means: Window means of the signal. Shape (n,).
@@ -181,7 +184,9 @@ def mean_rate(means: Array, step: float) -> Array:
 
 
 def mean_acceleration(means: Array, step: float) -> Array:
-    """Mean second derivative over windows from the means of a signal, of fourth order.
+    """Mean second derivative in each window from window means, fourth-order accurate.
+
+    The two windows at each end use lower-order differences.
 
     Args:
         means: Window means of the signal. Shape (n,).

@@ -23,31 +23,40 @@ from swgjoint.maps.torsion_law import torque_at_knots
 from swgjoint.typing import Array
 
 SLIDES = 10.0 * PRESLIDING
-"""Rotation since rest or reversal beyond which friction is assumed to slip [rad]."""
+"""Rotation since rest or reversal after which the bristle is assumed to slip [rad]."""
 _MOVES = 0.05  # fraction of the largest speed below which the wave generator may stick
-_ROUND_OFF = 1e-12  # relative to the largest value
-_TOLD, _SHOWS = 1e-4, 1e-3  # relevant skew [s] and its least share of the torsion
-_SOFTEST = 1e-3  # of the mean stiffness: keeps slopes positive during the search
+_ROUND_OFF = 1e-12  # range of a constant channel, relative to its largest value
+_TOLD, _SHOWS = 1e-4, 1e-3  # relevant delay [s]; its smallest effect on the torsion [-]
+_SOFTEST = 1e-3  # least slope relative to the mean stiffness, during the search
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
-    """A log with its known quantities, and the torques of given parameters along it."""
+    """A log with its known quantities, and the torques of given parameters along it.
+
+    Arrays have the shape (n,), one value for each window, unless stated otherwise.
+    """
 
     samples: Averaged
+    """Window means of the log."""
     layout: str
+    """Which member is fixed."""
     teeth: tuple[int, int]
+    """Number of teeth of flexspline and circular spline."""
     ratings: Ratings
+    """Catalogue torques, or those derived from the rated torque and the log."""
     spring: str
+    """Type of spring, a key of :data:`~swgjoint.identify.unknowns.SPRINGS`."""
     rotor_inertia: float | None
+    """Inertia of motor and wave generator [kg·m²]; None if it is a parameter."""
     orders: NDArray[np.int64]
     """Orders (p, q) of the kinematic error. Shape (n_harmonics, 2)."""
     hysteresis: bool
     """Whether the model has a Jenkin element."""
     skew: bool
-    """Whether a time offset of the link angles is estimated."""
+    """Whether the delay of the link angles is estimated."""
     first_skew: float
-    """Time offset of the link angles from a linear fit of the log [s]."""
+    """Delay of the link angles from a linear fit of the log [s]."""
     link_rate: Array
     """Link speed [rad/s]."""
     link_acceleration: Array
@@ -63,7 +72,7 @@ class Model:
     relative_rate: Array
     """Speed nu of the wave generator relative to the flexspline [rad/s]."""
     slipping: Array
-    """Direction of slip s, 1 or -1; zero where the friction may stick."""
+    """Direction of slip, 1 or -1; zero where the friction may stick [-]."""
     cos: Array
     """Window mean of the cosine of every harmonic's phase. Shape (n, n_harmonics)."""
     sin: Array
@@ -95,10 +104,12 @@ class Model:
             ratings: All catalogue torques, or only the rated torque [N·m].
             corners: T1 and T2 [N·m]; None takes 0.2 and 0.6 of the rated torque.
             spring: Key of :data:`SPRINGS`.
-            rotor_inertia: Inertia of the rotor [kg·m²]; estimated if None.
-            orders: (p, q) of the kinematic error.
+            rotor_inertia: Inertia of motor and wave generator [kg·m²]; estimated if
+                None.
+            orders: Orders (p, q) of the kinematic error.
             hysteresis: Whether the model has a Jenkin element.
-            skew: Whether to estimate a time offset of the link angles.
+            skew: Whether to estimate the delay of the link angles, if the output torque
+                was logged and the delay would have a visible effect.
 
         Raises:
             InputError: If an option is invalid or a channel of the log is constant or
@@ -112,7 +123,7 @@ class Model:
         rate, link_rate = mean_rate(theta, step), mean_rate(psi, step)
         alpha, b = angle_coefficients(layout)
         n = (pairs @ np.array([alpha, b])).astype(float)
-        # a window may contain many waves: average the waves instead of their phases
+        # a window may contain many waves: average sine and cosine, not the phase
         phase = np.stack([log.motor_angle, log.link_angle], axis=-1) @ n.T
         stretch, _ = play_bristle(b[0] * theta + b[1] * psi, np.full(len(t), SLIDES))
         slips = np.abs(stretch) >= (1.0 - 1e-9) * SLIDES
@@ -133,7 +144,7 @@ class Model:
             if np.ptp(x) <= _ROUND_OFF * largest:
                 raise InputError(
                     f"{log.where}: the {channel} is constant, {x[0] + 0.0:.3g} {unit};"
-                    " accepted: one that changes"
+                    " accepted: a channel that changes"
                 )
         # with the motor torque alone a skew cannot be separated from viscous friction
         skew = skew and samples.output_torque is not None
@@ -142,9 +153,9 @@ class Model:
         slope = float(np.polyfit(torsion - late * link_rate, torque, 1)[0])
         if not slope > 0.0:
             raise InputError(
-                f"torque falls by {-slope:.3g} N·m/rad as the torsion theta/i - psi"
-                f" grows, i = {i:g}; accepted: a log whose torques and angles have the"
-                " signs of the drive; check its layout and teeth"
+                f"torque decreases by {-slope:.3g} N·m/rad with increasing torsion"
+                f" theta/i - psi, i = {i:g}; accepted: a log whose torques and angles"
+                " have the signs of the drive; check its layout and teeth"
             )
         return cls(
             samples=samples,
@@ -173,11 +184,11 @@ class Model:
 
     @property
     def ratio(self) -> float:
-        """Signed ratio i."""
+        """Signed ratio i [-]."""
         return signed_ratio(self.layout, *self.teeth)
 
     def measured_torques(self) -> dict[str, Array]:
-        """Torques of the log by channel [N·m], at the :attr:`kept` samples."""
+        """Measured torques by channel at the :attr:`kept` samples [N·m]."""
         both = {
             "output_torque": self.samples.output_torque,
             "motor_torque": self.samples.motor_torque,
@@ -186,13 +197,13 @@ class Model:
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
-        """Mask of the samples that enter the fit.
+        """Mask of the window means that enter the fit. Shape (n,).
 
-        Samples count once the torsion has covered half its range, when the element has
-        forgotten the start of the log. The last two are excluded because their
-        acceleration is one-sided. With friction only samples count at which the wave
-        generator certainly slips, since static friction may have any value below its
-        limit.
+        The fit begins once the torsion has covered half its range; the hysteresis
+        element then no longer depends on its state at the start of the log. The last
+        two means are excluded because their acceleration is one-sided. If the motor
+        torque was logged, only means at which the wave generator certainly slips are
+        included, because static friction may have any value below its limit.
         """
         x = self.torsion
         travel = np.maximum.accumulate(x) - np.minimum.accumulate(x)
@@ -204,7 +215,11 @@ class Model:
         return np.asarray(keep)
 
     def torques(self, values: Array) -> dict[str, Array]:
-        """Output and motor torques along the log by channel, for given values [N·m]."""
+        """Modelled torques by channel at the :attr:`kept` samples [N·m].
+
+        Args:
+            values: Parameter values in the order of :attr:`unknowns`.
+        """
         p = {x.name: v for x, v in zip(self.unknowns, values, strict=True)}
         i, s = self.ratio, self.samples
         alpha, b = angle_coefficients(self.layout)
@@ -241,7 +256,7 @@ class Model:
 
     @property
     def phase_step(self) -> float:
-        """Largest phase change of a harmonic between two windows [rad]."""
+        """Largest phase change of a harmonic from one window to the next [rad]."""
         alpha, b = angle_coefficients(self.layout)
         n = self.orders @ np.array([alpha, b])
         angles = np.stack([self.samples.motor_angle, self.samples.link_angle])
@@ -275,6 +290,9 @@ def lines_of(model: Model, p: Mapping[str, float]) -> tuple[Array, Array]:
     Args:
         model: Model with a three-line spring.
         p: Parameter values by name.
+
+    Returns:
+        Knots and stiffness; each stiffness parameter is at least a small positive one.
     """
     r, least = model.ratings, _SOFTEST * model.mean_stiffness
     K1, K2, K3 = (max(float(p[k]), least) for k in SPRINGS["three_lines"])
@@ -283,12 +301,12 @@ def lines_of(model: Model, p: Mapping[str, float]) -> tuple[Array, Array]:
 
 
 def _tells_skew(torsion: Array, link_rate: Array) -> bool:
-    """Whether a skew of :data:`_TOLD` would have a visible effect on the torsion."""
+    """Whether a delay of :data:`_TOLD` would have a visible effect on the torsion."""
     return _TOLD * spread(link_rate) > _SHOWS * spread(torsion)
 
 
 def _line_skew(torsion: Array, torque: Array, link_rate: Array) -> float:
-    """Delay of the link angles from a linear fit of the drive [s]."""
+    """Delay of the link angles from a linear fit of torsion to torque and speed [s]."""
     columns = np.column_stack([torque, link_rate, np.ones_like(torque)])
     scale = np.abs(columns).max(axis=0)
     weights = np.linalg.lstsq(columns / scale, torsion, rcond=None)[0] / scale
@@ -304,6 +322,9 @@ def ratings_of(
         rated: Rated torque [N·m].
         largest: Largest torque of the log [N·m].
         corners: T1 and T2 [N·m]; None takes 0.2 and 0.6 of the rated torque.
+
+    Returns:
+        Ratings whose peaks are the larger of ``rated`` and ``largest``.
 
     Raises:
         InputError: If a torque is invalid.

@@ -18,25 +18,25 @@ SPRINGS = {
     "cubic": ("stiffness", "hardening"),
 }
 """Names of the stiffness parameters by type of spring."""
-_LEAST = 1e-6  # least stiffness and yield torque of an element, relative to the scales
+_LEAST = 1e-6  # lower bounds of an element, relative to the scales of its parameters
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelParameter:
-    """One unknown parameter of the model."""
+    """One unknown parameter of the model; numbers are in its ``unit``."""
 
     name: str
     unit: str
     start: float
     """Initial value of the search."""
     scale: float
-    """Change that affects the torques about as much as those of other parameters."""
+    """Typical size; a change by it affects the torques about as much as for others."""
     least: float = -np.inf
     """Lower bound."""
 
 
 def unknowns_of(model: Model) -> list[ModelParameter]:
-    """The unknowns in their order; they start from a linear spring with little else."""
+    """Unknowns in the order of all value arrays; they start from a linear spring."""
     K, i = model.mean_stiffness, abs(model.ratio)
     x = 0.5 * float(np.ptp(model.torsion))
     T = K * x
@@ -57,7 +57,7 @@ def unknowns_of(model: Model) -> list[ModelParameter]:
         ModelParameter(name="damping", unit="N·m·s/rad", start=0.0, scale=T / rate),
     ]
     if model.hysteresis:
-        # an element has the width f/k, so that -k and -f are equivalent to k and f
+        # the yield torsion is f/k: bounds exclude -k and -f, equivalent to k and f
         unknowns += [
             ModelParameter(
                 name="hysteresis_stiffness",
