@@ -42,8 +42,8 @@ def attach(
     """Turn a hinge into the output of a strain wave gear.
 
     ``rigid`` gives the joint the reflected inertia i²J as armature. ``kinematic`` uses
-    the same model; the kinematic error enters through the inputs of a commanded
-    motion, see :mod:`swgjoint.joint.prescribed`.
+    the same model; the kinematic error enters through the controller's commands and
+    torques, see :mod:`swgjoint.joint.prescribed`.
 
     ``linear``, ``native`` and ``full`` add a rotor (body ``<joint>_rotor`` with a hinge
     of the same name, next to the link under the same parent) and a tendon
@@ -54,22 +54,22 @@ def attach(
     same name, which evaluates ``drive`` including hysteresis. Keyframes gain the rotor
     coordinate, at the position of zero torsion.
 
-    The rotor replaces the armature that the file gives the joint or its actuators.
-    Actuators that act on the joint turn the rotor instead, in the units of the joint:
-    the gear g becomes g/i. The input of a motor is still torque at the link, and the
-    input of a servo is still the link angle, now as measured by the motor's encoder,
-    see :func:`~swgjoint.joint.motors.move_to_rotor`. If the joint has a single actuator
-    of gear 1, a sensor of the joint's actuator torque reads that actuator; otherwise it
-    reads the torque at the rotor, and a warning lists it. Everything else stays with
-    the link: damping, friction loss, springs and limits of the joint, tendons,
-    contacts and sensors (sensors of an actuator move to the motor side with it).
-    Models that are assembled with ``MjSpec.attach`` may get their drives before or
-    after the assembly, see :meth:`JointDrive.with_prefix`; the outer model sets
-    integrator and step.
+    The inertia of the rotor replaces the armature that the file gives the joint or its
+    actuators. Actuators that act on the joint then turn the rotor, in the units of the
+    joint: the gear g becomes g/i. The input of a motor is still torque at the link, and
+    the input of a servo is still the link angle, now as measured by the motor's
+    encoder, see :func:`~swgjoint.joint.motors.move_to_rotor`. If the joint has a single
+    actuator of gear 1, a sensor of the joint's actuator torque normally reads that
+    actuator; otherwise it reads the torque at the rotor, and a warning lists it.
+    Everything else stays with the link: damping, friction loss, springs and limits of
+    the joint, tendons, contacts and other sensors. Sensors of an actuator move to the
+    motor side with it. Models that are assembled with ``MjSpec.attach`` may get their
+    drives before or after the assembly, see :meth:`JointDrive.with_prefix`; the outer
+    model sets integrator and step.
 
-    With ``friction`` the model includes the friction of the map: as friction loss and
-    damping of the rotor at ``native``, as the complete friction law at ``full``, where
-    a tendon ``<joint>_friction`` carries its part of the integrator's metric.
+    With ``friction`` the model includes the friction of the map: at ``native`` as
+    friction loss and damping of the rotor, at ``full`` as the complete friction law,
+    whose part of the integrator's metric is carried by a tendon ``<joint>_friction``.
 
     No actuator is added. A motor that is modelled in its own units acts on the rotor::
 
@@ -80,9 +80,10 @@ def attach(
 
     Levels with a rotor replace the integrators Euler (MuJoCo's default), ``implicit``
     and ``implicitfast`` by ``discrete``, the latter two with a warning, because they
-    treat the drive as an explicit force. RK4 is kept: it is the reference below its
-    step limit. Too few solver iterations or too coarse a tolerance are replaced by
-    MuJoCo's defaults with a warning, see :mod:`swgjoint.joint.options`.
+    treat the drive as an explicit force. RK4 is kept, because it is an accurate
+    reference if the step is short enough. Too few solver iterations or too coarse a
+    tolerance are replaced by MuJoCo's defaults with a warning, see
+    :mod:`swgjoint.joint.options`.
     Under ``discrete`` the step itself damps a native spring (``linear``, ``native``),
     by about h w/2 of critical at a torsion frequency w; it does not damp ``full``.
     :func:`~swgjoint.joint.step_damping.step_mode` computes the resulting damping, and
@@ -96,21 +97,27 @@ def attach(
         drive: Map of the drive.
         level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
         rotor_inertia: Inertia of rotor and wave generator about their axis [kg·m²].
-        damping_ratio: Fraction of critical damping of rotor against link, with the link
-            inertia at qpos0 and the other joints held [-]; None: that of the map.
+        damping_ratio: Damping ratio of the vibration of rotor against link, with the
+            link inertia at qpos0 and the other joints locked [-]; None takes the value
+            of the map.
         friction: Whether the model includes the friction of the map, if it has any.
-        rotor: ``gyroscopic``: a body carried along by the parent link. ``lumped``: its
-            kinetic energy is that of its rotation relative to that link alone (Spong
-            1987, J. Dyn. Sys. Meas. Control 109:310-319, assumption 2).
-        variable: At ``full``, give the tendon the numbers by which one specimen of the
-            drive may deviate from its map, see :mod:`swgjoint.joint.variation`.
-        max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
-            cannot resolve at this speed are left out. None keeps all.
-        max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
-        integrator: ``discrete`` replaces these options as described above, ``keep``
-            replaces none.
+        rotor: ``gyroscopic``: a body that moves with the parent link. ``lumped``: a
+            rotor whose kinetic energy is only that of its rotation relative to that
+            link (Spong 1987, J. Dyn. Sys. Meas. Control 109:310-319, assumption 2).
+        variable: At ``full``, reserve user data of the tendon for the deviations of one
+            specimen from its map, see :mod:`swgjoint.joint.variation`.
+        max_input_speed: Largest speed of the rotor [rad/s]; at ``kinematic`` and
+            ``full``, harmonics that the step cannot resolve at this speed are omitted.
+            None keeps all.
+        max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
+            [rad].
+        integrator: ``discrete`` replaces integrator and solver options as described
+            above, ``keep`` replaces none.
         watch: Whether to warn of a step outside the integrator's region, here and
             while the model runs; see :mod:`swgjoint.joint.watch`.
+
+    Returns:
+        The attached drive, with the names of the elements that it added.
 
     Raises:
         InputError: If the joint, the level or a value cannot be used; the spec is
@@ -141,8 +148,9 @@ def attach_all(
 ) -> dict[str, JointDrive]:
     """Attach drives to several hinges at once.
 
-    The result equals that of :func:`attach` joint by joint in the order of the model.
-    It costs one compilation, or two if keyframes state positions.
+    The result is the same as that of :func:`attach` for one joint after the other, in
+    the order of the model. It needs one compilation, or two if keyframes state
+    positions.
 
     Args:
         spec: Model to edit.
@@ -154,8 +162,8 @@ def attach_all(
         The attached drives by joint name, in the order of the model.
 
     Raises:
-        InputError: If a joint or a value cannot be used, with one line for each joint;
-            the spec is then unchanged.
+        InputError: If a joint or a value cannot be used; the spec is then unchanged.
+            One message lists all joints that cannot take a drive.
         ComputationError: If the plugin cannot be loaded or the engine does not accept
             its metric.
     """
@@ -234,7 +242,7 @@ def attach_all(
 
 
 def _configs(drives: Iterable[JointDrive]) -> dict[str, dict[str, str]]:
-    """Attributes of the plugin instances by joint; each map is formatted once."""
+    """Attributes of the plugin instances by joint; a shared map is formatted once."""
     texts: dict[int, dict[str, str]] = {}
     configs = {}
     for drive in drives:
@@ -282,7 +290,7 @@ def _add_plugin(
 def _warn_of_sensors(
     sensors: Mapping[str, str], drives: Mapping[str, JointDrive]
 ) -> None:
-    """Warn of sensors of joint torque that now read the motor side."""
+    """Warn about sensors of joint torque that now read the torque at the rotor."""
     if not sensors:
         return
     factors = ", ".join(

@@ -6,7 +6,7 @@ import sys
 
 
 def depth_of_caller() -> int:
-    """``stacklevel`` for ``warnings.warn`` that names the first line outside."""
+    """``stacklevel`` of a warning that names the first line outside the package."""
     depth, frame = 1, sys._getframe(1)
     package = __name__.partition(".")[0]
     while frame.f_back is not None:

@@ -23,7 +23,7 @@ CONTACT_DAMPING_RATIO = 0.05
 damping ratio is below :data:`LEAST_DAMPING_RATIO` [-].
 
 The engine pushes a link out of a contact along a prescribed path, whatever torque this
-needs. This feeds energy into the torsion of a bouncing chain, at any step and also
+needs. This feeds energy into the torsion of a bouncing chain, at any step size and also
 under RK4. A bouncing chain touches the floor about 5 % of the time, so this value
 dissipates about as much as :data:`LEAST_DAMPING_RATIO` applied all the time."""
 ACCELERATIONS = 2
@@ -32,10 +32,10 @@ ACCELERATIONS = 2
 
 @dataclass(frozen=True, kw_only=True)
 class UnresolvedOrder:
-    """A harmonic that was left out because the step cannot resolve it."""
+    """A harmonic that was omitted because the step cannot resolve it."""
 
     order: float
-    """Cycles per turn of the input, |n_theta + n_psi/i|."""
+    """Cycles per turn of the input, |n_theta + n_psi/i| [-]."""
     error: float
     """Amplitude in the kinematic error [rad]."""
     torque: float
@@ -44,7 +44,7 @@ class UnresolvedOrder:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointSignals:
-    """Signals of the drive, sample by sample, as arrays of equal shape."""
+    """Signals of a drive: arrays of equal shape, one element for each sample."""
 
     torsion: Array
     """Torsion theta/i + e0 - psi [rad]."""
@@ -61,29 +61,32 @@ class JointDrive:
     joint: str
     """Name of the link joint."""
     rotor: str | None
-    """Name of the rotor joint on the input side; None at ``rigid``, ``kinematic``."""
+    """Name of the rotor joint at the input; None at ``rigid`` and ``kinematic``."""
     tendon: str | None
     """Name of the tendon of the drive; None without a rotor."""
     plugin: str | None
     """Name of the plugin instance; None at levels other than ``full``."""
     level: str
+    """``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``."""
     ratio: float
+    """Signed ratio i [-]."""
     rotor_inertia: float
     """Inertia of rotor and wave generator at the input side [kg·m²]."""
     link_inertia: float
-    """Link inertia about the joint at qpos0, with the other joints held [kg·m²]."""
+    """Link inertia about the joint at qpos0, other joints locked [kg·m²]."""
     stiffness: float
     """Mean stiffness of the map [N·m/rad]."""
     damping: float
-    """Damping torque per torsion rate at the output side [N·m·s/rad]."""
+    """Damping torque per torsion rate at the output side [N·m·s/rad]; zero without a
+    rotor."""
     contact_damping: float = 0.0
     """Smallest damping while a contact or a limit acts anywhere in the model, from
-    :data:`CONTACT_DAMPING_RATIO` [N·m·s/rad]; zero for drives with losses and at levels
-    other than ``full``."""
+    :data:`CONTACT_DAMPING_RATIO` [N·m·s/rad]; zero for drives with friction or enough
+    damping and at levels other than ``full``."""
     drive: DriveMap
     """Map as simulated, without the unresolved harmonics."""
     unresolved: tuple[UnresolvedOrder, ...]
-    """Harmonics left out, lowest order first."""
+    """Omitted harmonics by increasing order."""
     native: NativeSpring | None = None
     """Native springs that represent the map; None at levels other than ``native``."""
     hysteresis: tuple[str, ...] = ()
@@ -96,12 +99,12 @@ class JointDrive:
     compensated_at: float | None = None
     """Step for which the compensation is valid [s]; None without compensation."""
     motors: tuple[str, ...] = ()
-    """Actuators that the model had on the joint; if there is a rotor, they turn it."""
+    """Names of the actuators on the joint; if there is a rotor, they turn the rotor."""
     variable: bool = False
     """Whether the model has user data by which the drive may deviate from its map."""
 
     def with_prefix(self, prefix: str) -> JointDrive:
-        """The same drive after ``MjSpec.attach`` added its model under a prefix."""
+        """The same drive after ``MjSpec.attach`` prefixed the names of its model."""
 
         def renamed(name: str | None) -> str | None:
             return None if name is None else prefix + name
@@ -124,24 +127,24 @@ class JointDrive:
 
     @property
     def friction(self) -> Friction | None:
-        """Friction law at ``full``; None at ``native``, where the rotor carries it."""
+        """Friction law at ``full``; None at ``native``, which uses rotor friction."""
         return self.drive.friction if self.level == "full" else None
 
     @property
     def kept_orders(self) -> tuple[float, ...]:
-        """Orders per input turn of the map as simulated, increasing."""
+        """Orders per input turn in the map as simulated, increasing [-]."""
         return tuple(sorted({float(n) for n in input_orders(self.drive)[1:]}))
 
     @property
     def natural_frequency(self) -> float:
-        """Torsion mode of the otherwise free rotor and link [rad/s]; zero if rigid."""
+        """Torsion frequency of rotor against link [rad/s]; zero without a rotor."""
         if self.rotor is None:
             return 0.0
         return float(np.sqrt(self.stiffness * self.mobility))
 
     @property
     def mobility(self) -> float:
-        """Inverse inertia of rotor against link, at the output [1/(kg·m²)]."""
+        """Sum of inverse inertias of rotor and link, at the output [1/(kg·m²)]."""
         rotor = self.ratio**2 * self.rotor_inertia
         return 1.0 / rotor + 1.0 / self.link_inertia
 
@@ -167,7 +170,11 @@ class JointDrive:
             theta_rate: Rotor velocities [rad/s].
             psi_rate: Link velocities [rad/s].
             slipping: Torque of the hysteresis elements along the torsion [N·m].
-            friction: Friction of the wave generator against the flexspline [N·m].
+            friction: Friction torque of the wave generator against the flexspline
+                [N·m]; used only at ``full``.
+
+        Returns:
+            Signals in the shape to which all arguments broadcast.
 
         Raises:
             InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
@@ -208,8 +215,11 @@ class JointDrive:
         """Torque on the link per torque along the torsion, -dDelta/dpsi [-].
 
         Args:
-            theta: Motor angle of the input [rad].
-            psi: Output angle [rad], of a shape that broadcasts with theta.
+            theta: Rotor angles [rad].
+            psi: Link angles [rad], of a shape that broadcasts with theta.
+
+        Returns:
+            1 minus the derivative of e0 by psi at ``full``; 1 at other levels.
         """
         if self.level != "full":
             return np.ones(np.broadcast(theta, psi).shape)
@@ -225,7 +235,7 @@ class JointDrive:
         return self.ratio * np.asarray(psi, float)
 
     def prescribed_error(self, theta: ArrayLike) -> Array:
-        """Error e0 that ``kinematic`` prescribes at motor angles [rad]; otherwise zero.
+        """Error e0 that ``kinematic`` prescribes at motor angles, otherwise zero [rad].
 
         Args:
             theta: Commanded motor angles [rad].
@@ -242,8 +252,8 @@ class JointDrive:
 
         A drive without a rotor has zero torsion. Its transmission error is that of the
         map at the motor angle that corresponds to the link angle (``rigid``: zero). Its
-        torque on the link is the joint torque minus the inertia torque of the reflected
-        rotor.
+        torque on the link is the actuator and applied torque at the joint minus the
+        inertia torque of the reflected rotor.
 
         Args:
             model: The compiled model.
@@ -297,7 +307,7 @@ class JointDrive:
 def _slipping(
     model: mujoco.MjModel, data: mujoco.MjData, tendon: str, torsion: float
 ) -> float:
-    """Torque of one Jenkin element from the history that the engine stores [N·m]."""
+    """Torque of one Jenkin element, from the slip that the engine stores [N·m]."""
     t = int(model.tendon(tendon).id)
     limit = float(model.tendon_springyield[t])
     rest = float(data.plastic[model.tendon_plasticadr[t]])
@@ -305,7 +315,7 @@ def _slipping(
 
 
 def input_orders(drive: DriveMap) -> Array:
-    """Order per input turn of every harmonic, |n_theta + n_psi/i|. (n_harmonics,)."""
+    """Order of every harmonic per input turn [-]. Shape (n_harmonics,)."""
     n_theta, n_psi = drive.angle_orders.T
     return np.asarray(np.abs(n_theta + n_psi / drive.ratio))
 
@@ -319,7 +329,8 @@ def prune(
         drive: Map with all its harmonics.
         timestep: Step h [s].
         max_input_speed: Largest speed of the input [rad/s].
-        max_phase_step: Largest h n |theta rate| that is kept [rad].
+        max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
+            [rad].
 
     Returns:
         The map without these harmonics, and the removed harmonics by increasing order.

@@ -22,10 +22,11 @@ SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
 def add_rotor(
     spec: mujoco.MjSpec, place: DrivePlace, name: str, rotor: Rotor
 ) -> tuple[Any, Any]:
-    """Add the rotor body and its hinge at the joint, without inheriting defaults.
+    """Add the rotor body and its hinge, which inherit no defaults, at the joint.
 
-    A gyroscopic rotor turns with the link that carries it, gyroscopic torques included.
-    A lumped rotor has only the kinetic energy of its rotation relative to that link.
+    A gyroscopic rotor moves with the link that carries it and exerts gyroscopic torques
+    on it. A lumped rotor has only the kinetic energy of its rotation relative to that
+    link.
 
     Args:
         spec: The model, which is changed.
@@ -75,7 +76,7 @@ def add_tendon(
     dead_band: float = 0.0,
     coefficients: tuple[float, float] | None = None,
 ) -> Any:
-    """Add a fixed tendon of length theta/i - psi, without inheriting defaults.
+    """Add a fixed tendon of length theta/i - psi that inherits no defaults.
 
     Args:
         spec: The model, which is changed.
@@ -89,6 +90,9 @@ def add_tendon(
         springyield: Length at which the spring yields [rad]; zero: never.
         dead_band: Half width of the band without spring torque [rad].
         coefficients: Factors of theta and psi in the length; (1/i, -1) if None [-].
+
+    Returns:
+        The tendon.
     """
     tendon = spec.add_tendon(name=name)
     tendon.stiffness = np.array(stiffness)
@@ -113,7 +117,7 @@ def add_native(
     spring: NativeSpring,
     rotor: Any,
 ) -> None:
-    """Add the springs, Jenkin tendons and rotor friction that the drive has.
+    """Add the springs, Jenkin elements and rotor friction of a drive at ``native``.
 
     Args:
         spec: The model, which is changed.

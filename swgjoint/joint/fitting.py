@@ -21,7 +21,9 @@ from swgjoint.joint.prescribed import kinematic_part, ratio_variation
 from swgjoint.maps.drive_map import DriveMap
 
 LEVELS = ("rigid", "kinematic", "linear", "native", "full")
+"""Levels of detail of a joint, see :func:`swgjoint.joint.attach.attach`."""
 ROTORS = ("gyroscopic", "lumped")
+"""Models of the rotor, see :func:`swgjoint.joint.attach.attach`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,18 +31,23 @@ class Fitting:
     """Drive and settings of one joint, see :func:`swgjoint.joint.attach.attach`."""
 
     drive: DriveMap
+    """Map of the drive."""
     rotor_inertia: float
     """Inertia of rotor and wave generator about their axis [kg·m²]."""
     level: str = "full"
+    """Level of detail, one of :data:`LEVELS`."""
     damping_ratio: float | None = None
-    """Fraction of critical damping; that of the map if None [-]."""
+    """Damping ratio of the torsional vibration [-]; None takes that of the map."""
     friction: bool = True
+    """Whether the model includes the friction of the map."""
     rotor: str = "gyroscopic"
+    """Model of the rotor, one of :data:`ROTORS`."""
     variable: bool = False
+    """Whether the drive may deviate from its map at ``full``."""
     max_input_speed: float | None = None
-    """Largest speed of the rotor [rad/s]."""
+    """Largest speed of the rotor [rad/s]; None keeps all harmonics."""
     max_phase_step: float = 0.5
-    """Largest phase step h n |theta rate| that is kept [rad]."""
+    """Largest phase step h n |theta rate| of a harmonic that is kept [rad]."""
 
     @property
     def has_rotor(self) -> bool:
@@ -51,8 +58,8 @@ class Fitting:
         """Reject values outside their range.
 
         Raises:
-            InputError: If a value is outside its range; the message has the value, its
-                unit and the accepted values.
+            InputError: If a value is outside its range; the message states the value,
+                its unit and the accepted values.
         """
         if not isinstance(self.drive, DriveMap):
             raise InputError(
@@ -70,7 +77,7 @@ class Fitting:
             )
         ratio = self.damping_ratio
         if ratio is not None and not (np.isfinite(ratio) and 0.0 <= ratio < 1.0):
-            raise InputError(f"damping_ratio {ratio} of {joint!r}; accepted: 0 to 1")
+            raise InputError(f"damping_ratio {ratio} of {joint!r}; accepted: >= 0, < 1")
         if self.max_input_speed is not None:
             _positive("max_input_speed", self.max_input_speed, "rad/s")
         _positive("max_phase_step", self.max_phase_step, "rad")
@@ -79,7 +86,7 @@ class Fitting:
 def fit_drive(
     joint: str, fitting: Fitting, place: DrivePlace, *, timestep: float
 ) -> JointDrive:
-    """Joint drive that results from the settings of a joint.
+    """Drive of a joint: names of its elements, parameters and map as simulated.
 
     Args:
         joint: Name of the joint.
@@ -88,7 +95,8 @@ def fit_drive(
         timestep: Step of the model [s].
 
     Raises:
-        InputError: If the level cannot represent the map.
+        InputError: At ``kinematic``, if the kinematic error varies the ratio by 100 %
+            or more.
     """
     drive, level = fitting.drive, fitting.level
     if not fitting.friction and drive.friction is not None:

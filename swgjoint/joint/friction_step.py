@@ -1,24 +1,27 @@
 r"""Friction in one step of the discrete scheme; equivalent of ``plugin/friction.cc``.
 
 The bristle starts at the stretch :math:`z_0` and undergoes a relative rotation dx. It
-sticks over the distance a until it reaches its limit R, and then slips. For forward
-motion and with :math:`f = \sigma R`, its mean torque over the step is
+sticks over the rotation a until it reaches its limit R, and then slips. For forward
+motion, the stiffness :math:`\sigma`, the damping :math:`\sigma_1` and the yield torque
+:math:`f = \sigma R`, its mean torque over the step is
 
 .. math::
     \bar q = \begin{cases} \sigma (z_0 + dx/2) + \sigma_1 dx/h & dx \le a\\
         f - \sigma a^2/(2\,dx) + \sigma_1 a/h & dx > a = R - z_0, \end{cases}
 
 which is continuous and increasing, and its work :math:`\bar q\,dx` is exact. The
-predicted pair responds to a torque F with :math:`dx = d - \tfrac12 h c F`, so that
-:math:`F = \bar q(dx) + \eta\,dx/h` is a linear or quadratic equation, which needs no
-iteration.
+predicted pair responds to a torque F with :math:`dx = d - \tfrac12 h c F`, where c is
+the reduction of the relative speed per torque. With the viscous coefficient eta,
+:math:`F = \bar q(dx) + \eta\,dx/h` is thus a linear or quadratic equation, which needs
+no iteration.
 
-The engine receives a torque that is linear in the true dx: offset + rate dx. With
-rate >= sigma/2 and either offset :math:`\sigma z_0` (sticking), \|offset\| at most
-:math:`\sigma |z_0|`, or offset 0, the work of this torque is never below
-:math:`-\sigma z_0^2/2`, whatever the other forces do in the step. The bristle ends with
-at most its initial energy plus that work. The friction of a step therefore dissipates
-energy or returns only stored energy, even if the prediction is wrong.
+The engine receives a torque that is linear in the true dx: offset + rate dx. Either
+\|offset\| is at most :math:`\sigma|z_0|` (equal while the bristle sticks) and rate is
+at least :math:`\sigma/2`, or offset is 0. In both cases the work of this torque is
+never below :math:`-\sigma z_0^2/2`, whatever the other forces do in the step. The
+bristle ends with at most its initial energy plus that work. The friction of a step
+therefore dissipates energy or returns only stored energy, even if the prediction is
+wrong.
 """
 
 from __future__ import annotations
@@ -38,15 +41,15 @@ class FrictionStep:
     reach: float
     """Largest stretch R in this step [rad]."""
     force: float
-    """Torque at unchanged speed [N·m]."""
+    """Torque if the relative speed does not change in the step [N·m]."""
     metric: float
-    """Torque per change of the speed, divided by h [N·m/rad]."""
+    """Torque per change of the relative speed, divided by h [N·m/rad]."""
     offset: float
     """Torque of the bristle alone at zero rotation [N·m]."""
     rate: float
-    """Torque of the bristle alone per rotation [N·m/rad]."""
+    """Change of that torque per rotation [N·m/rad]."""
     predicted: float
-    """Torque on the predicted step [N·m]."""
+    """Torque for the predicted rotation [N·m]."""
 
 
 def friction_step(
@@ -69,6 +72,9 @@ def friction_step(
         free: Change of nu in the step without friction [rad/s].
         response: Reduction of nu per friction torque, > 0 [rad/s per N·m].
         timestep: Step h [s].
+
+    Returns:
+        The torque as a linear function of the change of speed.
     """
     h, sigma = timestep, friction.stiffness
     reach = yield_torque / sigma
@@ -107,9 +113,9 @@ def stretch_after(friction: Friction, step: FrictionStep, rotation: float) -> fl
     """Bristle stretch z after the actual rotation of the step [rad].
 
     Args:
-        friction: Friction of the drive.
+        friction: Parameters of the friction law.
         step: Linearised friction of the step.
-        rotation: Rotation in the step [rad].
+        rotation: Actual relative rotation in the step [rad].
     """
     end = min(max(step.stretch + rotation, -step.reach), step.reach)
     work = (step.offset + step.rate * rotation) * rotation
