@@ -12,7 +12,7 @@ from swgjoint.joint.place import DrivePlace
 
 
 def clear_armature(place: DrivePlace) -> None:
-    """Remove the armature of a joint's actuators, which the rotor replaces."""
+    """Remove the armature of a joint's actuators; the rotor replaces it."""
     for actuator in place.actuators.values():
         actuator.armature = 0.0
 
@@ -26,7 +26,7 @@ def move_to_rotor(
     free: tuple[float, float] | None,
     measured: set[str],
 ) -> None:
-    r"""Make the actuators of a joint turn its rotor, in the units of the joint.
+    r"""Move the actuators of a joint to its rotor and keep the units of the joint.
 
     The gear g of an actuator becomes g/i. Its length is then :math:`g\,\theta/i`, the
     link angle as measured by the motor's encoder, and its force f turns the rotor with
@@ -34,18 +34,19 @@ def move_to_rotor(
     gains keep their meaning and units. The limit of the joint's actuator torque moves
     to the rotor as well.
 
-    Values that the compiler would derive from the joint are written explicitly: the
-    range of ``inheritrange``, and the damping of ``dampratio`` for the inertia of rotor
-    and link on a rigid drive. Sensors of the joint's actuator torque move as well, see
+    Values that the compiler would derive from the joint are written explicitly. These
+    are the ranges that ``inheritrange`` sets and the damping that ``dampratio`` sets;
+    that damping is computed for the inertia of rotor and link with a rigid drive.
+    Sensors of the joint's actuator torque move as well, see
     :func:`torque_is_actuators`.
 
     Args:
         place: Position, actuators and sensors of the joint.
         rotor: Hinge of the rotor.
         ratio: Signed ratio of the drive [-].
-        reflected: Inertia of the rotor at the joint, i²J [kg·m²].
-        free: Inertias from :func:`swgjoint.joint.place.free_inertias` [kg·m²]; None
-            without a damping ratio.
+        reflected: Rotor inertia reflected to the link, i²J [kg·m²].
+        free: Inertias from :func:`swgjoint.joint.place.free_inertias` [kg·m²]; None if
+            no actuator of the joint states a damping ratio.
         measured: Names of the actuators whose force a sensor of the file reads.
     """
     joint, model = place.joint, place.model
@@ -120,7 +121,7 @@ def _common_range(place: DrivePlace, k: int) -> Any:
 def misread_sensors(
     places: Mapping[str, DrivePlace], measured: set[str]
 ) -> dict[str, str]:
-    """Sensors of joint torque that will read the motor side.
+    """Sensors of joint torque that will read the torque at the rotor.
 
     Args:
         places: Joints by name.

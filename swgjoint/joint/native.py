@@ -10,10 +10,10 @@ x = theta/i - psi,
 so the three lines of a catalogue become three tendons: K1 everywhere, K2 - K1 beyond
 the torsion at T1, K3 - K2 beyond the torsion at T2. Hysteresis becomes parallel tendons
 with ``springyield`` (Jenkin elements). Friction becomes ``frictionloss`` and
-``damping`` of the rotor (Coulomb, bending and viscous parts) and acts against the
-housing. This is an approximation: constants cannot represent friction that grows with
-load or decreases with speed, and the engine's friction loss is a soft constraint, which
-creeps.
+``damping`` of the rotor (Coulomb, bending and viscous parts), which act against the
+housing. This is an approximation: constants cannot represent friction that increases
+with load or decreases with speed, and the engine's friction loss is a soft constraint,
+so that a loaded rotor creeps instead of sticking.
 
 Hysteresis and friction are added only if the map has them. Kinematic error and the
 angle harmonics of the torque have no native equivalent.
@@ -37,17 +37,17 @@ CLOSE = 0.01
 """Torque error, as a fraction of rated torque, below which no further tendon is added
 [-]."""
 LEAST = 1e-3
-"""Smallest slope as a fraction of the mean stiffness, kept even in a clearance [-]."""
+"""Smallest slope relative to the mean stiffness, even where the curve is flat [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Corner:
-    """Stiffness that acts beyond a torsion in both directions: a dead-band tendon."""
+    """A dead-band tendon: stiffness that acts only beyond a torsion of either sign."""
 
     torsion: float
     """Half width of the dead band, > 0 [rad]."""
     stiffness: float
-    """Change of the slope at that torsion, < 0 if the curve softens [N·m/rad]."""
+    """Change of the slope at that torsion, negative if the curve softens [N·m/rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +57,8 @@ class NativeSpring:
     linear: float
     """Linear coefficient a, > 0 [N·m/rad]."""
     cubic: float = 0.0
-    """Cubic coefficient c, >= 0 because a softening cubic would reach negative
-    stiffness [N·m/rad³]."""
+    """Cubic coefficient c [N·m/rad³]; never negative, because a softening cubic would
+    reach negative stiffness."""
     corners: tuple[Corner, ...] = ()
     """Dead-band springs by increasing torsion; the slope stays > 0 beyond each one."""
     residual: float
@@ -68,6 +68,7 @@ class NativeSpring:
     note: str = ""
     """Features of the mean curve that the fit does not reproduce."""
     hysteresis: tuple[Jenkin, ...] = ()
+    """Jenkin elements of the map."""
     friction: float = 0.0
     """Constant friction torque at the input [N·m]."""
     viscous: float = 0.0
@@ -76,7 +77,7 @@ class NativeSpring:
     """Parts of the friction law that constants cannot represent."""
 
     def torque(self, torsion: Array) -> Array:
-        """Elastic torque without hysteresis at torsions [rad], same shape [N·m]."""
+        """Elastic torque without hysteresis [N·m] at torsions of any shape [rad]."""
         x = np.asarray(torsion, float)
         total = x * (self.linear + self.cubic * x**2)
         for corner in self.corners:
@@ -85,7 +86,7 @@ class NativeSpring:
         return np.asarray(total)
 
     def torsion(self, torque: float) -> float:
-        """Torsion [rad] at an elastic torque [N·m], by bisection."""
+        """Torsion at an elastic torque [N·m], by bisection [rad]."""
         high = abs(torque) / self.linear
         while float(self.torque(np.array(high))) < abs(torque):
             high *= 2.0
@@ -99,19 +100,19 @@ class NativeSpring:
         return float(np.copysign(high, torque))
 
     def slope(self, torsion: float) -> float:
-        """Tangent stiffness without hysteresis at a torsion [rad], in [N·m/rad]."""
+        """Tangent stiffness without hysteresis [N·m/rad] at a torsion [rad]."""
         x = abs(torsion)
         beyond = sum(c.stiffness for c in self.corners if x > c.torsion)
         return self.linear + 3.0 * self.cubic * x**2 + beyond
 
     def implicit(self, torsion: float) -> float:
-        """Stiffness that the integrator treats implicitly, tangents > 0 [N·m/rad]."""
+        """Positive parts of the slope, which are integrated implicitly [N·m/rad]."""
         x = abs(torsion)
         beyond = sum(max(c.stiffness, 0.0) for c in self.corners if x > c.torsion)
         return self.linear + 3.0 * self.cubic * x**2 + beyond
 
     def largest_slope(self, torsion: float) -> float:
-        """Largest tangent stiffness up to a torsion [N·m/rad]."""
+        """Largest tangent stiffness from zero to a positive torsion [N·m/rad]."""
         ends = [c.torsion * (1.0 + 1e-9) for c in self.corners if c.torsion < torsion]
         return max(self.slope(x) for x in (0.0, *ends, torsion))
 
@@ -122,9 +123,9 @@ def fit_native(drive: DriveMap) -> NativeSpring:
     The fit extends to the repeated peak torque or 1.5 T2, whichever is larger, within
     the range of the map. The candidates are a x + c x³, dead bands at the torsions of
     T1 and T2, and one to :data:`MAX_CORNERS` dead bands that are denser where the curve
-    bends more; springs with dead bands are tried in order of their number. The first
-    whose torque error is at most :data:`CLOSE` of rated torque is used, otherwise the
-    closest.
+    bends more. The candidates are tried in this order, those with dead bands by
+    increasing number of tendons. The first candidate whose torque error is at most
+    :data:`CLOSE` of rated torque is used; if there is none, the closest is used.
 
     The slopes are a least-squares fit in which every slope is at least :data:`LEAST` of
     the mean stiffness. ``note`` reports where this bound or the number of tendons
@@ -165,11 +166,12 @@ def fit_native(drive: DriveMap) -> NativeSpring:
 
 
 def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
-    """Law of this level between motor and link, as a map.
+    """The law of this level between motor and link, expressed as a map.
 
     The map contains the elastic part, the hysteresis and, if the drive has friction,
-    its constant and viscous parts. The native friction acts against the housing, but in
-    a map friction acts against the flexspline; the two differ by the ratio.
+    its constant and viscous parts. Native friction acts against the housing, but in a
+    map friction acts against the flexspline. If the flexspline turns, its speed, 1/i of
+    the input speed, is the difference between the two sliding speeds.
 
     Args:
         drive: Map of the drive.
@@ -266,7 +268,7 @@ def _lines(x: Array, torque: Array, corners: Array, least: float) -> NativeSprin
     from scipy.optimize import nnls
 
     ends = np.array([0.0, *corners, x[-1]])
-    # length of x on each line
+    # part of x that each line covers
     ways = np.clip(x[:, None] - ends[:-1], 0.0, np.diff(ends))
     unit = float(x[-1])
     over, _ = nnls(ways / unit, torque - least * x)
@@ -284,11 +286,11 @@ def _lines(x: Array, torque: Array, corners: Array, least: float) -> NativeSprin
 
 
 def _denser_at_bends(x: Array, torque: Array, count: int) -> Array:
-    """Corners of a broken line at equal parts of the integrated root curvature.
+    """Corners of a piecewise linear curve, equally spaced in integrated root curvature.
 
     Source:
         de Boor (2001), "A Practical Guide to Splines", chapter XII: equal parts of
-        |f''|^(1/2) for the broken line.
+        |f''|^(1/2) for piecewise linear approximation.
     """
     slope = np.gradient(np.concatenate([[0.0], torque]), np.concatenate([[0.0], x]))
     bend = np.sqrt(np.abs(np.gradient(slope, x[0])))

@@ -13,6 +13,7 @@ from swgjoint.errors import InputError
 from swgjoint.maps.hysteresis import MAX_ELEMENTS
 
 ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+"""Transmissions with which an actuator acts directly on a joint."""
 
 
 class Surroundings:
@@ -30,7 +31,7 @@ class Surroundings:
         for tendon in spec.tendons:
             self.tendons[tendon.name] = tendon
             path = tendon.path
-            # by index: iteration ends in an engine exception that costs 0.1 ms
+            # by index: iteration ends with an engine exception, which costs 0.1 ms
             wraps = (path[k] for k in range(len(path)))
             self.wrapped[tendon.name] = [
                 wrap.target.name
@@ -68,23 +69,25 @@ class Surroundings:
             name = equality.name1
             does = f"follows {equality.name2!r}" if equality.name2 else "is locked"
             why = (
-                f"joint {name!r} {does} by {_named(equality)}, against which a"
-                " drive would work; accepted: the joint that leads, or an equality"
-                " that is not active"
+                f"joint {name!r} {does} through {_named(equality)}, which would oppose"
+                " a drive; accepted: the joint that leads, or an equality that is not"
+                " active"
             )
             self.held.setdefault(name, why)
         if equality.type == mujoco.mjtEq.mjEQ_TENDON:
             for end in (equality.name1, equality.name2):
                 for name in self.wrapped.get(end, ()) if end else ():
                     why = (
-                        f"joint {name!r} is held by {_named(equality)} of"
-                        f" tendon {end!r}, against which a drive would work; accepted:"
-                        " an equality that is not active"
+                        f"joint {name!r} is constrained by {_named(equality)} of"
+                        f" tendon {end!r}, which would oppose a drive; accepted: an"
+                        " equality that is not active"
                     )
                     self.held.setdefault(name, why)
 
     def nearest_names(self, name: str, joints: Iterable[str] | None = None) -> str:
-        """Text that lists the joints of the model, or the nearest names of many.
+        """Text for messages that lists the joints of the model.
+
+        Of more than 20 joints, only those with the most similar names are listed.
 
         Args:
             name: Name that was not found.
@@ -131,8 +134,8 @@ class Surroundings:
             )
         if hinge.actgravcomp and self.gravcomp:
             raise InputError(
-                f"joint {name!r} has actuatorgravcomp, a torque on the link past the"
-                " drive; accepted: false"
+                f"joint {name!r} has actuatorgravcomp, a torque that acts on the link"
+                " and bypasses the drive; accepted: false"
             )
         if name in self.held:
             raise InputError(self.held[name])
@@ -141,11 +144,11 @@ class Surroundings:
 
     def _check_driven(self, name: str) -> None:
         if self.has_drive(name):
-            raise InputError(f"joint {name!r} has a drive already")
+            raise InputError(f"joint {name!r} already has a drive")
         if self.is_rotor(name):
             raise InputError(
-                f"joint {name!r} is the rotor of a drive; a drive goes on the joint"
-                f" {name.removesuffix('_rotor')!r} of its link, which has one"
+                f"joint {name!r} is the rotor of a drive; the joint of its link,"
+                f" {name.removesuffix('_rotor')!r}, already has this drive"
             )
 
     def _check_names(self, name: str) -> None:
@@ -167,24 +170,25 @@ class Surroundings:
         for kind, element, is_taken in taken:
             if is_taken:
                 raise InputError(
-                    f"joint {name!r}: its drive would be called {element!r}, as a"
-                    f" {kind} of the model is already; rename that one"
+                    f"joint {name!r}: its drive needs the name {element!r}, which a"
+                    f" {kind} of the model already has; rename this {kind}"
                 )
 
     def _check_actuators(self, name: str) -> None:
         for actuator in self.actuators.get(name, {}).values():
             if actuator.dyntype == mujoco.mjtDyn.mjDYN_MUSCLE:
                 raise InputError(
-                    f"joint {name!r} is moved by muscle {actuator.name!r}, which is no"
-                    " motor; a drive needs another actuator or none"
+                    f"joint {name!r} is moved by muscle {actuator.name!r}, which is not"
+                    " a motor; accepted: another type of actuator, or none"
                 )
         if name in self.pulled:
             actuator, tendon = self.pulled[name]
             raise InputError(
                 f"joint {name!r} is moved by actuator {actuator.name!r} through tendon"
-                f" {tendon!r}, past a drive; accepted: an actuator on the joint"
+                f" {tendon!r}, which would bypass a drive; accepted: an actuator on the"
+                " joint"
             )
 
 
 def _named(equality: Any) -> str:
-    return f"equality {equality.name!r}" if equality.name else "a nameless equality"
+    return f"equality {equality.name!r}" if equality.name else "an unnamed equality"

@@ -1,12 +1,12 @@
-"""Model options that drives need: integrator and linear solver.
+"""Model options that drives need: integrator and solver settings.
 
 Under ``discrete`` the engine solves (M + h² P)(v+ - v) = h f by conjugate gradients, in
 at most ``iterations`` iterations, to the relative residual ``tolerance``. Models for
-reinforcement learning often allow 1 to 5 iterations. The drive stiffness is then not
-solved to convergence, which the engine reports only on the console. On nine robots with
-6 to 32 joints, catalogue drives needed at most 15 iterations (steps up to 5 ms), and
-drives of 1e7 N·m/rad with rotors of 1e-6 kg·m² at most 70. A tolerance of 1e-6 changes
-torques by 3e-5, a tolerance of 1e-4 by 1e-3.
+reinforcement learning often allow only 1 to 5 iterations. The solution then does not
+converge with the drive stiffness, which the engine reports only on the console. On nine
+robots with 6 to 32 joints, catalogue drives needed at most 15 iterations (steps up to
+5 ms), and drives of 1e7 N·m/rad with rotors of 1e-6 kg·m² at most 70. A tolerance of
+1e-6 changes torques by a fraction of 3e-5, a tolerance of 1e-4 by a fraction of 1e-3.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from swgjoint.errors import InputError
 from swgjoint.joint.callers import depth_of_caller
 
 INTEGRATORS = ("discrete", "keep")
+"""Accepted values of the option ``integrator`` of ``attach``."""
 ITERATIONS, LS_ITERATIONS = 100, 50
 """MuJoCo's default iteration limits of its solvers; smaller limits are raised to them.
 """
 TOLERANCE = 1e-8
-"""MuJoCo's default, which replaces tolerances above :data:`LARGEST_TOLERANCE` [-]."""
+"""MuJoCo's default tolerance [-]; replaces those above :data:`LARGEST_TOLERANCE`."""
 LARGEST_TOLERANCE = 1e-6
 """Largest tolerance of the solver that is kept [-]."""
 _DIVERGES = (
@@ -36,17 +37,17 @@ _DIVERGES = (
 
 @dataclass(frozen=True, kw_only=True)
 class EngineOptions:
-    """Options of a model with drives."""
+    """Integrator and solver options of a model with drives, and their warnings."""
 
     integrator: mujoco.mjtIntegrator
     iterations: int
     ls_iterations: int
     tolerance: float
     said: tuple[str, ...]
-    """Warnings of one line each."""
+    """Warnings, one line each."""
 
     def warn(self) -> None:
-        """Warn of options that change and of options that may be unsuitable."""
+        """Warn about options that were changed and options that may be unsuitable."""
         for line in self.said:
             warnings.warn(line, stacklevel=depth_of_caller())
 
@@ -59,7 +60,7 @@ class EngineOptions:
 
 
 def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOptions:
-    """Options of a model that integrate its drives correctly.
+    """Options with which the engine integrates the drives of a model correctly.
 
     Args:
         spec: Model; unchanged.
@@ -81,8 +82,8 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
             name = old.name.removeprefix("mjINT_").lower()
             said.append(
                 f"integrator {name} replaced by discrete: {name} treats a drive as an"
-                " explicit force and diverges; integrator='keep' keeps it, RK4 is kept"
-                " as the reference"
+                " explicit force and diverges; integrator='keep' keeps it. RK4 is never"
+                " replaced"
             )
     if rotors and integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
         if option.solver == mujoco.mjtSolver.mjSOL_PGS:
@@ -93,14 +94,14 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
         if option.noslip_iterations > 0:
             said.append(
                 "noslip_iterations > 0 solves contacts without the drives' stiffness; "
-                "set it to 0 with drives"
+                "accepted for models with drives: 0"
             )
         enough = _converging(spec)
         if solver != enough:
             does = "set to" if wanted == "discrete" else "use"
             said.append(
-                f"solver {_text(solver)}: does not solve the drive stiffness to"
-                f" convergence under integrator discrete; {does} {_text(enough)}"
+                f"solver {_text(solver)}: may not converge with the drive stiffness"
+                f" under integrator discrete; {does} {_text(enough)}"
             )
             if wanted == "discrete":
                 solver = enough

@@ -18,26 +18,26 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
     """First matching key of every hinge that takes a drive.
 
     A key is the name of a joint or a pattern with ``*``, ``?`` and ``[...]`` as in file
-    names. A pattern selects hinges; matching hinges that cannot take a drive are left
-    out with one warning that lists them. Rotors of drives are never selected.
+    names. A pattern selects hinges; matching hinges that cannot take a drive are
+    omitted, with one warning that lists them. Rotors of drives are never selected.
 
     Args:
-        spec: Model.
+        spec: Model; unchanged.
         keys: Names and patterns; earlier keys have priority.
 
     Returns:
         Key by joint, in the order of the model.
 
     Raises:
-        InputError: If a name cannot take a drive, if a pattern matches no hinge that
-            can, or if earlier keys already select all joints of a key; with one line
-            for each problem.
+        InputError: If a named joint cannot take a drive, if a pattern matches no hinge
+            that can, or if earlier keys already select all joints of a key; with one
+            line for each problem.
     """
     around = Surroundings(spec)
     keys = list(keys)
     for key in keys:
         if not isinstance(key, str):
-            raise InputError(f"joint {key!r}; accepted: a name or a pattern")
+            raise InputError(f"joint {key!r}; accepted: a joint name or a pattern")
     patterns = [key for key in keys if _is_pattern(key, around)]
     place = {key: k for k, key in enumerate(keys)}
     hinges = [
@@ -81,8 +81,8 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
             if key not in taken:
                 others = ", ".join(sorted(map(repr, before)))
                 wrong.append(
-                    f"{key!r} selects no joint: {others} before it matches the same"
-                    " joints; put the more specific key first"
+                    f"{key!r} selects no joint, because {others} comes earlier and"
+                    " matches the same joints; put the more specific key first"
                 )
     if wrong:
         raise InputError("\n".join(wrong))
@@ -109,7 +109,7 @@ def _no_hinge(name: str, around: Surroundings) -> str:
 
 
 def _obstacle(joint: Any, around: Surroundings) -> str:
-    """Reason why a hinge cannot take a drive; empty if it can."""
+    """Reason why a hinge cannot take a drive; empty if it can take one."""
     if not joint.name:
         return f"a hinge of body {joint.parent.name!r} has no name"
     try:

@@ -15,9 +15,9 @@ from swgjoint.joint.obstacles import Surroundings
 from swgjoint.typing import Array
 
 ROTOR_MASS = 1e-9
-"""Mass of the rotor body [kg]; the arm model already includes the mass of the motor."""
+"""Mass of the rotor body [kg]; the model's links already include the motor mass."""
 LUMPED_INERTIA = 1e-12
-"""Inertia of the body of a lumped rotor, since the engine requires one [kg·m²]."""
+"""Body inertia of a lumped rotor [kg·m²]; the engine requires a positive value."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +25,9 @@ class DrivePlace:
     """A joint in the compiled model: its frame, inertia, actuators and sensors."""
 
     joint: Any
+    """Hinge in the spec."""
     parent: Any
+    """Parent body of the link, which gets the rotor."""
     model: mujoco.MjModel
     """Compiled model without drives."""
     index: int
@@ -45,7 +47,7 @@ class DrivePlace:
     armature: float
     """Armature of the joint and of the actuators on it [kg·m²]."""
     inertia: float
-    """Inertia at qpos0 without armature, with the other joints held [kg·m²]."""
+    """Inertia at qpos0 without armature, with the other joints locked [kg·m²]."""
     has_damping_ratio: bool
     """Whether an actuator on the joint states its damping as a ratio."""
 
@@ -105,12 +107,15 @@ class Compiled:
 
 @dataclass(frozen=True, kw_only=True)
 class Rotor:
-    """Rotor of a drive."""
+    """Inertia and type of the rotor of a drive."""
 
     inertia: float
     """Rotor inertia about its axis [kg·m²]."""
     ratio: float
+    """Signed ratio i of the drive [-]."""
     lumped: bool
+    """Whether the rotor rotates only relative to its parent link, see
+    :func:`swgjoint.joint.attach.attach`."""
     own: bool
     """Whether the rotor has its own joint; otherwise it is armature of the link joint.
     """
@@ -131,9 +136,10 @@ def free_inertias(
 ) -> dict[str, tuple[float, float]]:
     """Inertias about joints with the other joints free, without and with other drives.
 
-    The second inertia includes the drives of all joints that precede the joint in the
-    model, but neither a drive nor armature of the joint itself. Only joints whose
-    actuators state a damping ratio are listed.
+    The first inertia is that of the model without drives. The second includes the
+    drives of all joints that precede the joint in the model, but neither a drive nor
+    armature of the joint itself. Only joints whose actuators state a damping ratio are
+    listed.
 
     Args:
         compiled: Model without drives.
@@ -157,7 +163,7 @@ def free_inertias(
         if not rotor.own:
             mass[dof, dof] += rotor.reflected
             continue
-        # the rotor body turns with its parent; eliminate the free rotor hinge
+        # the rotor body moves with its parent; eliminate the free rotor hinge
         linear, angular = np.zeros((2, 3, model.nv))
         parent = int(model.body_parentid[model.jnt_bodyid[place.index]])
         anchor = data.xanchor[place.index]
@@ -215,6 +221,6 @@ def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:
         )
     if compiler.boundinertia > rotor_inertia:
         raise InputError(
-            f"compiler boundinertia {compiler.boundinertia} kg·m² is above the rotor's "
-            f"inertia {rotor_inertia} kg·m²; accepted: at most that"
+            f"compiler boundinertia {compiler.boundinertia} kg·m² is above the rotor "
+            f"inertia; accepted: at most {rotor_inertia} kg·m²"
         )

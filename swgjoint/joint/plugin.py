@@ -1,7 +1,6 @@
 """The engine plugin ``swgjoint.drive``: its library, attributes and self-test.
 
-For development, one command builds the library in place, see
-``swgjoint/plugin/README.md``.
+``swgjoint/plugin/README.md`` states the command that builds the library in place.
 """
 
 from __future__ import annotations
@@ -21,25 +20,29 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 
 NUMERICAL_DAMPING = 0.1
-"""Fraction of a backward step mixed in for torsion modes that the step cannot resolve
-[-].
+"""Coefficient nu1 of the numerical damping of unresolved torsion modes [-].
 
-It adds no damping below h w = 0.5 and 0.03 of critical at h w = 2; it must be positive
-for the scheme to be stable on stiff joints.
+With a = (h w)² at the torsion frequency w, the step contains the fraction
+nu1 a²/(16 + a²) of a backward step. This adds less than 1e-4 of critical damping below
+h w = 0.5, and 0.03 at h w = 2. The coefficient must be positive for the scheme to be
+stable on stiff joints.
 """
 PASSES = 2
-"""Evaluations of the map per step: one predicts the pair, the next gives the force."""
+"""Evaluations of the map per step: the first predicts the motion of rotor and link, the
+second gives the force."""
 TENDON_STIFFNESS = (1e-9, 0.0, 1.0)
-"""Polynomial of the carrier tendon; the cubic part sets its tangent by its length."""
+"""Stiffness polynomial of the drive's tendon [N·m/rad, N·m/rad², N·m/rad³]. The plugin
+sets the length so that the tangent of the cubic spring is the stiffness p."""
 FRICTION_STIFFNESS = (1e-9, 0.0, 1e-19)
-"""Polynomial of the friction tendon, whose length is a rotation of many turns: with
-such a small cubic part its own spring force is negligible. The plugin identifies the
-tendon by this value, which MuJoCo's XML therefore has to preserve."""
+"""Stiffness polynomial of the friction tendon. Its length is a rotation of many turns,
+but with such a small cubic part its own spring force is negligible. The plugin
+identifies the tendon by this cubic part, which MuJoCo's XML therefore has to preserve.
+"""
 
 
 @cache
 def load() -> None:
-    """Register the plugin with MuJoCo; further calls do nothing.
+    """Register the plugin with MuJoCo; further calls have no effect.
 
     Raises:
         ComputationError: If MuJoCo has another version, or the library is not built or
@@ -61,22 +64,23 @@ def load() -> None:
         mujoco.mj_loadPluginLibrary(str(path))
     except Exception as error:
         raise ComputationError(
-            f"MuJoCo {MUJOCO_VERSION} does not load {path}: {error}"
+            f"MuJoCo {MUJOCO_VERSION} cannot load {path}: {error}"
         ) from error
 
 
 def load_plugin() -> Path:
     """Register the drive plugin with MuJoCo, so that saved models with drives load.
 
-    Importing swgjoint registers the plugin. Call this function for an error message
-    that names what is missing, or for the path that ``mj_loadPluginLibrary`` needs in C
+    Importing swgjoint already registers the plugin. This function raises an error that
+    names what is missing, and returns the path that ``mj_loadPluginLibrary`` needs in C
     and C++.
 
     Returns:
         Path of the library.
 
     Raises:
-        ComputationError: If MuJoCo has another version or the library is not built.
+        ComputationError: If MuJoCo has another version, or the library is not built or
+            cannot be loaded.
     """
     load()
     return library()
@@ -95,13 +99,13 @@ def config(
     numerical_damping: float = NUMERICAL_DAMPING,
     passes: int = PASSES,
 ) -> dict[str, str]:
-    """Text attributes of a plugin instance, which replace a map file.
+    """Attributes of a plugin instance as text; they contain the whole map.
 
     Args:
         drive: Map to evaluate.
         damping: Damping torque per torsion rate [N·m·s/rad].
-        contact_damping: Smallest damping while a contact or a limit acts
-            [N·m·s/rad].
+        contact_damping: Smallest damping, torque per torsion rate, while a contact or a
+            limit acts [N·m·s/rad].
         numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
         passes: See :data:`PASSES`.
 
@@ -135,7 +139,10 @@ def config(
 
 
 def friction_numbers(drive: DriveMap) -> np.ndarray:
-    """Attribute ``friction``: direction, then the law including bending. Shape (9,)."""
+    """Numbers of the attribute ``friction``: direction, then the law. Shape (9,).
+
+    The constant bending torque is added to the Coulomb and static torques.
+    """
     f = drive.friction
     assert f is not None
     return np.array(
@@ -173,11 +180,11 @@ _SELF_TEST = """
 
 
 def metric_error() -> float:
-    """Relative deviation of one step from (M + h² (p g g' + p_b b b'))⁻¹ h f [-].
+    """Relative error of one engine step against (M + h² (p g g' + p_b b b'))⁻¹ h f [-].
 
     The scheme passes the direction g, the stiffness p and the stiffness p_b of friction
-    to the engine through ``ten_J`` and ``ten_length``. This is undocumented behaviour,
-    so the function tests it on the installed engine.
+    to the engine through ``ten_J`` and ``ten_length``. MuJoCo does not document this
+    use, so the function tests it on the installed engine.
     """
     from swgjoint.joint.reference import TwinMotion, metric_of, scheme_force
 

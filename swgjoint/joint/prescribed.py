@@ -28,7 +28,7 @@ from swgjoint.typing import Array
 
 
 def kinematic_part(drive: DriveMap) -> DriveMap:
-    """The map reduced to the harmonics that have a kinematic error."""
+    """The map with only those harmonics that have a kinematic error."""
     return drive.with_harmonics(np.hypot(*drive.kinematic_error.T) > 0.0)
 
 
@@ -40,7 +40,7 @@ def ratio_variation(drive: DriveMap) -> float:
 
 
 def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
-    """Error e0 at motor angles, with psi = theta/i + e0 [rad]. Shape of theta.
+    """Error e0 at motor angles with psi = theta/i + e0, in the shape of theta [rad].
 
     Args:
         drive: The map.
@@ -48,7 +48,7 @@ def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
     """
     theta = np.asarray(theta, float)
     e0, psi = np.zeros_like(theta), theta / drive.ratio
-    # e0 moves psi by about an arc minute, so an iteration reduces the error by n_psi e0
+    # each iteration reduces the error by the slope of e0 by psi, which is small
     for _ in range(60):
         last = e0
         e0 = drive.error_at(drive.phases(theta, psi + e0))[0]
@@ -58,14 +58,15 @@ def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
 
 
 def motor_of_link(drive: DriveMap, psi: ArrayLike) -> Array:
-    """Motor angle at which the output angle is psi [rad]. Shape of psi.
+    """Motor angles at which the output angle is psi, in the shape of psi [rad].
 
     Args:
         drive: The map.
         psi: Link angles of any shape [rad].
 
     Raises:
-        ComputationError: If e0 is so steep that several motor angles fit one psi.
+        ComputationError: If Newton's method does not converge, because e0 is so steep
+            that several motor angles fit one psi.
     """
     psi = np.asarray(psi, float)
     theta = drive.ratio * psi
