@@ -1,13 +1,14 @@
 r"""The law of the engine plugin in numpy, an independent implementation for the tests.
 
-The law has two modes. Both act on the pair (theta, psi) of rotor and link with
-:math:`g = (\partial_\theta\Delta, \partial_\psi\Delta)`.
+The law has two modes. Both act on the positions q = (theta, psi) and speeds v of rotor
+and link, with :math:`g = (\partial_\theta\Delta, \partial_\psi\Delta)`.
 
-*Gradient* (all integrators except ``discrete``): :math:`-\nabla V - C\,(g\cdot v)\,g`.
+*Gradient* (all integrators except ``discrete``): the force is
+:math:`-\nabla V - C\,(g\cdot v)\,g`.
 
 *Scheme* (``discrete``, step h): with :math:`\tilde x = q - h v/2` the engine's step is
-a midpoint rule in :math:`(\tilde x, v)`. The force is the discrete gradient of V from
-:math:`\tilde x` to :math:`\tilde x + h\,\bar v`,
+a midpoint rule in :math:`(\tilde x, v)`. The force is minus the discrete gradient of V
+from :math:`\tilde x` to :math:`\tilde x + h\,\bar v`,
 
 .. math::
     V^+ - V = L\,(\Delta^+ - \Delta) + e\cdot(\tilde x^+ - \tilde x),
@@ -15,12 +16,12 @@ a midpoint rule in :math:`(\tilde x, v)`. The force is the discrete gradient of 
 split symmetrically: L is the secant of V by the torsion with every harmonic at the mean
 of its two end values, e is the secant by the angles with every coefficient at the mean
 of its two end values, and g is the secant of the torsion. The scheme predicts the step
-of the pair. The remainder, linear in the velocity step, is passed to the engine as the
-metric :math:`M + h^2 p\,g g^T`.
+of the pair. The rest of the force, which is linear in the velocity step, is passed to
+the engine as the metric :math:`M + h^2 p\,g g^T`.
 
-Hysteresis consists of elements with stiffness k and yield torque f, relaxed at r. It
-adds its mean torque over the step to L and the slope of that mean to the remainder. The
-stretch changes from :math:`u_0` to
+Hysteresis consists of elements with stiffness k and yield torque f, each relaxed at a
+torsion r. An element adds its mean torque over the step to L and the slope of that mean
+to the slope of L, which enters p. Its stretch changes from :math:`u_0` to
 :math:`u_1 = \mathrm{clip}(u_0 + \Delta^+ - \Delta, \pm f/k)`; with s the fraction of
 the torsion step in which it sticks,
 
@@ -28,10 +29,11 @@ the torsion step in which it sticks,
     \bar q = k\,[\tfrac12 (u_0 + u_1)\,s + u_1 (1 - s)], \qquad
     \partial\bar q/\partial\Delta^+ = \tfrac12 k s^2.
 
-Its work is the change of :math:`k u^2/2` plus the slip dissipation, which is >= 0.
+Its work is the change of :math:`k u^2/2` plus the slip dissipation, which is never
+negative.
 
 Friction acts along beta, the rotation of the wave generator relative to the flexspline,
-with its own metric :math:`h^2 p_b\,b b^T`; see
+with b its gradient and its own metric :math:`h^2 p_b\,b b^T`; see
 :mod:`swgjoint.joint.friction_step`.
 
 Source:
@@ -53,7 +55,7 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True)
 class TwinMotion:
-    """State of one rotor-link pair before a step."""
+    """State of one rotor-link pair before a step; angles in rad and rates in rad/s."""
 
     theta: float
     psi: float
@@ -61,11 +63,11 @@ class TwinMotion:
     psi_rate: float
     rotor_weight: float = 0.0
     """Diagonal element of the rotor dof in the inverse mass matrix, see
-    :mod:`.response` [1/(kg·m²)]."""
+    :mod:`swgjoint.joint.response`; ``link_weight`` likewise [1/(kg·m²)]."""
     link_weight: float = 0.0
     rotor_acceleration: float = 0.0
-    """Rotor acceleration by all other forces in the last step, a plugin state [rad/s²].
-    """
+    """Rotor acceleration by all other forces in the last step, a plugin state like
+    ``link_acceleration`` [rad/s²]."""
     link_acceleration: float = 0.0
     rest: tuple[float, ...] = ()
     """Torsion at which each hysteresis element is relaxed [rad]."""
@@ -79,24 +81,27 @@ class SchemeForce:
     """Force and metric that the scheme passes to the engine for one step."""
 
     theta: float
-    """Force on the rotor before the metric acts [N·m]."""
+    """Torque on the rotor before the metric acts, ``psi``: on the link [N·m]."""
     psi: float
     g_theta: float
     g_psi: float
+    """Secants g of the torsion by theta and by psi [-]."""
     along: float
-    """Force lam along g [N·m]."""
+    """Torque along g, subtracted from the other torques [N·m]."""
     metric: float
     """Stiffness p of the rank-one metric [N·m/rad]."""
     e_theta: float
-    """Secant of V by theta at fixed torsion [N·m]."""
     e_psi: float
+    """Secants of V by theta and by psi at fixed torsion [N·m]."""
     friction: FrictionStep | None = None
-    """Friction along beta; ``theta`` and ``psi`` include its force, ``metric`` excludes
-    its metric."""
+    """Friction along beta; ``theta`` and ``psi`` include its torque, but ``metric``
+    excludes its metric."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Secant:
+    """Direction g, mean torque, its slope, tangents at both ends, and e, as above."""
+
     g: Array
     torque: float
     slope: float
@@ -108,7 +113,7 @@ class _Secant:
 def gradient_force(
     drive: DriveMap, motion: TwinMotion, *, damping: float
 ) -> tuple[float, float]:
-    """Forces on rotor and link, minus the gradient of V and the damping [N·m].
+    """Torques on rotor and link: -grad V, damping, hysteresis and friction [N·m].
 
     Args:
         drive: The map.
@@ -149,8 +154,8 @@ def scheme_force(
         drive: The map.
         motion: State of the pair at the beginning of the step.
         timestep: Step h [s].
-        damping: Damping C, torque per torsion rate [N·m·s/rad]; while a contact or a
-            limit acts, at least ``contact_damping`` of the drive.
+        damping: Damping C, torque per torsion rate [N·m·s/rad]. While a contact or a
+            limit acts, the caller has to pass at least the drive's ``contact_damping``.
         numerical_damping: Coefficient nu1 of the scheme [-].
         passes: Number of evaluations of the map.
     """
@@ -228,7 +233,7 @@ def metric_of(drive: DriveMap, force: SchemeForce, *, timestep: float) -> Array:
         timestep: Step h [s].
 
     Returns:
-        Shape (2, 2).
+        Matrix in the order rotor, link. Shape (2, 2).
     """
     g = np.array([force.g_theta, force.g_psi])
     metric = force.metric * np.outer(g, g)
@@ -247,7 +252,7 @@ def other_acceleration(
     theta_rate: float,
     psi_rate: float,
 ) -> tuple[float, float]:
-    """Plugin state after a step: acceleration by all other forces [rad/s²].
+    """Plugin state after a step: accelerations by all other forces [rad/s²].
 
     Args:
         drive: The map.
@@ -331,7 +336,7 @@ def relax_state(
 def _slip(
     drive: DriveMap, rest: tuple[float, ...], torsion: float, change: float
 ) -> tuple[float, float, float]:
-    """Mean torque of the elements over a step, its slope, and sticking stiffness."""
+    """Mean torque of the elements [N·m], its slope and sticking stiffness [N·m/rad]."""
     torque = slope = sticking = 0.0
     for element, r in zip(drive.hysteresis, rest, strict=True):
         k, d = element.stiffness, element.yield_torsion

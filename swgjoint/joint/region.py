@@ -1,55 +1,68 @@
 """Region of stable integration of a drive, and sub-steps for steps outside it.
 
-Bounds of the discrete scheme. Here n are the orders per input turn, e and V the
-amplitudes of kinematic error and cogging energy, T the repeated peak torque, K the
-stiffness, J the rotor inertia, C = T sum n²e + sum n²V the curvature that the metric
-does not include, and w the torsion frequency of rotor against link:
+Bounds of the discrete scheme. Here h is the step, n are the orders per input turn, e
+and V the amplitudes of kinematic error and cogging energy, T the repeated peak torque,
+K the mean stiffness, J the rotor inertia, C = T sum n²e + sum n²V the curvature that
+the metric does not include, and w the torsion frequency of rotor against link:
 
 - h <= 5 ms: longer steps are untested;
-- h n |theta rate| <= 0.5: the step does not resolve shorter waves;
-- h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond these bounds, the rotor
+- h n |theta rate| <= 0.5: beyond this bound the step does not resolve the harmonic;
+- h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond these bounds the rotor
   snaps between several equilibrium positions within a step and gains energy;
 - i sum n e <= 0.56 and K_max <= 30 K: larger values are untested. K_max includes the
   stiffness of sticking hysteresis elements;
-- T/(i J), T/J_link <= 1e10 rad/s²: the engine treats larger accelerations as a
-  divergence;
+- T/(i J), T/J_link <= 1e10 rad/s², here with T at least ``max_torque``: the engine
+  treats larger accelerations as a divergence;
 - if contacts or joint limits may act, h sqrt(K/J_link) <= 2.5: the engine pushes a
   link out of a contact along a prescribed path, and a light link that vibrates faster
   than the steps drags its rotor along;
-- for drives without losses, h w <= 0.25 if an order can excite the torsion: there only
-  the steps take energy from the resonance. Even at h w = 0.5 they take less than a
-  hundredth of the energy that a damping ratio of 0.02 dissipates.
+- for drives without losses, h w <= 0.25 if an order can excite the torsion: in such a
+  resonance only the numerical damping takes energy from the vibration. Even at
+  h w = 0.5 it takes less than a hundredth of the energy that a damping ratio of 0.02
+  dissipates.
 
 Contacts of the engine feed energy into the torsion of chains that bounce on them, at
-any step and also under RK4. A drive without friction and with a damping ratio below
-0.001 therefore gets a damping ratio of 0.05 while contacts or limits act, see
+any step size and also under RK4. A drive without friction and with a damping ratio
+below 0.001 therefore gets a damping ratio of 0.05 while contacts or limits act, see
 :data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO`; in free motion it has no losses.
 
-A step outside the region is divided into equal parts that are inside by a
-:data:`MARGIN`. Under RK4 and the other integrators the bound is on the fastest
-frequency, including that of a sticking friction bristle, and on the decay rate of the
-bristle.
+A step outside the region is divided into equal sub-steps that are inside it by a
+:data:`MARGIN`. Under RK4 and the other integrators, h times the fastest frequency is
+bounded, including that of a sticking friction bristle, and h times the decay rate of
+the bristle.
 
-Tests on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 kg·m²,
-i 30..160, low orders and tooth order with side bands, ripple 2-5 %, hardening to 26 K,
-steps 0.5-5 ms, no physical damping, 2 s): of 2302 runs inside the region none diverged
-and one gained more than 5 % of its energy. With one to three hysteresis elements of
-0.1 to 20 K stiffness, of 2254 runs inside (1 s) none diverged and two gained more than
-5 %, including the energy of the elements. When steps were divided exactly to the edge
-of the region, 2 of about 600 runs gained energy; with the margin none of 228.
+The bounds were tested on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3 kg·m²,
+link 1e-4..1e2 kg·m², i 30..160, low orders and tooth order with side bands, ripple
+2-5 %, hardening to 26 K, steps 0.5-5 ms, no physical damping). None of the runs in the
+first two rows diverged:
 
-Of 5480 joints dropped on a floor, 9 gained 5 % more energy than the engine's floor
-itself supplies, and none of the 582 with h sqrt(K/J_link) from 2 to 2.5; without that
-bound 12 of 3090 did, by up to three times their energy. In free rotation for 10 s near
-resonance at 1 ms, 804 catalogue drives lost at most 1.5 %; without the last bound 83 of
-1217 lost more than 5 %. ``swgjoint stability --full`` runs a grid of these cases: of
-6300 runs none gains energy and 155 are rejected. Of 792 chains of two links that lie on
-a floor or press against limits with damping ratios of 0, 0.001 and 0.02, none gains
-energy and none is rejected. Without the contact damping, 12 of the 264 chains without
-losses would gain more than the contacts of a finer run supply, up to 2.3 times the
-energy of their fall; 13 with a ratio of 0.001, 2 with 0.02, none with 0.05, and of the
-132 on floors none with 0.025. Under RK4 at 25 µs three of these chains gain up to 9
-times that energy.
+=========================================  =====  ======  =========================
+runs                                       number failed  criterion of failure
+=========================================  =====  ======  =========================
+free, 2 s                                  2302   1       gains > 5 % energy
+one to three hysteresis elements of        2254   2       gains > 5 %, elements
+0.1 to 20 K stiffness, 1 s                                included
+step divided to the edge of the region     ~600   2       gains energy
+step divided with the margin               228    0       gains energy
+dropped on a floor                         5480   9       gains > 5 % more than the
+                                                          engine's floor supplies
+same, h sqrt(K/J_link) from 2 to 2.5       582    0       same
+same, without the bound of 2.5             3090   12      same; up to three times
+                                                          the energy
+catalogue drives near resonance,           804    0       loses > 5 %; largest loss
+10 s at 1 ms                                              1.5 %
+same, without the last bound               1217   83      loses > 5 %
+=========================================  =====  ======  =========================
+
+``swgjoint stability --full`` runs a grid of these cases: of 6300 runs none gains energy
+and 155 are rejected. Of 792 chains of two links that rest on a floor or press against
+limits, with damping ratios of 0, 0.001 and 0.02, none gains energy and none is
+rejected. Without the contact damping, some chains would gain more energy than the
+contacts of a finer run supply: 12 of the 264 without losses (up to 2.3 times the energy
+of their fall), 13 with a damping ratio of 0.001, 2 with 0.02 and none with 0.05. Of the
+132 on floors, none would with 0.025. Under RK4 at 25 µs, three of these chains gain up
+to 9 times that energy.
+
 These tests are no proof: the step is one linearised solve with two evaluations.
 `tests/joint/test_random_joints.py` runs a sample.
 """
@@ -65,20 +78,21 @@ from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
 
 MAX_SUB_STEPS = 64
-"""Largest number of sub-steps; runs that need more are rejected. An arm at 1 ms still
-runs in real time with this number; beyond it the user should choose a smaller step."""
+"""Largest number of sub-steps; runs that need more are rejected. With this number, an
+arm at a step of 1 ms still runs in real time; for more, choose a smaller step."""
 MAX_PHASE_STEP = 0.5
 """Largest phase step of the highest order, h n |theta rate| [rad]."""
 MARGIN = 1.4
-"""Longest step inside the region divided by the sub-step [-]; without a margin all
-sub-steps would be at the edge of the region."""
+"""Smallest ratio of the longest step inside the region to a sub-step [-]; without a
+margin, sub-steps could be at the edge of the region."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RegionBound:
-    """One bound of the region: value <= limit."""
+    """One bound of the region: value <= limit, in the unit that ``what`` states."""
 
     what: str
+    """Description of the bounded quantity."""
     value: float
     limit: float
     timestep: float | None
@@ -92,11 +106,14 @@ class RegionBound:
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Bounds of one joint at a step."""
+    """Bounds of one joint at one step size."""
 
     joint: str
+    """Name of the joint."""
     timestep: float
+    """Step h [s]."""
     bounds: tuple[RegionBound, ...]
+    """Bounds that apply to the level and the integrator."""
 
     @property
     def ok(self) -> bool:
@@ -105,7 +122,7 @@ class Region:
 
     @property
     def suggested_timestep(self) -> float | None:
-        """Largest step that meets every bound, to two digits [s]; None if none does."""
+        """Largest step that meets all bounds, rounded to two digits [s]; None: no step."""
         steps = [bound.timestep for bound in self.bounds if not bound.ok]
         if None in steps:
             return None
@@ -117,10 +134,10 @@ class Region:
 
     @property
     def sub_steps(self) -> int | None:
-        """Number of equal sub-steps inside the region with the margin.
+        """Number of equal sub-steps that are inside the region with the margin.
 
-        It is 1 if the step itself is inside, and None if no step is. In a user's own
-        simulation loop, use the largest number of all joints::
+        It is 1 if the step itself is inside, and None if no step is. In a simulation
+        loop of your own, use the largest number of all joints::
 
             n = check_region(drive, timestep=h, max_input_speed=speed).sub_steps
             model.opt.timestep = h / n  # attach keeps the harmonics that h carries
@@ -136,7 +153,7 @@ class Region:
 
     @property
     def exceeded(self) -> str:
-        """Exceeded bounds with value and limit; empty inside the region."""
+        """Text of the exceeded bounds with value and limit; empty inside the region."""
         return "; ".join(
             f"{b.what} = {b.value:.3g} > {b.limit:.3g}" for b in self.bounds if not b.ok
         )
@@ -155,7 +172,7 @@ class Region:
         )
         return (
             f"joint {self.joint!r} at a step of {1e3 * self.timestep:.3g} ms is "
-            f"outside the integrator's region: {what}; {way_out}"
+            f"outside the stability region of the integrator: {what}; {way_out}"
         )
 
     def require(self, max_sub_steps: int = 1) -> int:
@@ -165,7 +182,8 @@ class Region:
             max_sub_steps: Largest accepted number; 1 rejects steps outside the region.
 
         Raises:
-            ComputationError: If more sub-steps are needed, with :attr:`message`.
+            ComputationError: If more sub-steps are needed or no step is inside, with
+                :attr:`message`.
         """
         parts = self.sub_steps
         if parts is not None and parts <= max_sub_steps:
@@ -196,6 +214,10 @@ def check_region(
         contacts: Whether contacts or limits may act on the link.
         integrator: ``discrete``; ``RK4`` and the other integrators treat the drive as
             an explicit force, so h times the fastest frequency is bounded.
+
+    Returns:
+        The bounds that apply; none without a rotor or for a native spring under
+        ``discrete``.
     """
     native = drive.level in ("linear", "native")
     if drive.rotor is None or (native and integrator == "discrete"):
@@ -309,13 +331,13 @@ def _explicit_bounds(
         stiffness += sum(element.stiffness for element in drive.native.hysteresis)
     rotor = drive.ratio**2 * drive.rotor_inertia
     frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))
-    # stability limits of a free oscillation: 2.8 for RK4, 2 for a semi-implicit step
+    # a free vibration is stable up to 2.8 for RK4 and 2 for a semi-implicit step
     rk4 = integrator.upper() == "RK4"
     limit, what = 2.0 if rk4 else 1.0, "the fastest torsion frequency"
     damped: tuple[RegionBound, ...] = ()
     law = drive.friction
     if law is not None:
-        # sticking bristle: beyond the limit it creeps below yield, or diverges
+        # beyond the limit, a sticking bristle creeps below its yield torque or diverges
         mobility = 1.0 / drive.rotor_inertia
         mobility += abs(drive.drive.friction_direction[1]) / drive.link_inertia
         frequency = sqrt(frequency**2 + law.stiffness * mobility)

@@ -2,13 +2,14 @@ r"""Response of a joint to its own torque with all other joints free, as in the 
 
 The plugin predicts the step of a drive from the response of rotor and link to its
 torque. With the other joints free, the response is the diagonal of the inverse mass
-matrix. From the engine's factorisation M = L'DL,
+matrix. The engine's factorisation M = L'DL gives
 
-.. math:: (M^{-1})_{ii} = \sum_j (L^{-T} e_i)_j^2 / D_j
+.. math:: (M^{-1})_{ii} = \sum_j (L^{-T} e_i)_j^2 / D_j,
 
-over the dofs j that carry i. The part that the prediction omits returns one step late
-as an acceleration by other forces: if the response is too small, it feeds energy into
-the torsion modes of a chain, if it is too large, it damps them.
+summed over dof i and the dofs j that carry it. Any part of the response that the
+prediction omits returns one step late as an acceleration by other forces. If the
+predicted response is too small, this feeds energy into the torsion modes of a chain;
+if it is too large, this damps them.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def responses(
         dofs: Indices of the dofs of the joints.
 
     Returns:
-        Shape (..., number of dofs).
+        Diagonal elements of the given dofs. Shape (..., number of dofs).
     """
     diagonal = []
     for dof in dofs:

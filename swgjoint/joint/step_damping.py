@@ -1,24 +1,25 @@
 r"""Numerical damping of torsional vibrations, and its compensation for native springs.
 
 Under ``discrete`` a native spring of tangent k gets an additional force -k h v and the
-metric h² k. This is the backward rule, which damps by about h w/2 of critical. A damper
-of -h k cancels the force. With x~ = q - h v/2, 1/w the inertia of the pair along the
-torsion and c the drive's own damping, the remaining equation is
+metric h² k. This is the backward rule, which damps a vibration of frequency Omega with
+a damping ratio of about h Omega/2. A damper of -h k cancels the force. Let q be the
+torsion, v its rate, x~ = q - h v/2, 1/w the inertia of the pair along the torsion and c
+the drive's own damping. The remaining equation is
 
 .. math:: (1/w + \tfrac34 h^2 k - \tfrac12 h c)(v^+ - v)
     = -h\,[k\,(\tilde x + \tilde x^+)/2 + c\,(v + v^+)/2],
 
-the midpoint rule of a pair with more inertia. Its energy, including that inertia,
-decreases by the work of c alone at any step with 0 <= c <= h k. The frequency is lower
-than that of the pair, by slightly more than 3 (h Omega)²/8 for a short step. If the
-step does not resolve the vibration, a fraction nu of the integrator's damping remains,
-as at level ``full``.
+the midpoint rule of a pair with more inertia. Its energy, including that of the added
+inertia, decreases only by the work of c, for any step size with 0 <= c <= h k. The
+frequency is lower than that of the pair, for a short step by a fraction of slightly
+more than 3 (h Omega)²/8. If the step does not resolve the vibration, a fraction nu of
+the integrator's damping remains, as at level ``full``.
 
 Only a constant stiffness can be compensated: tendons with dead bands, whose tangent is
-zero inside, keep the integrator's damping. The negative damper is valid for one step,
-one integrator and a solver that includes the metric; at a shorter step it would feed
-energy into the vibration. Therefore :func:`~swgjoint.joint.attach.attach` omits it, and
-:func:`damp_as_asked` is called last, when step and integrator are final, as scenes do.
+zero inside, keep the integrator's damping. The negative damper is valid for one step
+size, one integrator and a solver that includes the metric; at a shorter step it would
+feed energy into the vibration. Therefore :func:`~swgjoint.joint.attach.attach` does not
+add it. Call :func:`damp_as_asked` last, when step and integrator are final; scenes do.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from swgjoint.joint.drive import JointDrive
 
 NUMERICAL_DAMPING = 0.1
 """Coefficient nu1 of the scheme of level ``full``, see
-:mod:`swgjoint.joint.reference` [-]."""
+:data:`swgjoint.joint.plugin.NUMERICAL_DAMPING` [-]."""
 OFF_ZERO = 1e-18
 """Rest length of a compensated spring [rad]. The engine would omit a spring of length
 exactly zero from its metric; the torque of this length is below round-off."""
@@ -42,10 +43,10 @@ exactly zero from its metric; the torque of this length is below round-off."""
 
 @dataclass(frozen=True, kw_only=True)
 class StepMode:
-    """Small torsional vibration of an otherwise free rotor and link."""
+    """Small torsional vibration of rotor against link, with no other joint moving."""
 
     damping_ratio: float
-    """Damping ratio at the step [-]; no vibration at 1 and above."""
+    """Damping ratio at the step [-]; at 1 and above there is no vibration."""
     frequency: float
     """Frequency at the step [rad/s]."""
     own_damping_ratio: float
@@ -55,7 +56,7 @@ class StepMode:
 
 
 def left_share(stiffness_step: float) -> float:
-    """Fraction nu of the integrator's damping that remains, for (h w)² [-]."""
+    """Fraction nu of the integrator's damping that remains, from (h Omega)² [-]."""
     return NUMERICAL_DAMPING * stiffness_step**2 / (16.0 + stiffness_step**2)
 
 
@@ -125,7 +126,7 @@ def is_implicit(spec: mujoco.MjSpec) -> bool:
 
 
 def compensation(drive: JointDrive, timestep: float) -> float:
-    """Damping to be removed from the base spring at a step [N·m·s/rad].
+    """Damping of the integrator to be removed from the main spring [N·m·s/rad].
 
     Args:
         drive: A drive at level ``linear`` or ``native``.
@@ -139,15 +140,16 @@ def compensation(drive: JointDrive, timestep: float) -> float:
 def step_mode(
     drive: JointDrive, *, timestep: float, torque: float = 0.0
 ) -> StepMode | None:
-    """Damping ratio and frequency of the torsion at a step under ``discrete``.
+    """Damping ratio and frequency of the torsional vibration under ``discrete``.
 
     Args:
-        drive: Drive, with its link inertia at qpos0 and the other joints held.
+        drive: Drive; the link has its inertia at qpos0 and other joints are locked.
         timestep: Step h [s].
-        torque: Mean torque about which the joint vibrates [N·m]; hysteresis sticks.
+        torque: Mean torque about which the joint vibrates [N·m]; hysteresis elements
+            stick.
 
     Returns:
-        The vibration; None if the drive has no rotor, or no stiffness at that torque.
+        The vibration; None if the drive has no rotor or no stiffness at that torque.
     """
     if drive.rotor is None:
         return None

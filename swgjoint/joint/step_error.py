@@ -1,13 +1,13 @@
-r"""Error of the step in a spectral line of the output torque, in closed form.
+r"""Error of a spectral line of the output torque due to the step, in closed form.
 
-For small vibrations about a mean torque T0 the scheme is the equation of rotor and link
-with time derivatives at a shifted frequency: a line of frequency Omega responds as if
-its frequency were
+For small vibrations about a mean torque T0 the scheme is the equation of motion of
+rotor and link with time derivatives at a shifted frequency: a line of frequency Omega
+responds as if its frequency were
 
-.. math:: \Omega_h = \frac{2}{h} \tan\beta, \quad \beta = \frac{h\,\Omega}{2}
+.. math:: \Omega_h = \frac{2}{h} \tan\beta, \quad \beta = \frac{h\,\Omega}{2},
 
-and its angle orders in the forces on rotor and link are larger by Omega_h/Omega. The
-step thus shifts a line towards the torsional resonance from below. With A,
+and its angle orders in the forces on rotor and link are larger by the factor
+Omega_h/Omega. A line below the torsional resonance is thus shifted towards it. With A,
 T = dA/dDelta and e the complex amplitudes of potential, torque and kinematic error of
 one harmonic (n, m), and the amplitudes of rotor and link as unknowns,
 
@@ -16,15 +16,16 @@ one harmonic (n, m), and the amplitudes of rotor and link as unknowns,
     (-J\,\Omega_h^2 + S)\,\theta = -F/i - j n \frac{\Omega_h}{\Omega} (T_0 e + A),
     \quad -J_l\,\Omega_h^2\,\psi = F - j m \frac{\Omega_h}{\Omega} (T_0 e + A).
 
-S is the motor loop with stiffness k and damping d. The engine evaluates its own
+S is the motor loop with position gain k and speed gain d. The engine evaluates its own
 actuators at the end of the step, which increases the effective rotor inertia by about
 h d/2; a sampled controller acts one step late. With t = tan beta,
 
-.. math:: S = (1 \pm j t)\,[j \Omega_h d + k (1 + j t)].
+.. math:: S = (1 \pm j t)\,[j \Omega_h d + k (1 + j t)],
 
-The torque on the link is F - j m (T_0 e + A). The error is its magnitude divided by
-that in the limit of short steps, minus 1. Motion of the other joints of an arm, which
-is neglected here, changes the error.
+with + for the engine's actuators and - for a sampled controller. The torque on the link
+is F - j m (T_0 e + A). The error is its magnitude divided by that in the limit of short
+steps, minus 1. The other joints of an arm are assumed not to move; if they do, the
+error changes.
 """
 
 from __future__ import annotations
@@ -43,15 +44,15 @@ SAME = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class LinearMotorLoop:
-    """Gains of a motor control loop on angle and speed of the rotor."""
+    """Gains of a motor control loop that feeds back angle and speed of the rotor."""
 
     stiffness: float = 0.0
     """Position gain [N·m/rad]."""
     damping: float = 0.0
     """Speed gain [N·m·s/rad]."""
     sampled: bool = False
-    """Whether a sampled controller uses the state before the step; otherwise the loop
-    is an actuator of the engine."""
+    """True for a sampled controller, which uses the state before the step; False for an
+    actuator of the engine."""
 
 
 def step_error(
@@ -66,8 +67,8 @@ def step_error(
 ) -> float | None:
     """Relative amplitude error of a spectral line of the output torque [-].
 
-    The error applies to positions read half a step back, where the scheme evaluates
-    them.
+    The error is that of the torque at positions half a step back, where the scheme
+    evaluates them.
 
     Args:
         drive: Drive at level ``full``.
@@ -76,13 +77,14 @@ def step_error(
         speed: Input speed [rad/s].
         torque: Mean output torque [N·m].
         timestep: Step h of the engine under ``discrete`` [s].
-        link_inertia: Inertia about the joint [kg·m²]; that at qpos0 if None.
+        link_inertia: Link inertia about the joint [kg·m²]; that at qpos0 if None.
         loop: Control loop of the motor; a free rotor if None.
 
     Returns:
-        Relative error, e.g. 0.01 if the line is 1 % too large. None if the level has no
-        harmonics, if the drive does not have this order, if the input is at rest, or if
-        the phase of the line advances by half a turn or more in one step.
+        Relative error, e.g. 0.01 if the line is 1 % too large. None if the level is not
+        ``full``, if the drive does not have this order, if the input is at rest, if the
+        phase of the line advances by half a turn or more in one step, or if the line
+        has zero amplitude.
     """
     if drive.level != "full" or not speed:
         return None
@@ -148,10 +150,10 @@ def _line(
         theta, psi = np.linalg.solve(
             matrix, [-known / ratio - n * push, known - m * push]
         )
-        # the torque as recorded, without the damping that the steps add
+        # the torque as recorded, without the numerical damping
         twist = theta / ratio - psi
         line = force + k * (twist + error) - 1j * m * by_angle
         line += 1j * drive.damping * (seen * twist + omega * error)
-        # positive and negative frequencies form one line
+        # lines of positive and negative frequency coincide
         total += line.conjugate() if omega < 0.0 else line
     return complex(total)

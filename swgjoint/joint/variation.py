@@ -1,8 +1,8 @@
 r"""Deviations of one specimen of a drive from its map, without recompiling the model.
 
 In every step the engine plugin reads the deviations of a drive from the user data of
-its tendon. These are five numbers, which are all zero for the map itself. They can be
-written into a compiled model, or for each simulation into the ``tendon_user`` of a
+its tendon. These are five numbers, all zero for the map itself. They can be written
+into the ``tendon_user`` of a compiled model or, separately for each simulation, of a
 ``mujoco.batch.Batch``::
 
     got = attach(spec, joint="elbow", drive=drive, rotor_inertia=4e-5, variable=True)
@@ -35,7 +35,7 @@ _SHARES = ("stiffness", "kinematic_error", "losses")
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    r"""Deviations from a map; dimensionless ones are fractions of the map's value.
+    r"""Deviations from a map; those without a unit are fractions of the map's value.
 
     .. math::
         V' = (1 + s)\,V(\Delta, \theta + a, \psi + b), \quad
@@ -63,14 +63,14 @@ class Variation:
 
     @property
     def numbers(self) -> Array:
-        """Deviations in the order of the plugin. Shape (5,)."""
+        """Deviations in the order in which the plugin reads them. Shape (5,)."""
         return np.array(
             [self.stiffness, self.kinematic_error, self.theta, self.psi, self.losses],
             float,
         )
 
     def apply_to(self, drive: DriveMap) -> DriveMap:
-        """Map of the specimen, as the plugin evaluates it."""
+        """Map of the specimen, equal to what the plugin evaluates."""
         shift = drive.angle_orders @ np.array([self.theta, self.psi])
         size, losses = 1.0 + self.stiffness, 1.0 + self.losses
 

@@ -1,11 +1,11 @@
 """Warn if a model in a user's own loop leaves the region of stable integration.
 
 Attaching a drive warns of a step that is outside the region at rest. Step, integrator
-and speed may change later. Therefore the model carries the bounds in a custom numeric
-:data:`NUMERIC`, and the engine plugin checks them in every step. The plugin calls
+and speed may change later. Therefore the model stores the bounds in a custom numeric
+named :data:`NUMERIC`, and the engine plugin checks them in every step. The plugin calls
 ``mju_warning`` once per model and step size; the warning appears on the console and in
 ``MUJOCO_LOG.TXT``, or goes to the handler set by ``mujoco.set_mju_user_warning``. A
-scene checks its region itself and has no such numeric.
+scene checks the region itself, so its model has no such numeric.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import MAX_PHASE_STEP, check_region
 
 NUMERIC = "swgjoint_region"
-"""Name of the custom numeric: largest step under ``discrete``, under RK4 and under the
-other integrators [s], largest phase step [rad]."""
+"""Name of the custom numeric. Its four values are the largest step under ``discrete``,
+under RK4 and under the other integrators [s], and the largest phase step [rad]."""
 SCHEMES = ("discrete", "RK4", "implicitfast")
+"""Integrators of the first three values; ``implicitfast`` represents all others."""
 UNBOUNDED = 1e6
-"""Step that stands for no limit [s]."""
+"""Value that means that the step has no limit [s]."""
 
 
 def limits(drives: Iterable[JointDrive]) -> NDArray[np.float64]:
-    """Largest steps at rest by :data:`SCHEMES` [s] and phase step [rad]. Shape (4,)."""
+    """Largest steps at rest [s] and largest phase step [rad], see :data:`NUMERIC`."""
     steps = np.full(len(SCHEMES), UNBOUNDED)
     for drive in drives:
         for k, scheme in enumerate(SCHEMES):
