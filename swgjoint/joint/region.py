@@ -122,7 +122,7 @@ class Region:
 
     @property
     def suggested_timestep(self) -> float | None:
-        """Largest step that meets all bounds, rounded to two digits [s]; None: no step."""
+        """Largest step that meets all bounds, to two digits [s]; None if none does."""
         steps = [bound.timestep for bound in self.bounds if not bound.ok]
         if None in steps:
             return None

@@ -2,8 +2,8 @@ r"""Level ``full`` in MuJoCo Warp: the law of the engine plugin as a passive cal
 
 MuJoCo Warp does not support engine plugins. Like the engine, its ``discrete``
 integrator builds the metric from ``ten_J`` and ``ten_length`` after the passive stage.
-A callback can therefore provide direction and stiffness for the same step, see
-:mod:`swgjoint.joint.reference`, for many worlds at once::
+A callback at that stage can therefore provide direction and stiffness for the same
+step, for many worlds at once, see :mod:`swgjoint.joint.reference`::
 
     drive = swgjoint.attach(spec, joint="j", drive=drive_map, rotor_inertia=4e-5)
     model = without_plugin(spec)
@@ -18,9 +18,9 @@ map.
 
 The law is evaluated in double precision, but the engine's state has single precision:
 the relative rounding error of a position is 6e-8, which causes torque noise of about
-1e-7 K at an output angle of 1 rad. The time of a world must increase in every step,
-because it distinguishes a step from a repeated ``forward`` and from a reset; single
-precision allows 1e7 steps.
+K times 1e-7 rad at an output angle of 1 rad and stiffness K. The time of a world must
+increase in every step, because it distinguishes a step from a repeated ``forward`` and
+from a reset; in single precision it does so for about 1e7 steps.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ except ImportError as error:
 
 
 def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a spec without the drive plugin; rotors and tendons remain."""
+    """Compiled model of a spec without the drive plugin; rotors and tendons remain."""
     plain = spec.copy()
     for body in plain.bodies:
         if body.plugin.plugin_name == plugin.NAME:
@@ -60,7 +60,7 @@ def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 class WarpDrives:
-    """Callback that adds drives to a MuJoCo Warp model with a fixed world count."""
+    """Callback that adds drives to a Warp model for a fixed number of worlds."""
 
     def __init__(
         self,
@@ -146,16 +146,16 @@ def install(m: Any, d: Any, model: mujoco.MjModel, drives: Sequence[JointDrive])
 
     Args:
         m: Result of ``mujoco_warp.put_model`` for ``model``; gets the callback.
-        d: Data of ``m``, which set the number of worlds and the device.
+        d: Data of ``m``; determines the number of worlds and the device.
         model: Result of :func:`without_plugin` for the spec.
-        drives: Drives that ``attach`` returned; other levels need no callback.
+        drives: Drives that ``attach`` returned; those at other levels are ignored.
 
     Returns:
         The callback, :class:`WarpDrives`.
 
     Raises:
-        InputError: If the integrator is not ``discrete``, the model has a passive
-            callback, or a drive is missing from the model or variable.
+        InputError: If the integrator is not ``discrete``, the model already has a
+            passive callback, a drive is not in the model, or a drive is ``variable``.
     """
     integrator = mujoco.mjtIntegrator(int(m.opt.integrator))
     if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
@@ -187,9 +187,9 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
         ) from error
     if drive.variable or model.tendon_user[tendon].any():
         raise InputError(
-            f"joint {drive.joint!r}: its drive may deviate from its map by numbers in"
-            " the model, which MuJoCo Warp does not read; accepted: variable=False,"
-            " with the map of Variation.apply_to for another specimen"
+            f"joint {drive.joint!r}: its drive may deviate from its map through user"
+            " data of the model, which MuJoCo Warp does not read; accepted:"
+            " variable=False, with the map of Variation.apply_to for another specimen"
         )
     one = WarpDrive()
     one.tendon = tendon

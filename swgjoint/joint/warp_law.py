@@ -29,7 +29,7 @@ PASSES = wp.constant(plugin.PASSES)
 
 @wp.struct
 class Rub:
-    """Friction in one step, as in ``friction.cc``; linear in the rotation."""
+    """Friction of one step, as :class:`~swgjoint.joint.friction_step.FrictionStep`."""
 
     stretch: real
     reach: real
@@ -42,7 +42,11 @@ class Rub:
 
 @wp.struct
 class WarpStep:
-    """State that one evaluation passes to the next, for one drive in one world."""
+    """State of one drive in one world, passed from one evaluation to the next.
+
+    Speeds v [rad/s] and inverse inertias w [1/(kg·m²)] belong to rotor and link, angles
+    are in rad; g, e, force and metric are those of the last step.
+    """
 
     time: float
     v_rotor: real
@@ -57,7 +61,7 @@ class WarpStep:
     metric: real
     torsion: real
     a_rotor: real
-    """Rotor acceleration by all other forces [rad/s²]."""
+    """Rotor acceleration by all other forces, ``a_link`` likewise [rad/s²]."""
     a_link: real
     rub: Rub
     rotation: real
@@ -78,7 +82,7 @@ def rub_over(
     response: real,
     h: real,
 ):
-    """Solve friction on the predicted step of a rotor-link pair.
+    """Friction torque for the predicted step of a rotor-link pair, as a :class:`Rub`.
 
     Args:
         drive: Drive with the parameters of friction.
@@ -87,7 +91,7 @@ def rub_over(
         speed: Relative speed at the beginning of the step [rad/s].
         free: Change of that speed without friction [rad/s].
         response: Reduction of that speed per friction torque [rad/s per N·m].
-        h: Step [s].
+        h: Step h [s].
     """
     out = Rub()
     sigma = drive.bristle
@@ -130,8 +134,8 @@ def stretch_after(drive: WarpDrive, rub: Rub, dx: real):
 
     Args:
         drive: Drive with the parameters of friction.
-        rub: Friction of the step.
-        dx: Rotation in the step [rad].
+        rub: Linearised friction of the step.
+        dx: Actual relative rotation in the step [rad].
     """
     end = wp.clamp(rub.stretch + dx, -rub.reach, rub.reach)
     work = (rub.offset + rub.rate * dx) * dx
@@ -151,7 +155,7 @@ def factor_mass_matrix(
 ):
     """Factor M by eliminating dofs from the leaves: D, and the rows of L times D.
 
-    MuJoCo Warp has no factor of M before the passive stage, and a different one later.
+    MuJoCo Warp has not factored M at the passive stage; its later factors differ.
 
     Args:
         M_rownnz: Number of entries in each row of M. Shape (nv,).
@@ -159,7 +163,7 @@ def factor_mass_matrix(
         M_colind: Columns of the entries of M. Shape (nC,).
         M: Mass matrices [kg·m²]. Shape (worlds, nC).
         nv: Number of dofs.
-        out: Factors. Shape (worlds, nC).
+        out: Result, D on the diagonal entries. Shape (worlds, nC).
     """
     world = wp.tid()
     for j in range(out.shape[1]):
@@ -191,7 +195,7 @@ def respond(
         M_colind: Columns of the entries of M. Shape (nC,).
         factor: Result of :func:`factor_mass_matrix`. Shape (worlds, nC).
         column: Work space for one column of L^-T. Shape (worlds, nv).
-        weight: Diagonal elements [1/(kg·m²)]. Shape (worlds, nv).
+        weight: Result, the diagonal elements [1/(kg·m²)]. Shape (worlds, nv).
     """
     world = wp.tid()
     for dof in range(weight.shape[1]):
@@ -256,7 +260,7 @@ def law(
     h = real(timestep[world % timestep.shape[0]])
     vm, vl = real(qvel[world, drive.v_rotor]), real(qvel[world, drive.v_link])
 
-    # since the last evaluation there was a step, a reset or no change
+    # time tells whether there was a step, a reset or neither since the last evaluation
     last = steps[world, index]
     if time[world] > last.time:
         rm, rl = vm - last.v_rotor, vl - last.v_link
@@ -285,7 +289,7 @@ def law(
         for j in range(drive.element, drive.element + drive.elements):
             rest[world, j] = ZERO
 
-    # take the native spring of the tendon out again, as the engine applied it
+    # remove the torque of the tendon's native spring, which the engine has applied
     length = real(ten_length[world, drive.tendon])
     native = length * (SPRING + CUBIC * length * length)
     on_rotor = native * real(ten_J[world, drive.entry_rotor])
@@ -325,7 +329,7 @@ def law(
         force = s.torque - HALF * h * s.slope * (s.g_theta * dm + s.g_psi * dl)
         force += (nu * k * h + c) * (s.g_theta * vm + s.g_psi * vl)
         p = HALF * s.slope + real(0.75) * nu * k + HALF * c / h
-        # the step of the pair that this causes, for the next pass
+        # predicted step of the pair under this torque, for the next pass
         am, al = last.a_rotor - wm * s.e_theta, last.a_link - wl * s.e_psi
         turn = h * (s.g_theta * am + s.g_psi * al - w * force)
         f = force + h * p * turn / (ONE + h * h * w * p)
@@ -336,7 +340,7 @@ def law(
             x = middle / drive.stribeck
             slips = drive.coulomb + drive.load * wp.abs(s.torque)
             slips += (drive.stiction - drive.coulomb) * wp.exp(-x * x)
-            # (M + h² p g g')⁻¹ b: how the pair answers to friction
+            # (M + h² p g g')⁻¹ b: response of the pair to friction
             along = wm * drive.b_theta * s.g_theta + wl * drive.b_psi * s.g_psi
             along *= h * h * p / (ONE + h * h * w * p)
             rm = wm * (drive.b_theta - along * s.g_theta)
@@ -363,7 +367,7 @@ def law(
     on_link -= along * s.g_psi + s.e_psi
     ten_length[world, drive.tendon] = float(length)
     if drive.friction >= 0:
-        # the same along b, a second term of the metric
+        # likewise along b, for the second term of the metric
         tangent = wp.max(ZERO, rub.metric - SPRING) / (real(3.0) * FRICTION_CUBIC)
         length = wp.max(real(1e-12), wp.sqrt(tangent))
         rub.metric = SPRING + real(3.0) * FRICTION_CUBIC * length * length

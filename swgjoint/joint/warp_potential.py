@@ -7,6 +7,7 @@ real = wp.float64
 
 
 vec5 = wp.types.vector(length=5, dtype=real)
+"""Coefficients of a quartic of the torsion, for powers k = 0 to 4 [N·m/rad^k]."""
 
 
 ZERO = wp.constant(real(0.0))
@@ -23,13 +24,16 @@ class WarpDrive:
     """One drive: its addresses in the model, and its rows in the arrays of the maps."""
 
     tendon: int
+    """Index of the tendon."""
     q_rotor: int
     q_link: int
+    """Addresses of rotor and link in ``qpos``."""
     v_rotor: int
     v_link: int
+    """Addresses of rotor and link in ``qvel``."""
     entry_rotor: int
-    """Entry of the rotor in the tendon's row of ``ten_J``."""
     entry_link: int
+    """Addresses of rotor and link in ``ten_J``, in the row of the tendon."""
     harmonic: int
     """Index of the first harmonic; ``harmonics`` is the number of harmonics."""
     harmonics: int
@@ -39,23 +43,33 @@ class WarpDrive:
     row: int
     """First row of the polynomials, ordered by segment, harmonic, then A and B."""
     element: int
+    """Index of the first hysteresis element; ``elements`` is their number."""
     elements: int
     ratio: real
+    """Signed ratio i [-]."""
     damping: real
+    """Damping torque per torsion rate [N·m·s/rad]."""
     contact_damping: real
+    """Smallest damping while a contact or a limit acts [N·m·s/rad]."""
     friction: int
     """Index of the friction tendon; -1 without friction."""
     b_theta: real
     b_psi: real
+    """Derivatives of the friction angle beta by theta and psi [-]."""
     bristle: real
     """Stiffness of the bristle [N·m/rad]."""
     creep: real
     """Damping of the bristle [N·m·s/rad]."""
     coulomb: real
+    """Coulomb torque including the bending torque [N·m]."""
     stiction: real
+    """Static torque including the bending torque [N·m]."""
     stribeck: real
+    """Stribeck speed [rad/s]."""
     viscous: real
+    """Viscous friction coefficient [N·m·s/rad]."""
     load: real
+    """Friction torque per output torque [-]."""
 
 
 @wp.struct
@@ -63,10 +77,13 @@ class Sums:
     """Harmonics of one segment over a step: coefficients in powers of the torsion."""
 
     mean: vec5
+    """Potential with every harmonic at the mean of its values at both ends."""
     by_theta: vec5
     by_psi: vec5
+    """Secants of the potential by theta and psi at fixed torsion."""
     g_theta: real
     g_psi: real
+    """Secants of the torsion by theta and psi [-]."""
 
 
 @wp.struct
@@ -79,12 +96,17 @@ class Secant:
     """Change of the torsion in the step [rad]."""
     g_theta: real
     g_psi: real
+    """Secants of the torsion by theta and psi [-]."""
     torque: real
+    """Secant of V by the torsion, i.e. mean torque of the step [N·m]."""
     slope: real
+    """Derivative of this torque by the torsion at the end of the step [N·m/rad]."""
     k0: real
     k1: real
+    """Tangent stiffness at beginning and end of the step [N·m/rad]."""
     e_theta: real
     e_psi: real
+    """Secants of V by theta and psi at fixed torsion [N·m]."""
 
 
 @wp.struct
@@ -96,6 +118,7 @@ class Maps:
     segment: wp.array2d(dtype=real)
     """Begin, end and base of the polynomial of each segment, as torsions [rad]."""
     row: wp.array(dtype=vec5)
+    """Polynomials A and B (factors of cosine and sine), see :class:`WarpDrive`."""
     element: wp.array2d(dtype=real)
     """Stiffness [N·m/rad] and yield torsion [rad] of each hysteresis element."""
 
@@ -206,7 +229,7 @@ def weigh(
     dtheta: real,
     dpsi: real,
 ):
-    """Mean of the harmonics at both ends of a step, and their secants by the angles.
+    """Sums over the harmonics: means of both ends of a step, and secants by the angles.
 
     Args:
         drive: The drive.
@@ -274,7 +297,7 @@ def secant_over(
         out.torque = divided_difference(sums.mean, d0, d1)
         out.slope = divided_slope(sums.mean, d0, d1)
     else:
-        # piece by piece across the knots, to avoid differences of large energies
+        # sum the work segment by segment, to avoid differences of large energies
         work = real(0.0)
         begin = real(out.begin)
         j = int(j0)
@@ -304,7 +327,7 @@ def secant_over(
 
 @wp.func
 def slip(s: Secant, stiffness: real, reach: real, rest: real):
-    """Add the mean torque of one hysteresis element over the step.
+    """Secant with the mean torque of one hysteresis element over the step added.
 
     Args:
         s: Secant to which the element is added.
