@@ -113,8 +113,9 @@ def attach(
             [rad].
         integrator: ``discrete`` replaces integrator and solver options as described
             above, ``keep`` replaces none.
-        watch: Whether to warn of a step outside the integrator's region, here and
-            while the model runs; see :mod:`swgjoint.joint.watch`.
+        watch: Whether to warn about steps outside the stability region of the
+            integrator, here and while the model runs; see
+            :mod:`swgjoint.joint.watch`.
 
     Returns:
         The attached drive, with the names of the elements that it added.

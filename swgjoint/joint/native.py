@@ -1,8 +1,8 @@
 r"""Level ``native``: a drive represented by MuJoCo's own elements, without the plugin.
 
-The mean torsion curve becomes one tendon with polynomial stiffness or, if that is not
-accurate enough, up to :data:`MAX_CORNERS` parallel tendons with dead bands. With
-x = theta/i - psi,
+The mean torsion curve becomes one tendon with polynomial stiffness. If that is not
+accurate enough, it becomes a linear tendon and up to :data:`MAX_CORNERS` parallel
+tendons with dead bands. With x = theta/i - psi,
 
 .. math:: T(x) = a x + c x^3 \quad\text{or}\quad
     T(x) = a x + \sum_j k_j \operatorname{sign}(x) \max(|x| - d_j, 0),
@@ -34,8 +34,7 @@ MAX_CORNERS = 4
 """Largest number of tendons with a dead band; each adds a few percent to the time of a
 step."""
 CLOSE = 0.01
-"""Torque error, as a fraction of rated torque, below which no further tendon is added
-[-]."""
+"""Torque error relative to rated torque below which no further tendon is added [-]."""
 LEAST = 1e-3
 """Smallest slope relative to the mean stiffness, even where the curve is flat [-]."""
 
@@ -45,7 +44,7 @@ class Corner:
     """A dead-band tendon: stiffness that acts only beyond a torsion of either sign."""
 
     torsion: float
-    """Half width of the dead band, > 0 [rad]."""
+    """Half width d of the dead band, > 0 [rad]."""
     stiffness: float
     """Change of the slope at that torsion, negative if the curve softens [N·m/rad]."""
 
@@ -60,7 +59,7 @@ class NativeSpring:
     """Cubic coefficient c [N·m/rad³]; never negative, because a softening cubic would
     reach negative stiffness."""
     corners: tuple[Corner, ...] = ()
-    """Dead-band springs by increasing torsion; the slope stays > 0 beyond each one."""
+    """Dead-band springs by increasing torsion; the slope beyond each is positive."""
     residual: float
     """Root mean square deviation of the fit from the mean curve [N·m]."""
     fitted_to: float
@@ -77,7 +76,7 @@ class NativeSpring:
     """Parts of the friction law that constants cannot represent."""
 
     def torque(self, torsion: Array) -> Array:
-        """Elastic torque without hysteresis [N·m] at torsions of any shape [rad]."""
+        """Elastic torque [N·m] at torsions of any shape [rad], without hysteresis."""
         x = np.asarray(torsion, float)
         total = x * (self.linear + self.cubic * x**2)
         for corner in self.corners:
@@ -86,7 +85,7 @@ class NativeSpring:
         return np.asarray(total)
 
     def torsion(self, torque: float) -> float:
-        """Torsion at an elastic torque [N·m], by bisection [rad]."""
+        """Torsion [rad] at an elastic torque [N·m], by bisection."""
         high = abs(torque) / self.linear
         while float(self.torque(np.array(high))) < abs(torque):
             high *= 2.0

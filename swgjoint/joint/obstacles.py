@@ -87,7 +87,7 @@ class Surroundings:
     def nearest_names(self, name: str, joints: Iterable[str] | None = None) -> str:
         """Text for messages that lists the joints of the model.
 
-        Of more than 20 joints, only those with the most similar names are listed.
+        If there are more than 20, only those with similar names are listed, if any.
 
         Args:
             name: Name that was not found.

@@ -22,8 +22,8 @@ from swgjoint.joint.callers import depth_of_caller
 INTEGRATORS = ("discrete", "keep")
 """Accepted values of the option ``integrator`` of ``attach``."""
 ITERATIONS, LS_ITERATIONS = 100, 50
-"""MuJoCo's default iteration limits of its solvers; smaller limits are raised to them.
-"""
+"""MuJoCo's default limits of solver and line-search iterations; lower limits are
+raised to them."""
 TOLERANCE = 1e-8
 """MuJoCo's default tolerance [-]; replaces those above :data:`LARGEST_TOLERANCE`."""
 LARGEST_TOLERANCE = 1e-6
@@ -65,7 +65,7 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOpti
     Args:
         spec: Model; unchanged.
         wanted: ``discrete`` replaces unsuitable options, ``keep`` replaces none.
-        rotors: Whether a drive has a rotor; without one all options are kept.
+        rotors: Whether any drive has a rotor; otherwise all options are kept.
 
     Raises:
         InputError: If ``wanted`` is unknown or the solver omits the drive stiffness.

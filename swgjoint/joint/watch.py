@@ -1,8 +1,8 @@
 """Warn if a model in a user's own loop leaves the region of stable integration.
 
-Attaching a drive warns of a step that is outside the region at rest. Step, integrator
-and speed may change later. Therefore the model stores the bounds in a custom numeric
-named :data:`NUMERIC`, and the engine plugin checks them in every step. The plugin calls
+Attaching a drive gives a warning if the step is outside the region at rest. Step,
+integrator and speed may change later. Therefore the model stores the bounds in a custom
+numeric named :data:`NUMERIC`, and the engine plugin checks them in every step. It calls
 ``mju_warning`` once per model and step size; the warning appears on the console and in
 ``MUJOCO_LOG.TXT``, or goes to the handler set by ``mujoco.set_mju_user_warning``. A
 scene checks the region itself, so its model has no such numeric.
@@ -63,7 +63,7 @@ def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
 def warn_outside(
     drives: Iterable[JointDrive], *, timestep: float, integrator: mujoco.mjtIntegrator
 ) -> None:
-    """Warn once for all joints of a step that is outside the region at rest.
+    """Warn once for all joints if the step is outside the region at rest.
 
     Args:
         drives: Drives of the model.
