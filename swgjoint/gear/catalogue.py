@@ -16,35 +16,36 @@ from swgjoint.units import mm
 SIZE = 2.54 * mm
 """Pitch diameter per unit of catalogue size: a tenth of an inch [m]."""
 FITS_WITHIN = 2.0
-"""A row applies to designs whose pitch diameter and ratio are within this factor."""
+"""Largest factor between the pitch diameters, and between the ratios, of a design and a
+catalogue row that applies to it [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueRow:
-    """Torques of one component set [N·m], from ``models/catalogue``."""
+    """Torques of one component set at the output [N·m], from ``models/catalogue``."""
 
     size: int
     """Size: pitch diameter in tenths of an inch."""
     ratio: int
-    """Reduction ratio, without sign."""
+    """Reduction ratio, without sign [-]."""
     rated_torque: float
-    """Rated torque at the output."""
+    """Rated torque [N·m]."""
     repeated_peak: float
-    """Limit for repeated peak torque."""
+    """Limit for repeated peak torque [N·m]."""
     momentary_peak: float
-    """Limit for momentary peak torque."""
+    """Limit for momentary peak torque [N·m]."""
     ratcheting_torque: float
-    """Torque at which teeth ratchet."""
+    """Torque at which the teeth ratchet [N·m]."""
     T1: float
-    """End of the first line of the torsion curve."""
+    """Torque at the end of the first line of the torsion curve [N·m]."""
     T2: float
-    """End of the second line of the torsion curve."""
+    """Torque at the end of the second line of the torsion curve [N·m]."""
     series: str = "CSG"
     """Catalogue series."""
 
     @property
     def name(self) -> str:
-        """Name in the form of the catalogues, such as ``CSG-25-100``."""
+        """Name as written in catalogues, such as ``CSG-25-100``."""
         return f"{self.series}-{self.size}-{self.ratio}"
 
     @property
@@ -57,7 +58,10 @@ class CatalogueRow:
 def table(name: str) -> tuple[dict[str, float | str | None], ...]:
     """Rows of a bundled catalogue table; empty cells are None, numbers are floats.
 
-    The column names contain the units, the comment lines of the file the sources.
+    The column names contain the units. The comment lines of the file state the sources.
+
+    Args:
+        name: Name of the table's file in ``models/catalogue``, without ``.csv``.
 
     Raises:
         InputError: If there is no such table.
@@ -103,11 +107,11 @@ def catalogue_rows() -> tuple[CatalogueRow, ...]:
 
 
 def named_rows() -> tuple[CatalogueRow, ...]:
-    """Every drive that can be referred to by name: component sets, then other series.
+    """Every drive with a catalogue name: the component sets, then the other series.
 
-    Another series has a drive of a size if ``accuracy.csv`` states its accuracy for
-    that size. The tables contain no ratings of these series, so the drive takes those
-    of the component set of the same size and ratio.
+    A drive of another series is listed if ``accuracy.csv`` states the accuracy of this
+    series for its size. The tables contain no ratings of the other series, so each of
+    their drives has the ratings of the component set of the same size and ratio.
     """
     rows = catalogue_rows()
     others = dict.fromkeys((row["series"], row["size"]) for row in table("accuracy"))
@@ -120,9 +124,9 @@ def named_rows() -> tuple[CatalogueRow, ...]:
 
 
 def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:
-    """Row with the nearest pitch diameter and, among those, the nearest ratio.
+    """Row with the nearest pitch diameter and, among equals, the nearest ratio.
 
-    Nearness is measured by the factor between the values.
+    Nearness is measured by the factor between two values.
 
     Args:
         pitch_diameter: Pitch diameter of the flexspline [m].
@@ -141,10 +145,11 @@ def ratings_of(design: Design) -> Ratings:
     """Ratings of a design: its own values, completed from the nearest catalogue row.
 
     The row is scaled to the rated torque of the design or, without one, by the cube of
-    the ratio of pitch diameters. If no row applies, T1 and T2 are 0.2 and 0.6 of the
-    rated torque and the ratcheting torque is None. ``source`` names the rule. Default
+    the ratio of pitch diameters. If the nearest row differs by more than
+    :data:`FITS_WITHIN`, it supplies only the rated and the peak torques; T1 and T2 are
+    then 0.2 and 0.6 of the rated torque, and the ratcheting torque is None. Default
     values are adjusted to the design's own values where necessary, so that the torques
-    remain in increasing order.
+    remain in increasing order. The field ``source`` of the result describes the rule.
     """
     stated = design.ratings
     ratio = design.drive.teeth_flexspline / design.tooth_difference
@@ -155,7 +160,7 @@ def ratings_of(design: Design) -> Ratings:
         rule = f"scaled to the rated torque {stated.rated_torque_Nm:g} N·m"
     else:
         scale = size_factor**3
-        rule = f"scaled by {scale:.4g}, the cube of the pitch diameters"
+        rule = f"scaled by {scale:.4g}, the cube of the ratio of pitch diameters"
     fits = max(
         size_factor, 1.0 / size_factor, ratio / row.ratio, row.ratio / ratio
     ) <= FITS_WITHIN * (1.0 + 1e-12)
@@ -190,7 +195,7 @@ def ratings_of(design: Design) -> Ratings:
             source += (
                 "; no row fits (pitch diameter"
                 f" {design.pitch_diameter / mm:g} mm, ratio {ratio:g}):"
-                " T1, T2 are 0.2 and 0.6 of rated"
+                " T1 and T2 are 0.2 and 0.6 of rated torque"
             )
     return Ratings(
         rated_torque=rated,

@@ -1,4 +1,4 @@
-"""Figures that the bundled catalogue tables state for a drive, and their checks."""
+"""Figures that the bundled catalogue tables state for a drive, and checks of them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from swgjoint.gear.catalogue import CatalogueRow, table
 SIMILAR = 1.6
 """Largest factor between the torsion T1/K1 of a size and the median of its ratio class.
 
-T1 and K1 both grow with the cube of the size, so their quotient is nearly constant and
-a misplaced digit is conspicuous."""
+T1 and K1 both grow with the cube of the size, so their quotient is nearly the same for
+all sizes. A larger factor indicates a misplaced digit."""
 
 _PER_TABLE = 1e4  # K1 to K3 are in 1e4 N·m/rad
 _STATED = (
@@ -25,14 +25,14 @@ _STATED = (
 
 @dataclass(frozen=True, kw_only=True)
 class StatedLosses:
-    """Losses of one drive as stated in a catalogue."""
+    """Efficiency and no-load torques of one drive as stated in a catalogue."""
 
     rated_torque: float
     """Rated torque at the output [N·m]."""
     efficiency: float
     """Efficiency at rated torque and 2000 rpm input speed [-]."""
     no_load_running: float
-    """No-load running torque at the input, 2000 rpm [N·m]."""
+    """No-load running torque at the input, at an input speed of 2000 rpm [N·m]."""
     starting: float
     """Starting torque at the input [N·m]."""
     back_driving: float
@@ -45,19 +45,21 @@ LOSS_KEYS = (
     "back_driving_torque_Nm",
     "efficiency_percent",
 )
-"""Keys of the losses in ``swgjoint spec``."""
+"""Keys of the losses in the output of ``swgjoint spec``."""
 _LOSS_RATIO = 100
-"""Ratio of every row of ``losses.csv``."""
+"""Reduction ratio of every row of ``losses.csv`` [-]."""
 _MILLI = 1e-3
 LOSS_CONDITIONS = "+20 C, grease, RT1-H-CS of the same rated torque, second-hand"
-"""Test conditions of ``losses.csv``; running torque and efficiency are at 2000 rpm."""
+"""Test conditions of ``losses.csv``; no-load running torque and efficiency are stated
+at an input speed of 2000 rpm."""
 
 
 def stated_losses(row: CatalogueRow) -> StatedLosses | None:
-    """Losses from ``losses.csv`` for a drive of the same ratio and rated torque.
+    """Losses of the drive in ``losses.csv`` with the same size and rated torque.
 
     The table describes drives of another manufacturer (RT1-H-CS) that have the sizes
-    and rated torques of CSG drives at a ratio of 100. Its figures are second-hand.
+    and rated torques of CSG drives at a ratio of 100. Its values were digitised by a
+    third party, so they serve as a plausibility check only.
 
     Returns:
         The losses; None for another series or ratio, or without a matching row.
@@ -105,12 +107,14 @@ def stiffness_of(size: int, ratio: int) -> dict[str, float]:
 def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
     """Stated figures of one drive, other than stiffness and ratings.
 
-    A ratio class applies from its own ratio up to the next class of the series. The
-    tables state ratcheting torque, buckling torque and inertia only for CSG; the losses
-    come from :func:`stated_losses`.
+    The accuracy table is divided into ratio classes. A class applies from its own ratio
+    up to that of the next class of the series. The tables state ratcheting torque,
+    buckling torque and inertia only for the CSG series. The losses come from
+    :func:`stated_losses`.
 
     Returns:
-        Figures by key; None for those that the tables do not state.
+        Figures by key, in the unit of the key; None for those that the tables do not
+        state.
     """
     accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
     figures: dict[str, float | None] = dict.fromkeys(LOSS_KEYS)

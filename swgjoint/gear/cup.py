@@ -9,15 +9,16 @@ from swgjoint.units import mm
 
 
 def cup_torsional_stiffness(design: Design) -> float:
-    r"""Torsional stiffness of thin cylinder and diaphragm in series.
+    r"""Torsional stiffness of the thin cylinder and the diaphragm in series [N·m/rad].
 
     .. math::
         \frac1K = \frac{L}{2\pi G r^3 t} + \frac{1}{4\pi G t}
             \left|\frac{1}{r_b^2} - \frac{1}{r^2}\right|
 
-    with the wall thickness t of thesis eq. (3.50), equal in both parts, the mean radius
-    r of the cylinder, and the radius r_b of the bore (cup) or of the clamped outer edge
-    (hat). The formula neglects the fillet and the elliptical deformation.
+    Here t is the wall thickness of thesis eq. (3.50), which is the same in both parts,
+    r the mean radius of the cylinder, and r_b the radius of the bore (cup) or of the
+    clamped outer edge (hat). The formula neglects the fillet and the elliptical
+    deformation.
 
     Args:
         design: A design with a cup.

@@ -7,8 +7,9 @@ from typing import Literal, get_args
 Layout = Literal["circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed"]
 LAYOUTS: tuple[str, ...] = get_args(Layout)
 
-# alpha = wave generator relative to the circular spline, beta = wave generator
-# relative to the flexspline, as (d/dtheta, d/dpsi) of the input and output angle.
+# Coefficients (d/dtheta, d/dpsi) of alpha, the angle of the wave generator relative to
+# the circular spline, and of beta, its angle relative to the flexspline. theta is the
+# input angle and psi the output angle.
 _ANGLES: dict[str, tuple[tuple[int, int], tuple[int, int]]] = {
     "circular_spline_fixed": ((1, 0), (1, -1)),
     "flexspline_fixed": ((1, -1), (1, 0)),
@@ -50,10 +51,17 @@ def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> flo
 
 
 def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Derivatives of the gear angles alpha and beta with respect to theta and psi.
+    """Derivatives of the gear angles alpha and beta with respect to theta and psi [-].
 
-    Alpha is the angle of the wave generator relative to the circular spline, beta
-    relative to the flexspline; theta is the input angle and psi the output angle.
+    Alpha is the angle of the wave generator relative to the circular spline, and beta
+    its angle relative to the flexspline. Theta is the input angle and psi the output
+    angle.
+
+    Returns:
+        Derivatives of alpha with respect to theta and psi, then those of beta.
+
+    Raises:
+        KeyError: If the layout is not one of :data:`LAYOUTS`.
     """
     return _ANGLES[layout]
 
@@ -64,9 +72,12 @@ def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, 
     All angles are relative to the fixed member.
 
     Args:
-        layout: Which member is fixed.
+        layout: Which member is fixed, one of :data:`LAYOUTS`.
         theta: Input angle [rad].
         psi: Output angle [rad].
+
+    Raises:
+        KeyError: If the layout is not one of :data:`LAYOUTS`.
     """
     angles = {
         "circular_spline_fixed": (theta, psi, 0.0),
@@ -77,13 +88,13 @@ def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, 
 
 
 def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> int:
-    """Number of identical cycles of a perfect gear per input turn.
+    """Number of identical cycles of a gear without errors per input turn.
 
-    This is the tooth count of the fixed member or, with the wave generator fixed, of
-    the input member, the flexspline.
+    This is the tooth count of the fixed member or, with the wave generator fixed, that
+    of the flexspline, which is then the input.
 
     Args:
-        layout: Which member is fixed.
+        layout: Which member is fixed, one of :data:`LAYOUTS`.
         teeth_flexspline: Number of teeth of the flexspline.
         teeth_circular_spline: Number of teeth of the circular spline.
     """

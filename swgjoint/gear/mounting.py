@@ -2,21 +2,23 @@ r"""Compliance in series with the teeth: the cup and the springs of the mounting
 
 A boss spring connects the flexspline to its shaft or frame, a housing spring connects
 the circular spline to its frame or shaft, and a coupling connects the wave generator to
-its shaft. Each carries the torque of its member, a share s of the output torque T:
+its shaft. Each carries the torque of its member, which is a signed share s of the
+output torque T:
 
 * s = 1 for the output member;
 * :math:`s = 1 - 1/i` for the fixed member, because the wave generator takes the rest
   (:math:`z_{cs}/z_{fs}` with the circular spline fixed);
 * :math:`s = 1/i` for the input member.
 
-If the spring of a member twists by :math:`s T/k`, the output turns by s times that
-angle. For example, a fixed member that turns by :math:`\varphi` also turns the teeth
-relative to the wave generator, :math:`\psi = \varphi + (\theta - \varphi)/i`. The
-compliance at the output is therefore :math:`\sum s^2/k` and the stored energy
+If the spring of a member, with the stiffness k, twists by :math:`s T/k`, the output
+turns by s times that angle. For example, a fixed member that turns by :math:`\varphi`
+also changes the angle of the wave generator relative to it, so the output angle is
+:math:`\psi = \varphi + (\theta - \varphi)/i`. The compliance at the output is therefore :math:`\sum s^2/k` and the stored energy
 :math:`T^2 \sum s^2/2k`, so that :math:`T_{wg}\,d\theta - T\,d\psi = dU` remains exact.
 
 The shares are means over a pitch. The model neglects the ripple of the input torque on
-a spring and the small rotation by which this ripple shifts the pattern over theta.
+a spring, and the small rotation of the spring due to this ripple, which would shift the
+results along theta.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from swgjoint.gear.design.design import Design, MemberName
 
 
 def torque_shares(design: Design) -> dict[MemberName, float]:
-    """Torque on the mounting of each member, as a fraction of the output torque [-]."""
+    """Torque on the mounting of each toothed member over the output torque [-]."""
     rest = 1.0 - 1.0 / design.ratio
     flexspline, circular_spline = {
         "circular_spline_fixed": (1.0, rest),
@@ -37,7 +39,7 @@ def torque_shares(design: Design) -> dict[MemberName, float]:
 
 
 def coupling_share(design: Design) -> float:
-    """Torque on the coupling, as a fraction of the output torque [-]."""
+    """Torque on the coupling, divided by the output torque [-]; it has a sign."""
     if design.drive.layout == "wave_generator_fixed":
         return 1.0 - 1.0 / design.ratio
     return 1.0 / design.ratio
@@ -49,7 +51,8 @@ def series_compliance(design: Design, *, cup: bool) -> float:
     Args:
         design: The drive; absent ``[boss]``, ``[housing]`` and ``[coupling]`` tables
             mean rigid connections.
-        cup: Whether to add the closed-form cup, for models that do not contain the cup.
+        cup: Whether to add the closed-form compliance of the cup, for models that do
+            not contain the cup.
 
     Returns:
         Compliance [rad/(N·m)].
@@ -74,7 +77,10 @@ def series_compliance(design: Design, *, cup: bool) -> float:
 
 
 def springs_of(design: Design) -> dict[str, float] | None:
-    """Torsional stiffness of the springs by name [N·m/rad]; None without springs."""
+    """Torsional stiffness of each spring by name [N·m/rad]; None without springs.
+
+    The names are ``boss``, ``housing`` and ``coupling``.
+    """
     parts = {
         "boss": design.boss,
         "housing": design.housing,

@@ -14,9 +14,9 @@ from swgjoint.typing import Array
 
 
 def small_deflection(angle: ArrayLike) -> Array:
-    r"""Outward deflection, relative to the deflection under the force [-].
+    r"""Outward deflection, divided by the deflection under the force [-].
 
-    Small deflections of an inextensional ring:
+    For small deflections of an inextensional ring:
 
     .. math:: w = \frac{F R^3}{4 E I}
         \left(\cos\psi + \psi\sin\psi - \frac4\pi\right), \quad
@@ -42,27 +42,32 @@ class Elastica:
     """One quarter of an inextensional ring with large rotations."""
 
     deflection: Array
-    """Outward deflection in the requested directions, which are fixed in space [m]."""
+    """Outward deflection in the requested directions [m]. The directions are fixed in
+    space and do not follow the points of the ring."""
     force: float
     """Dimensionless force F R^2/(E I) [-]."""
     curvature: float
-    """Curvature under the force times R [-]; 1 in the undeformed ring."""
+    """Magnitude of the curvature under the force, multiplied by R [-]; 1 in the
+    undeformed ring."""
 
 
 def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
-    r"""Large deflection of a thin ring whose crowns move outwards.
+    r"""Large deflection of a thin ring that two opposite forces pull outwards.
+
+    The crowns are the two points under the forces. The equations
 
     .. math:: \theta' = \kappa, \quad \kappa' = \frac{F}{2EI}\cos\theta, \quad
         x' = \cos\theta, \quad y' = \sin\theta
 
-    along the quarter from the crown (s = 0) to the side. By symmetry no force acts
-    along x.
+    are solved along one quarter of the ring, from a crown (s = 0) to the side. The
+    force acts along y and, by symmetry, no force acts along x. The angle theta falls
+    along the quarter, so the curvature kappa is negative there.
 
     Args:
         radius: Radius R of the undeformed ring [m].
         crown: Outward displacement of each crown [m].
-        angle: Directions from the axis of the forces at which the deflection is
-            returned [rad].
+        angle: Directions in which the deflection is returned, from the axis of the
+            forces, 0 to pi/2 [rad].
 
     Raises:
         ComputationError: If the boundary value problem does not converge.

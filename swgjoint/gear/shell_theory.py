@@ -1,8 +1,10 @@
 r"""Closed-form force, stress and fatigue strength of the flexspline as a thin shell.
 
-The formulas come from two articles without equation numbers, so the equations are
-cited by their result: "deformation force" (the force that deforms the flexspline
-XB1-100-80) and "stress and fatigue" (stress and fatigue strength of the flexible gear).
+The formulas come from two articles, which are called "deformation force" (the force
+that deforms the flexspline XB1-100-80) and "stress and fatigue" (stress and fatigue
+strength of the flexible gear) here. The articles do not number their equations, so each
+equation is cited by the symbol of its result. ``models/studies/articles.toml`` contains
+the values that the articles print.
 
 The wall is inextensional. Its radial deflection at the open end is
 :math:`w = w_0\cos 2\varphi` on a wave generator and a Fourier series under point loads.
@@ -19,9 +21,9 @@ from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 SERIES_SUM = (pi**2 - 8.0) / 16.0
-"""Sum of 1/(n^2 - 1)^2 over even n."""
+"""Sum of 1/(n^2 - 1)^2 over n = 2, 4, 6, ... [-]."""
 PRINTED_SUM = 0.1141
-"""Value of this sum as printed in the article on the deformation force.
+"""Value of this sum as printed in the article on the deformation force [-].
 
 The printed value is too small: the first three terms, 1/9 + 1/225 + 1/1225, already sum
 to 0.1164."""
@@ -34,14 +36,14 @@ def ring_stiffness(
     *,
     series_sum: float = SERIES_SUM,
 ) -> float:
-    r"""Radial stiffness per length of a ring, or of a tube with free ends [N/m/m].
+    r"""Radial stiffness per unit length of a ring or of a tube with free ends [N/m/m].
 
     .. math:: \frac{P}{w_0} = \frac{\pi E \delta^3}{24 R^3 S}
 
-    The stiffness is the force of each of two opposite point loads divided by the
-    deflection under it. With the numbers of XB1 and the printed sum it is 1161 N/mm per
-    metre, or 81 N/mm for the length of 70 mm. The article prints a slope of about
-    1625 N/mm, twenty times as much.
+    The ring carries two opposite point loads. The stiffness is the force P of one of
+    them, divided by the deflection under it. The dimensions of XB1-100-80 and the
+    printed sum give 1161 N/mm per metre, or 81 N/mm for the length of 70 mm. The
+    article prints a slope of about 1625 N/mm, which is twenty times as large.
 
     Args:
         youngs_modulus: Young's modulus E [Pa].
@@ -71,9 +73,10 @@ def cup_stiffness(
         \frac{1}{(n^2-1)^2\left(\frac L3 + \frac{2(1-\nu)R^2}{n^2L}\right)},
         \quad D = \frac{E\delta^3}{12(1-\nu^2)}
 
-    from the energy of :math:`w_n = b_n\frac xL\cos n\varphi` with the circumferential
-    curvature change :math:`(n^2-1)w/R^2` and the twist :math:`(n^2-1)b_n/(nRL)`. The
-    formula neglects the bending of the diaphragm, whose edge moves along the axis.
+    The result follows from the strain energy of :math:`w_n = b_n\frac xL\cos n\varphi`
+    with the change of circumferential curvature :math:`(n^2-1)w_n/R^2` and the twist
+    :math:`(n^2-1)b_n/(nRL)`. The formula neglects the bending of the diaphragm, whose
+    edge moves along the axis.
 
     Args:
         youngs_modulus: Young's modulus E [Pa].
@@ -132,30 +135,40 @@ class ShellDimensions:
         )
 
     def bending_stress(self, factor: float = 1.5) -> float:
-        r"""Largest circumferential bending stress without load [Pa].
+        r"""Largest circumferential bending stress at zero torque [Pa].
 
-        .. math:: \sigma_\varphi = \frac{E s_1}{2r_m^2}(w'' + w)
+        .. math:: \sigma_\varphi = \frac{E s_1}{2r_m^2}\max|w'' + w|
             = C_\sigma\frac{w_0 E s_1}{r_m^2}, \quad C_\sigma = \tfrac32
 
-        The numbers of the article give 163.3 MPa, or 164.4 MPa with its
-        C_sigma = 1.510 for four forces at 25 deg; the article prints 166.98 MPa.
+        The dimensions of the article give 163.3 MPa, or 164.4 MPa with its
+        C_sigma = 1.510 for four forces at 25 deg. The article prints 166.98 MPa.
+
+        Args:
+            factor: C_sigma [-]; the default is that of w = w_0 cos 2 phi.
         """
         return (
             factor * self.deflection * self.youngs_modulus * self.wall / self.radius**2
         )
 
     def axial_stress(self, factor: float = 1.5) -> float:
-        """Axial bending stress nu sigma_phi without load [Pa]."""
+        """Axial bending stress nu sigma_phi at zero torque [Pa].
+
+        Args:
+            factor: C_sigma [-], as in :meth:`bending_stress`.
+        """
         return self.poisson_ratio * self.bending_stress(factor)
 
     def deformation_shear(self, factor: float) -> float:
-        r"""Shear stress from a deflection that falls to zero over the length [Pa].
+        r"""Shear stress due to a deflection that falls to zero over the length [Pa].
 
         .. math:: \tau_\varphi = C_\tau\frac{w_0 E s_1}{r_m L}
 
-        The formula :math:`\frac{Es_1}{2r_mL}w'` of the article means C_tau = 1, but its
-        fatigue assessment uses 0.506. The twist of a straight, inextensional wall gives
-        3/(4 (1 + nu)) = 0.577.
+        The formula :math:`\frac{Es_1}{2r_mL}w'` of the article corresponds to
+        C_tau = 1, but the fatigue assessment of the article uses 0.506. The twist of a
+        straight, inextensional wall gives 3/(4 (1 + nu)), which is 0.577 for nu = 0.3.
+
+        Args:
+            factor: C_tau [-].
         """
         return (
             factor
@@ -166,9 +179,12 @@ class ShellDimensions:
         )
 
     def torque_shear(self, torque: float) -> float:
-        r"""Shear stress from a torque that is distributed uniformly over the wall [Pa].
+        r"""Shear stress due to a torque, uniform over the section of the wall [Pa].
 
         .. math:: \tau_T = \frac{T}{2\pi r_m^2 s_1}
+
+        Args:
+            torque: Torque T on the flexspline [N·m].
         """
         return torque / (2.0 * pi * self.radius**2 * self.wall)
 
@@ -178,19 +194,20 @@ class FatigueFactors:
     """Constants of the fatigue assessment in the article."""
 
     bending: float = 2.4
-    """K_sigma, stress concentration factor in bending."""
+    """Stress concentration factor K_sigma in bending [-]."""
     torsion: float = 1.92
-    """K_tau = 0.8 K_sigma, stress concentration factor in torsion."""
+    """Stress concentration factor K_tau = 0.8 K_sigma in torsion [-]."""
     mean_shear: float = 0.2
-    """Weight of the mean shear stress."""
+    """Weight of the mean shear stress [-]."""
     biaxial: float = 0.7
-    """K_z for an axial stress of about 0.3 times the circumferential stress; the
-    von Mises criterion gives 1 - 0.3 + 0.3^2 = 0.79."""
+    """Factor K_z of the biaxial stress state [-], for an axial stress of about 0.3
+    times the circumferential stress. The von Mises criterion gives
+    1 - 0.3 + 0.3^2 = 0.79."""
     bending_shape: float = 1.510
-    """C_sigma for four forces at 25 deg from the major axis; the series gives 1.519, at
-    the minor axis."""
+    """Coefficient C_sigma for four forces at 25 deg from the major axis [-]. The
+    Fourier series gives 1.519, which occurs at the minor axis."""
     shear_shape: float = 0.506
-    """C_tau for the same four forces."""
+    """Coefficient C_tau for the same four forces [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +231,7 @@ def safety_factor(
     shear_mean: float,
     factors: FatigueFactors | None = None,
 ) -> SafetyFactor:
-    r"""Combined fatigue safety factor.
+    r"""Fatigue safety factors for normal stress, shear stress and both together.
 
     .. math:: S_\sigma = \frac{\sigma_{-1}}{K_\sigma\sigma_a}, \quad
         S_\tau = \frac{\tau_{-1}}{K_\tau\tau_a + 0.2\tau_m}, \quad
@@ -254,12 +271,12 @@ def shell_safety_factor(
     torsion_limit: float,
     factors: FatigueFactors | None = None,
 ) -> SafetyFactor:
-    r"""Safety factor from the closed forms alone.
+    r"""Fatigue safety factors from the closed-form stresses alone.
 
     .. math:: \sigma_a = C_\sigma\frac{w_0Es_1}{r_m^2}, \quad
         \tau_a = \tau_m = \tfrac12(\tau_T + \tau_\varphi)
 
-    The numbers of the article give 2.17 at 100 N·m.
+    The dimensions of the article give a combined factor of 2.17 at 100 N·m.
 
     Args:
         shell: Dimensions and material of the flexspline.

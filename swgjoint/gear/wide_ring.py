@@ -30,14 +30,15 @@ within 0.5 % for widths of at least four rim thicknesses."""
 
 @dataclass(frozen=True, kw_only=True)
 class RimAcross:
-    """Stiffness of a toothed rim, per length of face width or of circumference."""
+    """Stiffness of a toothed rim, per unit length of face width or circumference."""
 
     radius: float
     """Radius of the neutral line [m]."""
     bending: float
-    """Circumferential bending stiffness in plane stress [N·m]: E I over the width."""
+    """Circumferential bending stiffness in plane stress [N·m]: E I divided by the face
+    width."""
     stretching: float
-    """Circumferential stretching stiffness [N/m]: E A over the width."""
+    """Circumferential stretching stiffness [N/m]: E A divided by the face width."""
     across: float
     """Bending stiffness across the width [N·m]: E I of rim and tooth of one pitch,
     divided by the pitch."""
@@ -48,7 +49,8 @@ def edge_confinement(width: float, module: float, rim: float) -> float:
 
     .. math:: g = 1 - \frac{\tanh x}{x}, \quad x = \frac{b}{1.5\sqrt{mt}}
 
-    This is the mean of a stress that grows from zero at the edges as in shear lag.
+    This is the mean of a stress that is zero at both edges and grows towards the middle
+    of the face as in shear lag.
 
     Args:
         width: Face width b [m].
@@ -63,15 +65,15 @@ def edge_confinement(width: float, module: float, rim: float) -> float:
 def anticlastic_share(width: float, rim: RimAcross) -> float:
     r"""Fraction of the anticlastic bending that develops in a curved ring [-].
 
-    It is the ratio of the end rotations of a beam on an elastic foundation to those of
-    a free beam, both under equal end moments:
+    It is the end rotation of a beam on an elastic foundation, divided by that of a free
+    beam under the same end moments:
 
     .. math:: f = \frac{2}{x}\,\frac{\cosh x - \cos x}{\sinh x + \sin x}, \quad
         x = \beta b, \quad \beta^4 = \frac{EA}{4 r^2 D_z}
 
     Args:
         width: Face width b [m].
-        rim: Stiffness of the rim.
+        rim: Radius and stiffness of the rim.
 
     Source:
         Hetenyi (1946), "Beams on Elastic Foundation", University of Michigan Press,
@@ -102,13 +104,14 @@ def rim_confinement(
         c = g\Bigl(1 - f\,\frac{D_\varphi}{D_z}\Bigr)
 
     with :math:`D_\varphi` for plane stress, f from :func:`anticlastic_share` and g from
-    :func:`edge_confinement`. For a smooth ring :math:`D_z = D_\varphi`.
+    :func:`edge_confinement`. For a smooth ring :math:`D_z = D_\varphi`. Negative values
+    of the bracket are replaced by zero.
 
     Args:
         width: Face width [m].
         module: Module [m].
         thickness: Thickness of the rim below the teeth [m].
-        rim: Stiffness of the rim.
+        rim: Radius and stiffness of the rim.
     """
     released = anticlastic_share(width, rim) * rim.bending / rim.across
     return edge_confinement(width, module, thickness) * max(0.0, 1.0 - released)
