@@ -13,8 +13,9 @@ output torque T:
 If the spring of a member, with the stiffness k, twists by :math:`s T/k`, the output
 turns by s times that angle. For example, a fixed member that turns by :math:`\varphi`
 also changes the angle of the wave generator relative to it, so the output angle is
-:math:`\psi = \varphi + (\theta - \varphi)/i`. The compliance at the output is therefore :math:`\sum s^2/k` and the stored energy
-:math:`T^2 \sum s^2/2k`, so that :math:`T_{wg}\,d\theta - T\,d\psi = dU` remains exact.
+:math:`\psi = \varphi + (\theta - \varphi)/i`. The compliance at the output is therefore
+:math:`\sum s^2/k` and the stored energy :math:`T^2 \sum s^2/2k`, so that
+:math:`T_{wg}\,d\theta - T\,d\psi = dU` remains exact.
 
 The shares are means over a pitch. The model neglects the ripple of the input torque on
 a spring, and the small rotation of the spring due to this ripple, which would shift the

@@ -1,9 +1,9 @@
 r"""The thin-race ball bearing between wave generator and flexspline.
 
-The parts follow each other inwards from the bore of the rim: half the fit clearance,
-the outer race, half the clearance, the balls, and the rigid cam that carries the inner
-raceway. The outline of the wave generator describes the bore, so half of each clearance
-reduces the deflection at the lobes.
+From the bore of the rim inwards there are half the fit clearance, the outer race, half
+the internal clearance, the balls, and the rigid cam that carries the inner raceway. The
+outline of the wave generator describes the bore, so half of each clearance reduces the
+deflection at the lobes.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from swgjoint.gear.design.material import Material
 from swgjoint.units import GPa, mm, um
 
 GROOVE_CONFORMITY = 0.52
-"""Default groove radius over ball diameter: the middle of the usual range of 0.515 to
-0.53 for deep groove bearings (textbook, not checked). The contact stiffness of a ball
-varies by about 10 % over that range."""
+"""Default groove radius over ball diameter [-]. It is about the middle of the range of
+0.515 to 0.53 that is usual for deep groove ball bearings (a textbook range that was not
+verified). The contact stiffness of a ball varies by about 10 % over that range."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing:
-    """Undeformed, round bearing of a design in SI units."""
+    """Bearing of a design in SI units, round and not deformed by the cam."""
 
     balls: int
     """Number of balls."""
     ball_diameter: float
     """Diameter of a ball [m]."""
     race_thickness: float
-    """Thickness of the outer race [m]."""
+    """Radial thickness of the outer race [m]."""
     race_width: float
     """Width of the outer race along the axis [m]."""
     groove_inertia_factor: float
@@ -38,9 +38,10 @@ class BallBearing:
     groove_conformity: float
     """Groove radius over ball diameter in both races [-]."""
     clearance: float
-    """Radial internal clearance as in catalogues, measured on the diameter [m]."""
+    """Radial internal clearance as in catalogues, a difference of diameters [m]."""
     fit_clearance: float
-    """Clearance of the outer race in the bore of the rim, on the diameter [m]."""
+    """Clearance of the outer race in the bore of the rim, a difference of diameters
+    [m]."""
     bore_radius: float
     """Radius of the rim bore that contains the race [m]."""
     material: Material
@@ -50,8 +51,9 @@ class BallBearing:
     def from_design(cls, design: Design) -> BallBearing:
         """Bearing of a design.
 
-        Defaults of absent keys: a race of rectangular section as wide as the teeth,
-        without clearance in the bore, made of the material of the flexspline.
+        By default, the race has a rectangular section, is as wide as the teeth and has
+        no clearance in the bore, the groove conformity is :data:`GROOVE_CONFORMITY`,
+        and balls and races are made of the material of the flexspline.
 
         Raises:
             ValueError: If the design has no bearing.
@@ -96,18 +98,21 @@ class BallBearing:
 
     @property
     def cage_share(self) -> float:
-        r"""Rotation of the cage relative to the cam, per rotation of the outer race.
+        r"""Rotation of the cage divided by that of the outer race [-].
+
+        Both rotations are relative to the cam, which carries the inner raceway:
 
         .. math:: \tfrac12 (1 + D/d_m)
 
-        for balls that roll without slip between round raceways (textbook).
+        with the ball diameter D and the pitch diameter d_m of the bearing, for balls
+        that roll without slip between round raceways.
         """
         inner, outer = self.raceways
         return 0.5 * (1.0 + self.ball_diameter / (inner + outer))
 
     @property
     def race_stretching(self) -> float:
-        """Stretching stiffness E A of the outer race without its groove [N]."""
+        """Stretching stiffness E A of the outer race, as if it had no groove [N]."""
         section = self.race_width * self.race_thickness
         return self.material.youngs_modulus * section
 
@@ -136,7 +141,7 @@ class BallBearing:
 
 
 def effective_modulus(bearing: BallBearing) -> float:
-    """Effective modulus E / (1 - nu^2) / 2 of two bodies of one material [Pa]."""
+    """Effective modulus E / (2 (1 - nu^2)) of two bodies of the same material [Pa]."""
     steel = bearing.material
     return 0.5 * steel.youngs_modulus / (1.0 - steel.poisson_ratio**2)
 
@@ -161,9 +166,9 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
         ValueError: If one of the curvatures is not positive.
 
     Source:
-        Johnson (1985), "Contact Mechanics", section 4.2, eqs (4.26). The text was not
-        compared literally; tests check the limit of a sphere and the fit of Hamrock and
-        Brewe.
+        Johnson (1985), "Contact Mechanics", section 4.2, eqs (4.26). The formulas were
+        not compared with the printed text; tests check the limit of a sphere and the
+        fit of Hamrock and Brewe.
     """
     from scipy.optimize import brentq
     from scipy.special import ellipe, ellipk
@@ -182,7 +187,7 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
             - larger / smaller
         )
 
-    # K - E vanishes with m, so contacts of almost equal curvatures count as circular
+    # K - E is zero at m = 0, so almost equal curvatures are treated as a circle
     kappa = 1.0
     if larger / smaller > 1.0 + 1e-6:
         kappa = brentq(missed, 1.0 + 1e-7, 10.0 * larger / smaller, xtol=1e-13)

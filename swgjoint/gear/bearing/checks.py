@@ -14,17 +14,18 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height, with_check
 from swgjoint.units import mm, um
 
 THINNEST_RACE = 0.08
-"""Smallest thickness of the outer race over the ball diameter.
+"""Smallest accepted thickness of the outer race, divided by the ball diameter [-].
 
-Grooves are usually 0.1 to 0.2 ball diameters deep (not checked) and flexible races
-about 0.25 thick. At 0.02 the solver finds no equilibrium."""
+Grooves are usually 0.1 to 0.2 ball diameters deep (not verified against a source), and
+flexible races are about 0.25 ball diameters thick. At a thickness of 0.02 the solver
+finds no equilibrium."""
 WIDEST_RACE = 2.0
-"""Largest width of the race over the face width. The models load the race over its
-whole width, but the rim ends near the teeth."""
+"""Largest accepted width of the race, divided by the face width [-]. The models load
+the race over its whole width, but the rim ends near the teeth."""
 
 
 def bearing_checks(design: Design) -> list[Check]:
-    """Check deflection left by the clearances, race, balls and cam of a bearing."""
+    """Checks of a bearing: cam, deflection left by the clearances, race, and balls."""
     bearing = design.wave_generator.bearing
     assert bearing is not None
     bore = design.flexspline_inner_radius / mm
@@ -81,7 +82,10 @@ def bearing_checks(design: Design) -> list[Check]:
 
 
 def _cam(design: Design) -> list[Check]:
-    """Check that the cam below race and balls is a smooth curve."""
+    """Check that the cam inside race and balls is a smooth curve.
+
+    The list is empty if the wave generator cannot be built.
+    """
     bearing = BallBearing.from_design(design)
     try:
         outline = with_checks(design)[0]

@@ -11,17 +11,18 @@ STEP = 1.05
 REACH = 20.0
 """Largest factor between a trial value and the rejected value."""
 DIGITS = 4
-"""Significant digits of a bound, which is rounded to the accepted side."""
+"""Significant digits of a bound, which is rounded towards the accepted values."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AcceptedBound:
-    """A rejected value and the nearest accepted one."""
+    """A rejected value and the nearest accepted value, in the same unit."""
 
     rejected: float
     """Value that was rejected."""
     accepted: float
-    """Nearest accepted value, rounded to :data:`DIGITS` digits."""
+    """Nearest accepted value, rounded to :data:`DIGITS` digits if the rounded value is
+    accepted, too."""
 
     @property
     def sign(self) -> str:
@@ -30,7 +31,7 @@ class AcceptedBound:
 
     @property
     def change(self) -> float:
-        """Absolute logarithm of the change, for ranking several keys [-]."""
+        """Absolute logarithm of accepted over rejected value, to compare keys [-]."""
         return abs(log(self.accepted / self.rejected))
 
 
@@ -54,7 +55,8 @@ def nearest_bound(
         high: Trial values are at most this.
 
     Returns:
-        The bound; None if the search accepts no value, or if ``value`` is not positive.
+        The bound; None if no trial value is accepted, or if ``value`` is not positive
+        and finite.
     """
     if not (value > 0.0 and isfinite(value)):
         return None
@@ -72,7 +74,10 @@ def nearest_bound(
 def _bisected(
     rejected: float, accepted: float, accepts: Callable[[float], bool]
 ) -> float:
-    """Accepted value within 1e-5 of the bound, rounded if the result is accepted."""
+    """Accepted value within 1e-5 of the bound, rounded if that is accepted, too.
+
+    ``rejected`` and ``accepted`` are values on both sides of the bound.
+    """
     while abs(accepted / rejected - 1.0) > 1e-5:
         middle = 0.5 * (rejected + accepted)
         if accepts(middle):

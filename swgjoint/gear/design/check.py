@@ -13,19 +13,19 @@ class Check:
     """A figure of a design compared with its limit."""
 
     name: str
-    """Name of the figure, with the direction of the limit."""
+    """Name of the figure, followed by the kind of limit, such as ", at most"."""
     ok: bool
     """Whether the design passes."""
     value: float | None
     """Value of the figure in ``unit``; None if it could not be computed."""
     unit: str = ""
-    """Unit of value and limit in reports."""
+    """Unit of value and limit in reports; empty if they have none."""
     limit: float | None = None
-    """Limit of the value, in ``unit``."""
+    """Limit of the value, in ``unit``; None if there is no value to compare."""
     fault: str = ""
-    """One line for a failed check: the key, its value, what is accepted."""
+    """Message for a failed check: the key, its value and what is accepted."""
     numerical: bool = False
-    """Whether the value is mere round-off if the check passes."""
+    """Whether the value of a passed check is nothing but round-off."""
 
     @classmethod
     def upper_limit(
@@ -95,10 +95,10 @@ class Check:
 
 
 def raise_faults(checks: Iterable[Check]) -> None:
-    """Reject a design with failed checks.
+    """Raise an error if any check has failed.
 
     Raises:
-        DesignError: With one line per failed check.
+        DesignError: If a check has failed; the message contains the fault of each.
     """
     lines = [check.fault for check in checks if not check.ok]
     if lines:

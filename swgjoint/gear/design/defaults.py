@@ -1,4 +1,4 @@
-"""Values of a design that are defaults because its file does not state them."""
+"""Default values that a design takes because its file does not state them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ ASSUMED = (
     "wave_generator",
     "cup",
 )
-"""Tables whose values affect every result. If another table is absent, the drive does
-not have the corresponding part, error or friction."""
+"""Tables whose default values affect every result. Without one of the other tables, the
+drive does not have the part, the error or the friction that this table describes."""
 
 
 def defaults_taken(design: Design) -> dict[str, Any]:
-    """Default values of numbers and choices that the file does not state.
+    """Default values of numbers and choices that the design file does not state.
 
-    Defaults that are zero or absent are omitted because they have no effect.
+    Defaults that are zero, empty or None are omitted because they have no effect.
 
     Returns:
-        Default values by dotted key.
+        Default values by dotted key, in the unit of the key.
     """
     defaults: dict[str, Any] = {}
     for name in ASSUMED:

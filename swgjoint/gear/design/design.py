@@ -1,4 +1,4 @@
-"""A strain wave gear as a design file describes it."""
+"""The design of a strain wave gear, as described by a design file."""
 
 from __future__ import annotations
 
@@ -42,28 +42,44 @@ MemberName = Literal["flexspline", "circular_spline"]
 
 
 class Design(Section):
-    """One drive: attributes mirror the tables and keys of the file, units included.
+    """One drive, with one attribute per table of its design file.
 
-    ``design.flexspline.profile.tip_radius_mm`` is the value of that key in the file,
-    whereas the properties of this class are in SI units. A design is immutable;
+    The attributes have the names and units of the keys in the file:
+    ``design.flexspline.profile.tip_radius_mm`` is in millimetres. The properties of
+    this class, in contrast, are in SI units. A design is immutable;
     :meth:`with_changes` returns a changed copy.
     """
 
     drive: DriveSection
+    """Name, layout, tooth counts, module and face width."""
     material: MaterialSection = MaterialSection()
+    """Material of both toothed members."""
     flexspline: Member
+    """Teeth and rim of the flexspline."""
     circular_spline: CircularSplineMember
+    """Teeth and rim of the circular spline."""
     wave_generator: WaveGenerator
+    """Outline of the wave generator, by kind, and its bearing."""
     cup: Cup | None = None
+    """Cup or hat behind the teeth; absent for a plain toothed ring."""
     boss: Boss | None = None
+    """Spring between flexspline and shaft or frame; absent if rigid."""
     housing: Housing | None = None
+    """Spring between circular spline and frame or shaft; absent if rigid."""
     coupling: Coupling | None = None
+    """Spring between wave generator and shaft; absent if rigid."""
     micro_geometry: MicroGeometry = MicroGeometry()
+    """Crowning and slope of wave generator and flanks."""
     tolerances: TolerancesSection = TolerancesSection()
+    """Manufacturing errors."""
     friction: FrictionSection = FrictionSection()
+    """Friction of the teeth."""
     ratings: RatingsSection = RatingsSection()
+    """Catalogue torques at the output."""
     joint: JointDampingSection = JointDampingSection()
+    """Damping of the drive in a robot joint."""
     mesh: MeshSection = MeshSection()
+    """Mesh and stress state of the finite element models."""
 
     @model_validator(mode="after")
     def _members_fit(self) -> Self:
@@ -109,7 +125,8 @@ class Design(Section):
             faults.append(
                 (
                     "circular_spline.profile.kind",
-                    "'conjugate' for both members; accepted: for one of them",
+                    "'conjugate' cannot be the kind of both members; accepted: another"
+                    " kind for one of them",
                 )
             )
         if faults:
@@ -120,14 +137,14 @@ class Design(Section):
 
     @classmethod
     def load(cls, reference: str | Path) -> Self:
-        """Read a design file, given by its path or by the name of a bundled design.
+        """Design from a file, given by its path or by the name of a bundled design.
 
-        ``size-NN-RRR`` names a drive of the family, with or without a bundled file; see
-        :mod:`swgjoint.gear.design.family`.
+        ``size-NN-RRR`` names a drive of the family, even if no file is bundled for it;
+        see :mod:`swgjoint.gear.design.family`.
 
         Raises:
-            DesignError: If there is no such design, or with one line per fault of the
-                file.
+            DesignError: If there is no such design, or if its file has faults (one line
+                per fault).
 
         >>> from swgjoint import Design
         >>> design = Design.load("reference-2d")
@@ -139,14 +156,18 @@ class Design(Section):
         except InputError as exc:
             member = family_member(str(reference).removesuffix(".toml"))
             if member is None:
-                raise DesignError(f"{exc}; any size-NN-RRR by rule") from None
+                raise DesignError(
+                    f"{exc}; size-NN-RRR names a drive of the family"
+                ) from None
             return cls.model_validate(family_design(*member))
         data = read_toml(path, what="design", error=DesignError)
         return validate(cls, data, where=str(path), error=DesignError)
 
     @classmethod
     def preset(cls, name: str) -> Self:
-        """A bundled design by its name, regardless of files in the current folder.
+        """Bundled design of a name, regardless of files in the current folder.
+
+        ``size-NN-RRR`` names a drive of the family, as in :meth:`load`.
 
         Raises:
             DesignError: If there is no bundled design of that name.
@@ -164,14 +185,14 @@ class Design(Section):
 
     @classmethod
     def from_toml(cls, text: str, where: str = "design") -> Self:
-        """A design from the text of a design file.
+        """Design from the text of a design file.
 
         Args:
             text: Content of the file.
             where: Name of the source in messages.
 
         Raises:
-            DesignError: With one line per fault of the text.
+            DesignError: If the text has faults (one line per fault).
         """
         data = parse_toml(text, where=where, error=DesignError)
         return validate(cls, data, where=where, error=DesignError)
@@ -179,16 +200,16 @@ class Design(Section):
     def with_changes(
         self, changes: Mapping[str, Any] | None = None, /, **dotted: Any
     ) -> Self:
-        """A checked copy with new values for some keys.
+        """Checked copy of the design with new values for some keys.
 
         Args:
-            changes: Values by dotted key, e.g. ``{"flexspline.rim_mm": 0.5}``. A table
-                is replaced as a whole, and ``None`` removes a key.
+            changes: Values by dotted key, e.g. ``{"flexspline.rim_mm": 0.5}``. If the
+                value is a table, it replaces the whole table; ``None`` removes the key.
             **dotted: Values by key with two underscores instead of each dot, e.g.
                 ``flexspline__rim_mm=0.5``.
 
         Raises:
-            DesignError: With one line per fault.
+            DesignError: If the changed design has faults (one line per fault).
 
         >>> from swgjoint import Design
         >>> stiff = Design.load("reference-2d").with_changes({"flexspline.rim_mm": 1.2})
@@ -217,14 +238,15 @@ class Design(Section):
     # -- text and identity ------------------------------------------------------
 
     def to_toml(self) -> str:
-        """The design as the text of a design file, including default values."""
+        """Text of a design file that describes the design, including default values."""
         return toml_text(self.model_dump(exclude_none=True))
 
     def content_hash(self) -> str:
         """SHA-256 of everything that affects results: all keys except name and source.
 
-        Two keys that were added later are omitted where cached results remain valid: an
-        absent coupling, and the stress state if it is plane stress.
+        Two keys are omitted if they have the values that applied before the keys were
+        introduced, so that older cached results remain valid: an absent coupling and
+        the stress state ``plane_stress``.
         """
         data = self.model_dump(exclude={"drive": {"name", "source"}})
         if self.coupling is None:
@@ -234,11 +256,11 @@ class Design(Section):
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    # -- figures in SI ----------------------------------------------------------
+    # -- quantities in SI units -------------------------------------------------
 
     @property
     def ratio(self) -> float:
-        """Signed ratio i; see :func:`swgjoint.gear.kinematics.ratio`."""
+        """Signed ratio i [-]; see :func:`swgjoint.gear.kinematics.ratio`."""
         return kinematics.ratio(
             self.drive.layout,
             self.drive.teeth_flexspline,
@@ -266,7 +288,7 @@ class Design(Section):
 
     @property
     def pitch_diameter(self) -> float:
-        """Pitch diameter m z_fs of the flexspline [m]."""
+        """Pitch diameter of the flexspline, module times number of teeth [m]."""
         return self.drive.module_mm * mm * self.drive.teeth_flexspline
 
     @property
@@ -280,7 +302,10 @@ class Design(Section):
         )
 
     def material_of(self, member: MemberName) -> Material:
-        """Material of one member in SI; its keys override those of ``[material]``."""
+        """Material of one member in SI units.
+
+        Keys of ``[material.<member>]`` override those of ``[material]``.
+        """
         base, override = self.material, getattr(self.material, member)
 
         def value(key: str, unit: float = 1.0) -> Any:

@@ -37,6 +37,9 @@ def tooth_curve(profile: ToothProfile, per_segment: int = 48) -> Curve:
     Args:
         profile: Profile of the tooth.
         per_segment: Number of points per segment of the profile.
+
+    Returns:
+        An open curve that is symmetric about the y axis.
     """
     stations = profile.stations
     parts = [
@@ -48,9 +51,10 @@ def tooth_curve(profile: ToothProfile, per_segment: int = 48) -> Curve:
 
 
 def wave_generator_curves(outline: WaveGenerator, count: int = 2880) -> list[Curve]:
-    """Closed outlines of a wave generator, counter-clockwise from +y; one per roller.
+    """Closed outlines of a wave generator, counter-clockwise.
 
-    With 2880 points, an outline of 60 mm radius has chord errors of 0.04 um.
+    There is one outline that starts on +y, or one per roller. With 2880 points, an
+    outline of 60 mm radius has chord errors of 0.04 um.
 
     Args:
         outline: The wave generator.
@@ -62,7 +66,10 @@ def wave_generator_curves(outline: WaveGenerator, count: int = 2880) -> list[Cur
 
 
 def dxf_text(curves: Curves) -> str:
-    """AutoCAD R12 text in mm with one layer per key and one POLYLINE per curve."""
+    """Text of a DXF file (AutoCAD R12) in mm, with one POLYLINE per curve.
+
+    Every key of ``curves`` becomes a layer with its name in upper case.
+    """
     lines = ["0", "SECTION", "2", "HEADER", "9", "$ACADVER", "1", "AC1009"]
     lines += ["9", "$INSUNITS", "70", "4", "0", "ENDSEC"]
     lines += ["0", "SECTION", "2", "TABLES", "0", "TABLE", "2", "LAYER"]
@@ -100,5 +107,5 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 
 
 def _figure(value: float) -> str:
-    """Format with 12 decimals; 1e-12 mm is below the rounding of the geometry."""
+    """Number with 12 decimals; 1e-12 mm is less than the round-off of the geometry."""
     return f"{value + 0.0:.12f}"

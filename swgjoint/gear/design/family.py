@@ -16,27 +16,27 @@ from swgjoint.toml_text import toml_text
 
 SIZES = (8, 100)
 RATIOS = (30, 200)
-"""Smallest and largest size and ratio; the flexspline has twice as many teeth as the
-ratio."""
+"""Smallest and largest size and ratio. The number of teeth of the flexspline is twice
+the ratio."""
 
-# Multiples of the pitch diameter d; lengths of the thesis are divided by its 120 mm.
-# FACE to GROOVE are proportions from a study of catalogue component sets with a "hard"
-# cup. That study assumed them, because drawings of cups and flexible bearings were not
-# available.
+# Lengths as multiples of the pitch diameter d; lengths of the thesis are divided by its
+# pitch diameter of 120 mm. FACE to GROOVE are proportions from a study of catalogue
+# component sets with a "hard" cup. The study assumed these proportions because it had
+# no drawings of cups and flexible bearings.
 FACE = 0.20
 RIM = 0.0125
 WALL_OVER_RIM = 0.0095 / 0.0125
-SMOOTH_CUP = 0.60 - FACE  # of the whole length 0.60 d, behind the teeth
+SMOOTH_CUP = 0.60 - FACE  # cylinder behind the teeth; the whole cup is 0.60 d long
 BORE_RADIUS = 0.58 * 0.5
 BALL = 0.083
 RACE = 0.021
 RACE_WIDTH = 0.145
-GROOVE = 0.8  # second moment of the race's section over that of its rectangle
-BALLS = 23  # odd, so that the lobes do not pass balls in phase
+GROOVE = 0.8  # second moment of area of the race section over that of its rectangle
+BALLS = 23  # an odd number, so that the two lobes do not pass balls at the same time
 BEARING_BORE = 0.71
 RING_RIM = 2.0 / 120.0  # thesis Table 4.1
 FILLET = 2.0 / 120.0  # thesis Table 7.3
-# multiples of the module: improved quadruple arc of thesis Table 6.7
+# lengths as multiples of the module: improved quadruple arc of thesis Table 6.7
 PROFILE = {
     "tip_radius_mm": 0.5,
     "addendum_radius_mm": 1.0,
@@ -45,14 +45,17 @@ PROFILE = {
     "root_radius_mm": 0.6,
 }
 # Thesis 7.13: 100, 90 and 45 um for w0 = 1 mm, a face width of 10 mm and a flexspline
-# 50 mm long. They are scaled by the coning over the face, w0 face/length.
+# 50 mm long. These values are scaled by the coning over the face width,
+# w0 times face width over length [um].
 CONING = 1.0e3 * 10.0 / 50.0
 MICRO_GEOMETRY = {
     "wave_generator_crowning_um": 100.0 / CONING,
     "wave_generator_slope_um": 90.0 / CONING,
     "flexspline_crowning_um": 45.0 / CONING,
 }
-# Radial ball bearings, normal class of ISO 5753-1: bore up to [mm], clearance [um]
+# Radial internal clearance of ball bearings, normal class of ISO 5753-1: largest bore
+# of the band [mm], smallest and largest clearance [um]. The last band of this table is
+# also used for all larger bores.
 CLEARANCE = (
     (18.0, (3, 18)),
     (30.0, (5, 20)),
@@ -71,7 +74,7 @@ _NAME = re.compile(r"size-(\d{1,4})-(\d{1,4})")
 
 
 def family_member(name: str) -> tuple[int, int] | None:
-    """Size and ratio of a ``size-NN-RRR`` name; None for any other name.
+    """Size and ratio from a name ``size-NN-RRR``; None for any other name.
 
     Raises:
         DesignError: If the size or the ratio is outside the range of the family.
@@ -94,7 +97,7 @@ def family_member(name: str) -> tuple[int, int] | None:
 
 
 def family_design(size: int, ratio: int) -> dict[str, Any]:
-    """Tables of the design file of one member.
+    """Tables of the design file for one drive of the family.
 
     Args:
         size: Pitch diameter in tenths of an inch.
@@ -161,7 +164,7 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
 
 
 def family_text(size: int, ratio: int) -> str:
-    """Text of the design file of one member, as bundled.
+    """Text of the design file for one drive of the family, as in the bundled files.
 
     Args:
         size: Pitch diameter in tenths of an inch.
@@ -176,5 +179,5 @@ def family_text(size: int, ratio: int) -> str:
 
 
 def _figure(value: float) -> float:
-    """Round to 1e-6 (1 nm for mm), so that files contain no binary remainder."""
+    """Value rounded to 1e-6 (1 nm for lengths in mm), for short numbers in files."""
     return round(value, 6)

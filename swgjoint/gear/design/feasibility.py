@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MEMBERS = ("flexspline", "circular_spline")
 CLOSED = 1e-12
-"""Largest gap between two segments of a closed flank [m]."""
+"""Largest accepted gap between two segments of a flank [m]."""
 OVERLAP = 0.01
 """Largest accepted overlap of rigid flanks, as a fraction of the module.
 
@@ -31,15 +31,15 @@ bundled designs, teeth without backlash overlap by 0.05 to 0.32 % of the module,
 finite elements confirm the stresses and torques of these designs.
 """
 
-
 PARTS = ("flexspline", "circular_spline", "teeth", "wave_generator", "cup", "bearing")
-"""Parts of a design that are checked."""
+"""Parts of a design that are checked; ``teeth`` is the fit of both members."""
 
 
 def design_checks(design: Design) -> list[Check]:
-    """Checks of both teeth, of their fit, and of the other parts of a design.
+    """Checks of the teeth of both members, of their fit, and of the other parts.
 
-    A part that cannot be built at all appears as a failed check without a value.
+    A tooth or an outline that cannot be built at all appears as a failed check without
+    a value. The engagement of the teeth is checked by :func:`engagement_checks`.
     """
     built = {member: _built(design, member) for member in MEMBERS}
     return [check for part in PARTS for check in _part(design, part, built)]
@@ -52,7 +52,8 @@ def part_checks(design: Design, part: str, *, bounds: bool = True) -> list[Check
         design: The drive.
         part: One of :data:`PARTS`. ``teeth`` is the fit of both members, which is
             checked only if both can be built.
-        bounds: Whether faults of a tooth state which values would be accepted.
+        bounds: Whether the message for a tooth that cannot be built states which values
+            would be accepted; the search for them takes time.
     """
     needed = MEMBERS if part == "teeth" else (part,) if part in MEMBERS else ()
     built = {member: _built(design, member, bounds=bounds) for member in needed}
@@ -98,7 +99,7 @@ def _not_built(name: str, error: DesignError) -> Check:
 
 
 def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
-    """Check junctions, segment lengths and end point of a flank."""
+    """Checks of the junctions, the segment lengths and the end point of a flank."""
     where = f"{design.drive.name}: {member}.profile"
     junctions = profile.junctions()
     gap = max(junction.gap for junction in junctions)
@@ -153,7 +154,7 @@ def _round_off(check: Check) -> Check:
 
 
 def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
-    """Check the clearance of the rigid flanks and the length of their engagement.
+    """Checks of the clearance of the rigid flanks and the angle of their engagement.
 
     Args:
         design: The drive.
@@ -163,7 +164,7 @@ def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
     least = path.smallest_clearance
     where = path.where[path.worst].replace("_", " ")
     theta = float(path.theta[path.worst]) / deg
-    # clearance of each flank per unit of the thickness coefficient
+    # clearance that each flank gains per unit of the thickness coefficient
     opened = 0.25 * np.pi * design.drive.module_mm * mm
     opened *= np.cos(design.circular_spline.pressure_angle_deg * deg)
     value = design.circular_spline.thickness_coefficient
@@ -193,10 +194,12 @@ def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
 
 
 def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
-    """Check tip clearance at the major axis and disengagement at the minor axis."""
+    """Checks of tip clearance at the major and of disengagement at the minor axis."""
     drive, w0 = design.drive, lobe_height(design)
     fs, cs = profiles["flexspline"], profiles["circular_spline"]
     checks = []
+    # tip of the flexspline in the root of the circular spline, then the reverse case,
+    # in which the root of the flexspline has the smaller radius
     for member, tip, key, root in (
         ("flexspline", fs.addendum_radius + w0, "circular_spline", cs.dedendum_radius),
         ("circular_spline", fs.dedendum_radius + w0, "flexspline", cs.addendum_radius),
@@ -236,7 +239,7 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
 
 
 def _cup(design: Design) -> list[Check]:
-    """Check that the fillet fits between cylinder and bore."""
+    """Check that the fillet fits between cylinder and bore, or flange edge of a hat."""
     cup = design.cup
     assert cup is not None
     wall = cup.thickness_coefficient * design.flexspline.rim_mm

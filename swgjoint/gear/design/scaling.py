@@ -1,10 +1,11 @@
 """Scale a design to another tooth count or module and make the result feasible.
 
-Tooth dimensions are scaled with the module, all other lengths with the pitch diameter,
-the shape of the wave generator with its axes, the micro-geometry with the deflection,
-and torques and stiffnesses with the cube of the pitch diameter. Manufacturing errors,
-bearing clearances, coefficients and angles do not change. If the scaled design is not
-feasible, single values are moved to the nearest feasible ones, with a margin.
+The lengths of the tooth profiles are scaled with the module and all other lengths with
+the pitch diameter. The shape of the wave generator is scaled with its axes, the
+micro-geometry with the deflection, and torques and stiffnesses with the cube of the
+pitch diameter. Manufacturing errors, bearing clearances, coefficients and angles do not
+change. If the scaled design is not feasible, single values are moved to the nearest
+feasible ones, with a margin.
 """
 
 from __future__ import annotations
@@ -32,17 +33,20 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import mm
 
 MARGIN = 0.02
-"""Relative margin of a moved value beyond its bound, used if the result is accepted."""
+"""Relative margin by which a value is moved beyond its bound [-], provided that the
+result is accepted."""
 DIGITS = 6
 """Significant digits of a scaled value."""
 ROUNDS = 8
-"""Largest number of moved values."""
+"""Largest number of values that are moved before the search gives up."""
 ENGAGEMENT = "engagement"
-"""Check of the rigid flanks in engagement, which is last because it is slowest."""
+"""Name of the check of rigid flanks in engagement, which is last because it is the
+slowest."""
 COARSE: dict[str, int] = {"positions": 241, "points": 101}
-"""Resolution of the passage of a tooth during the search for a bound."""
+"""Coarse resolution of the passage of a tooth, used in the search for a bound."""
 _KEPT = ("material", "tolerances", "friction", "joint", "mesh")
 """Tables that are not scaled."""
+# the module is set by itself, and clearances keep their value
 _KEPT_KEYS = ("module_mm", "clearance_um", "fit_clearance_um")
 _LARGEST = {
     **MEMBER_KEYS,
@@ -50,7 +54,7 @@ _LARGEST = {
     "parabola_length_coefficient": 1.0,
     "aperture_deg": 44.0,
 }
-"""Largest trial value by key."""
+"""Largest trial value by key, in the unit of the key."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +64,9 @@ class MovedValue:
     key: str
     """Dotted key of the value."""
     value: float
-    """New value."""
+    """New value, in the unit of the key."""
     bound: AcceptedBound
-    """Scaled value and the nearest accepted value."""
+    """Scaled value, which was rejected, and the nearest accepted value."""
     fault: str
     """Reason why the scaled value was rejected."""
 
@@ -85,7 +89,7 @@ class Scaled:
     factors: dict[str, float]
     """Scale factors of ``module``, ``pitch_diameter`` and ``deflection`` [-]."""
     moved: tuple[MovedValue, ...]
-    """Values that had to be moved."""
+    """Values that had to be moved, in the order of the changes."""
 
 
 def scaled_design(
@@ -110,8 +114,9 @@ def scaled_design(
         The scaled design with its scale factors and moved values.
 
     Raises:
-        DesignError: If a value is not accepted, or if no change of a single value makes
-            a part feasible; one line per fault.
+        DesignError: If a value is not accepted, if no change of a single value makes a
+            part feasible, or if more than :data:`ROUNDS` values would have to be moved;
+            one line per fault.
     """
     old = design.drive
     new_keys: dict[str, Any] = {
@@ -178,10 +183,10 @@ def _rounded(value: float) -> float:
 
 
 def _outline_to_scale(old: Design, new: Design) -> dict[str, Any]:
-    """Keys of the wave generator that give the old outline on the new axes.
+    """Values by key of the wave generator that give the old outline on the new axes.
 
-    A parabola y = a - c x² is scaled along both axes, a table by its distance from the
-    bore.
+    A parabola y = a - c x² is scaled along both axes. A table is scaled in terms of the
+    distance between its radius and that of the bore.
     """
     spec = old.wave_generator
     bores = (old.flexspline_inner_radius, new.flexspline_inner_radius)
@@ -204,7 +209,7 @@ def _outline_to_scale(old: Design, new: Design) -> dict[str, Any]:
 def _made_feasible(
     design: Design, fixed: frozenset[str]
 ) -> tuple[Design, tuple[MovedValue, ...]]:
-    """The design with single values moved, one by one, until every check passes."""
+    """The design after moving one value at a time until every check passes."""
     moved: list[MovedValue] = []
     while (failed := _first_failed(design)) is not None and len(moved) < ROUNDS:
         part, faults = failed
@@ -242,7 +247,7 @@ def _checks(
         return part_checks(design, part, bounds=bounds)
     try:
         return engagement_checks(design, tooth_path(design, **fineness))
-    except DesignError:  # with rollers, the rim does not follow an outline
+    except DesignError:  # e.g. rollers: the rim does not follow their outline
         return []
 
 

@@ -1,7 +1,7 @@
 """Manufacturing errors of one drive: actual positions of teeth and wave generator.
 
-All errors are drawn from the seed of the design. Each has its own random stream, so
-that adding one error does not change the others.
+The seed of the design determines all random errors and angles. Each has its own random
+stream, so that adding one error does not change the others.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class ToothErrors:
     """Displacement of the teeth of one member from their nominal positions."""
 
     tangential: Array
-    """Displacement along the pitch circle, counter-clockwise (n_teeth,) [m]."""
+    """Displacement along the pitch circle, counter-clockwise positive (n_teeth,)
+    [m]."""
     radial: Array
     """Radial displacement, positive outwards (n_teeth,) [m]."""
 
@@ -52,11 +53,12 @@ class ToothErrors:
 def tooth_errors(design: Design, member: MemberName) -> ToothErrors:
     r"""Errors of the teeth of a member.
 
-    * Cumulative pitch error: :math:`\sum_{k=1}^4 \cos(k\varphi - \varphi_k)/k`, scaled
-      to the peak-to-peak value of the key.
-    * Random pitch error: normally distributed; the key is its standard deviation.
-    * Ovality of the circular spline: radial; the key is the largest minus the smallest
-      radius.
+    * Cumulative pitch error: :math:`\sum_{k=1}^4 \cos(k\varphi - \varphi_k)/k` with
+      random phases, scaled to the peak-to-peak value that the design states.
+    * Random pitch error: a normally distributed displacement along the pitch circle
+      with the stated standard deviation. The mean over all teeth is subtracted.
+    * Ovality of the circular spline: a radial displacement. The design states the
+      largest minus the smallest radius.
     * Eccentricity of the circular spline: a translation of all teeth.
 
     Args:
@@ -103,11 +105,11 @@ def wave_generator_offset(design: Design) -> Array:
 def axis_tilt(design: Design) -> Array:
     """Slopes dx/dz and dy/dz of the axis of the circular spline (2,) [rad].
 
-    The axis intersects that of flexspline and wave generator in the middle of the face
-    width. The key is the angle between them, and the seed determines the direction of
-    the tilt. The axis is fixed to the bearings, even if the circular spline rotates
-    about it. At the distance z from the middle, the teeth are displaced by z times the
-    slopes.
+    The axis intersects the common axis of flexspline and wave generator in the middle
+    of the face width. The design states the angle between the two axes, and the seed
+    determines the direction of the tilt. The axis is fixed in the bearings, so it does
+    not rotate with the circular spline. At the distance z from the middle of the face
+    width, the teeth are displaced by z times the slopes.
     """
     turn = _stream(design.tolerances.seed, _TILT).uniform(0.0, 2.0 * np.pi)
     size = design.tolerances.misalignment_arcmin * arcmin
@@ -117,8 +119,11 @@ def axis_tilt(design: Design) -> Array:
 def flawed_wave_generator(design: Design) -> WaveGenerator:
     """Outline of the wave generator with its ovality, about its own centre.
 
-    The key is the largest minus the smallest deviation along the normal; the seed
-    determines the angle between the ovality and the major axis.
+    The design states the largest minus the smallest deviation along the normal. The
+    seed determines the angle between the ovality and the major axis.
+
+    Raises:
+        DesignError: If the wave generator cannot be built.
     """
     outline = wave_generator(design)
     ovality = design.tolerances.wave_generator_ovality_um * um
@@ -129,7 +134,7 @@ def flawed_wave_generator(design: Design) -> WaveGenerator:
 
 
 def with_perfect_teeth(design: Design) -> Design:
-    """The same drive, with errors of the wave generator only."""
+    """The same drive, with manufacturing errors of the wave generator only."""
     keys = (*TEETH, "misalignment_arcmin")
     return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
 
