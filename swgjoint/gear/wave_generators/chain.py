@@ -15,7 +15,7 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chain(ClosedCurve):
-    """Closed convex chain of pieces; the first piece starts on the +y axis."""
+    """Closed convex outline of consecutive pieces; the first starts on the +y axis."""
 
     pieces: tuple[OutlinePiece, ...]
     """Pieces in counter-clockwise order."""
@@ -38,7 +38,10 @@ class Chain(ClosedCurve):
         return float(self.stations[-1])
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Evaluate the piece at each arc length; junctions belong to the next piece."""
+        """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
+
+        At a junction, the piece that starts there is evaluated.
+        """
         along = self._within(s)
         last = len(self.pieces) - 1
         owner = np.clip(
@@ -62,13 +65,18 @@ class Chain(ClosedCurve):
         return np.concatenate([point for point, _, _ in at]), tangents
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Nearest foot on the pieces whose end normals enclose the point."""
+        """Signed distance, normal and curvature; see :class:`ClosedCurve`.
+
+        For each point, the foot is sought on the pieces whose end normals enclose the
+        point.
+        """
         starts, tangents = self._starts
-        # the normal at a junction separates points before and after it, (n_pieces, n)
+        # whether a point is after the normal at the start of a piece, (n_pieces, n)
         after = np.einsum("kj,nj->kn", tangents, points)
         after = after >= np.einsum("kj,kj->k", tangents, starts)[:, None]
         strip = after & ~np.roll(after, -1, axis=0)
-        # deep inside, the normals of a parabola intersect, so all pieces are searched
+        # far inside, where normals of a parabola intersect, a point may be in no strip;
+        # all pieces are then searched
         strip |= ~strip.any(axis=0)
         n = len(points)
         nearest = np.full(n, np.inf)
@@ -89,7 +97,7 @@ class Chain(ClosedCurve):
         return distance, normals, curvature
 
     def corners(self) -> Array:
-        """Corner angles at the junctions, zero where smooth (n_pieces,) [rad]."""
+        """Corner angle at each piece's end, zero where smooth (n_pieces,) [rad]."""
         _, after = self._starts
         ends = [
             piece.evaluate_at(np.array([piece.length]))[1][0] for piece in self.pieces
@@ -100,7 +108,7 @@ class Chain(ClosedCurve):
         return np.asarray(np.arctan2(cross, np.sum(before * after, axis=-1)))
 
     def gaps(self) -> Array:
-        """Distance between the end of a piece and the start of the next (n,) [m]."""
+        """Distance from each piece's end to the next piece (n_pieces,) [m]."""
         starts, _ = self._starts
         ends = [
             piece.evaluate_at(np.array([piece.length]))[0][0] for piece in self.pieces

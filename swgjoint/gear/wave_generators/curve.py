@@ -11,7 +11,7 @@ from swgjoint.typing import Array
 
 
 class ClosedCurve(ABC):
-    """Closed convex outline about the axis, with the major axis along +y, in SI units.
+    """Closed convex outline around the axis of rotation, with the major axis along +y.
 
     The arc length is counted counter-clockwise from the point on the +y axis.
     """
@@ -26,15 +26,16 @@ class ClosedCurve(ABC):
 
     @property
     def folds(self) -> int:
-        """Order of rotational symmetry: a turn by 2 pi/folds preserves the outline."""
+        """Order n of rotational symmetry: a turn by 2 pi/n leaves the outline as is."""
         return 2
 
     @abstractmethod
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Outline at arc length s, counter-clockwise from +y; periodic in s.
+        """Points, normals and curvatures of the outline at given arc lengths.
 
         Args:
-            s: Arc lengths (n,) [m].
+            s: Arc lengths (n,) [m], counter-clockwise from +y and over any number of
+                turns.
 
         Returns:
             Points (n, 2) [m]; outward unit normals (n, 2); curvatures (n,) [1/m],
@@ -49,8 +50,9 @@ class ClosedCurve(ABC):
             points: Points of shape (n, 2) [m].
 
         Returns:
-            Distances (n,) [m], positive outside; normals (n, 2); curvatures of the
-            outline at the foot (n,) [1/m], positive for a convex outline.
+            Distances (n,) [m], positive outside; outward unit normals (n, 2) and
+            curvatures (n,) [1/m] of the outline at the nearest point, positive where
+            the outline is convex.
         """
 
     def _within(self, s: ArrayLike) -> Array:
@@ -58,9 +60,12 @@ class ClosedCurve(ABC):
         return np.asarray(np.mod(np.asarray(s, dtype=float), self.perimeter))
 
     def outline(self, count: int) -> Array:
-        """Points of the closed outline at equal steps of arc length (count, 2) [m]."""
+        """Points of the outline at equal steps of arc length (count, 2) [m].
+
+        The last point repeats the first.
+        """
         return self.evaluate(np.linspace(0.0, self.perimeter, count))[0]
 
     def outlines(self, count: int) -> list[Array]:
-        """Closed curves for drawing or cutting, with ``count`` points each [m]."""
+        """Closed curves for drawing or cutting, each of shape (count, 2) [m]."""
         return [self.outline(count)]

@@ -16,7 +16,8 @@ from swgjoint.typing import Array
 class Elliptical(ClosedCurve):
     """Ellipse with the semi-major axis a along y (thesis eqs 3.3 and 3.4).
 
-    The eccentric angle t is counted from +y: its point is (-b sin t, a cos t).
+    The eccentric angle t is counted from +y, counter-clockwise: the point of the
+    ellipse at t is (-b sin t, a cos t).
     """
 
     major: float
@@ -26,18 +27,21 @@ class Elliptical(ClosedCurve):
 
     @cached_property
     def perimeter(self) -> float:
-        """Length of the outline, a complete elliptic integral [m]."""
+        """Length of the outline by a complete elliptic integral [m]."""
         from scipy.special import ellipe
 
         return float(4.0 * self.minor * ellipe(self._parameter))
 
     @property
     def _parameter(self) -> float:
-        """Parameter m of ds = b sqrt(1 - m sin^2 t) dt."""
+        """Parameter m of the elliptic integral, ds = b sqrt(1 - m sin^2 t) dt [-]."""
         return 1.0 - (self.major / self.minor) ** 2
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Evaluate the outline; Newton's method inverts the elliptic integral."""
+        """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
+
+        Newton's method inverts the elliptic integral of the arc length.
+        """
         from scipy.special import ellipeinc
 
         a, b = self.major, self.minor
@@ -56,10 +60,11 @@ class Elliptical(ClosedCurve):
         return points, normals, a * b / size**3
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Signed distance by Newton's method for the eccentric angle of the foot.
+        """Signed distance, normal and curvature; see :class:`ClosedCurve`.
 
-        The iteration works in one quadrant and mirrors the result back. A step that
-        leaves the bracket is replaced by bisection.
+        Newton's method solves for the eccentric angle of the foot. Points are mirrored
+        into one quadrant, and the result is mirrored back. A step that leaves the
+        bracket is replaced by bisection.
         """
         a, b = self.major, self.minor
         x, y = np.abs(points[:, 0]), np.abs(points[:, 1])  # x = b sin t, y = a cos t

@@ -16,11 +16,12 @@ from swgjoint.gear.wave_generators.rollers import FourRoller
 from swgjoint.units import mm
 
 MAX_STRETCH = 2e-3
-"""Largest relative excess of the perimeter over that of the undeformed bore.
+"""Largest accepted excess of the perimeter over that of the undeformed bore, divided by
+the latter [-].
 
-A rim that follows the whole outline is stretched by this amount; 0.2 % corresponds to a
-hoop stress of 420 MPa in steel. An ellipse with C = 1 needs (w_0/2r)^2, which is 7e-5
-in thesis Table 4.1.
+A rim that follows the whole outline is stretched by this amount. A stretch of 0.2 %
+corresponds to a hoop stress of 420 MPa in steel. An ellipse with C = 1 stretches the
+rim by (w_0/2r)^2, which is 7e-5 for the drive of thesis Table 4.1.
 """
 TANGENT = 1e-10
 """Largest corner angle at a junction that counts as tangent [rad]."""
@@ -46,7 +47,7 @@ def wave_generator_checks(
         Check.upper_limit(
             "wave generator: largest radius",
             shown,
-            # the half axis itself, with other round-off, must pass
+            # the semi-major axis itself must pass in spite of round-off
             limit * (1.0 + 1e-12),
             "mm",
             f"{where}.{_radius_key(design)}: the largest radius is {shown:.6g} mm;"
@@ -91,7 +92,7 @@ def wave_generator_checks(
 
 
 def _tip_clearance(design: Design) -> float:
-    """Radial tip clearance at the major axis from the coefficients [m]."""
+    """Radial tip clearance at the major axis, from the tooth coefficients [m]."""
     fs, cs = design.flexspline, design.circular_spline
     coefficient = min(
         cs.dedendum_coefficient - fs.addendum_coefficient,
@@ -132,6 +133,7 @@ def _length_key(design: Design) -> str:
 
 
 def _rollers_clear(design: Design, outline: FourRoller) -> Check:
+    """Check that neighbouring rollers do not touch each other."""
     spec = design.wave_generator
     assert spec.kind == "four_roller"
     x, y = outline.centre
@@ -152,6 +154,7 @@ def _rollers_clear(design: Design, outline: FourRoller) -> Check:
 
 
 def _convex(design: Design, outline: Radial) -> Check:
+    """Check that the outline is nowhere concave."""
     spec = design.wave_generator
     least = outline.least_curvature() * mm
     key = (

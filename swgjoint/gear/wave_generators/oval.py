@@ -16,9 +16,9 @@ from swgjoint.typing import Array
 class Oval(ClosedCurve):
     r"""An outline moved along its normal by :math:`\delta = \frac o2\cos 2(\varphi-a)`.
 
-    phi is the polar angle of the nominal outline, counter-clockwise from +y. The
-    deviation delta is of the order of micrometres, so terms in its square are
-    neglected.
+    The polar angle phi of a point on the nominal outline is counted counter-clockwise
+    from +y. The deviation delta is of the order of micrometres, so terms in its square
+    are neglected.
     """
 
     nominal: ClosedCurve
@@ -44,21 +44,25 @@ class Oval(ClosedCurve):
         return gcd(self.nominal.folds, 2)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Outline at arc lengths of the nominal outline."""
+        """Points, normals and curvatures at arc lengths of the nominal outline."""
         points, normals, curvature = self.nominal.evaluate(s)
         delta, slope, bend = self._deviation(points, normals)
         tilted, curvature = _moved(normals, curvature, delta, slope, bend)
         return points + delta[:, None] * normals, tilted, curvature
 
     def outlines(self, count: int) -> list[Array]:
-        """Outlines of the nominal wave generator; the deviation is invisible."""
+        """Outlines of the nominal wave generator, without the deviation [m].
+
+        The deviation would be too small to be visible.
+        """
         return self.nominal.outlines(count)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the nominal outline minus the deviation at the foot.
+        """Signed distance, normal and curvature; see :class:`ClosedCurve`.
 
-        The normal is the gradient of this distance, so that the work of contact forces
-        is consistent with the change of the distance.
+        The distance is that to the nominal outline minus the deviation at the foot. The
+        normal is the gradient of this distance, so that the work of contact forces is
+        consistent with the change of the distance.
         """
         distance, normals, curvature = self.nominal.signed_distance(points)
         foot = points - distance[:, None] * normals
@@ -68,7 +72,7 @@ class Oval(ClosedCurve):
         return distance - delta, tilted, curvature
 
     def _deviation(self, foot: Array, normals: Array) -> tuple[Array, Array, Array]:
-        """Deviation and its first two derivatives with respect to the arc length."""
+        """Deviation [m] and its first [-] and second derivative [1/m] along the arc."""
         square = np.einsum("ni,ni->n", foot, foot)
         phase = 2.0 * (np.arctan2(-foot[:, 0], foot[:, 1]) - self.angle)
         # d phi/ds: component of the tangent J n perpendicular to the radius
@@ -84,6 +88,7 @@ class Oval(ClosedCurve):
 def _moved(
     normals: Array, curvature: Array, delta: Array, slope: Array, bend: Array
 ) -> tuple[Array, Array]:
+    """Normals and curvatures [1/m] of the outline after moving it by the deviation."""
     tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
     tilted = normals - slope[:, None] * tangents
     tilted /= np.hypot(tilted[:, 0], tilted[:, 1])[:, None]

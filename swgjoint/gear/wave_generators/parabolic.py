@@ -12,18 +12,23 @@ from swgjoint.units import deg, mm
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """Half of a lobe: the parabola from the apex outwards and its connector arc."""
+    """One side of a lobe: the parabola from its apex outwards and the connector arc."""
 
     coefficient: float
     """Coefficient a_p of the parabola [1/m]."""
     length_coefficient: float
-    """Length coefficient C_p [-]; the parabola ends at x = C_p b."""
+    """Length coefficient C_p [-]; the parabola ends at x = C_p b, with the semi-minor
+    axis b."""
     connector_radius: float
     """Radius r_c of the connector arc [m]."""
 
 
 class OutlineFault(ValueError):
-    """Parameters that give no outline, with the key below ``wave_generator``."""
+    """Error for parameters that give no outline.
+
+    ``key`` is the key at fault in the table ``wave_generator``, and ``text`` the rest
+    of the message.
+    """
 
     def __init__(self, key: str, text: str) -> None:
         super().__init__(f"{key}{text}")
@@ -40,15 +45,17 @@ def parabolic(
     turn: float = 0.0,
     prefixes: tuple[str, str] = ("", ""),
 ) -> Chain:
-    """Parabolic lobes joined by connector, lateral and connector arc.
+    """Outline with two parabolic lobes and three arcs on each side between them.
 
-    ``left`` and ``right`` are the sides of the upper lobe. The lower lobe is the upper
-    lobe rotated by half a turn, so that both deflect the flexspline identically for
-    either direction of rotation. Equal sides and no turn give thesis 3.2.3.
+    From lobe to lobe there are a connector arc, a lateral arc and another connector
+    arc. ``left`` and ``right`` are the sides of the upper lobe. The lower lobe is the
+    upper lobe rotated by half a turn, so that both lobes deflect the flexspline
+    identically for either direction of rotation. Equal sides without rotation give the
+    symmetric outline of thesis 3.2.3.
 
     Args:
-        major: Height a of the apex on the +y axis [m].
-        minor: Half width b, where the lateral arcs touch x = +-b [m].
+        major: Height a of the apex on the +y axis, the semi-major axis [m].
+        minor: Semi-minor axis b; the lateral arcs touch the lines x = +-b [m].
         left: Side x < 0 of the upper lobe.
         right: Side x > 0 of the upper lobe.
         turn: Rotation of each lobe's parabola about its apex, counter-clockwise [rad]
@@ -66,7 +73,7 @@ def parabolic(
     wing_r = Parabola(
         apex=apex, coefficient=right.coefficient, start=x_r, end=0.0, turn=turn
     )
-    # directions of the normals at the ends of the parabolas, (3.7)
+    # directions of the normals at the ends of the parabolas, thesis eq. (3.7)
     end_l = 0.5 * pi + turn + atan(2.0 * left.coefficient * x_l)
     end_r = 0.5 * pi + turn - atan(2.0 * right.coefficient * x_r)
     centre_l = _connector(wing_l, -x_l, left, end_l)
@@ -76,7 +83,8 @@ def parabolic(
         (centre_r, right, prefixes[1], end_r),
     ):
         _check_connector(centre, side, prefix, end, minor)
-    # the lateral arc at x < 0 joins the left side above to the turned right side below
+    # the lateral arc at x < 0 joins the left side of the upper lobe to the right side
+    # of the lower lobe, which is rotated by half a turn
     below = (-centre_r[0], -centre_r[1])
     centre, radius = _lateral(
         centre_l, left.connector_radius, below, right.connector_radius, minor
@@ -105,7 +113,7 @@ def parabolic(
 
 
 def _connector(wing: Parabola, x: float, side: Side, angle: float) -> Point:
-    """Centre of the connector arc, r_p - r_c n_p, (3.8)."""
+    """Centre of the connector arc, r_p - r_c n_p [m], thesis eq. (3.8)."""
     c, d = cos(wing.turn), sin(wing.turn)
     y = -side.coefficient * x * x
     end = (wing.apex[0] + c * x - d * y, wing.apex[1] + d * x + c * y)  # (3.5)
@@ -116,7 +124,7 @@ def _connector(wing: Parabola, x: float, side: Side, angle: float) -> Point:
 def _check_connector(
     centre: Point, side: Side, prefix: str, angle: float, minor: float
 ) -> None:
-    """Check that the connector is inside x = b and its centre above the minor axis."""
+    """Check that the connector arc is inside |x| = b and its centre above y = 0."""
     reach = abs(centre[0]) + side.connector_radius
     if reach >= minor:
         # from its fixed end point, the arc extends by r_c (1 - cos of the end normal)
@@ -146,12 +154,14 @@ def _check_connector(
 def _lateral(
     upper: Point, r_upper: float, lower: Point, r_lower: float, minor: float
 ) -> tuple[Point, float]:
-    """Circle that touches x = -b and encloses both connector circles tangentially.
+    """Centre [m] and radius [m] of the circle that forms the lateral arc.
 
-    With the centre (R - b, y), internal tangency gives for each connector with centre
-    (-u, v) and radius r the condition
-    2 R (b - u - r) = (b - u)^2 - r^2 + (v - y)^2. R is eliminated, and the root between
-    the connectors is used. Equal connectors give y = 0 and thesis (3.11).
+    The circle touches the line x = -b and encloses both connector circles, which touch
+    it from the inside. Let its centre be (R - b, y). For a connector with centre
+    (-u, v) and radius r, tangency requires
+    2 R (b - u - r) = (b - u)^2 - r^2 + (v - y)^2. R is eliminated from the two
+    conditions, and the root y between the connectors is used. Equal connectors give
+    y = 0 and thesis eq. (3.11).
     """
     gap, rest, height = [], [], []
     for (x, v), r in ((upper, r_upper), (lower, r_lower)):

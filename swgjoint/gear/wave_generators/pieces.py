@@ -1,7 +1,7 @@
 """Arcs, straight lines and parabolas from which outlines are composed.
 
-Every piece is traversed counter-clockwise about the axis and is convex or straight. Its
-parameter is the arc length from its start.
+Every piece is traversed counter-clockwise around the axis of rotation and is convex or
+straight. Its parameter is the arc length from its start.
 """
 
 from __future__ import annotations
@@ -27,14 +27,19 @@ class OutlinePiece(Protocol):
         ...
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
-        """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m]."""
+        """Points (n, 2) [m], outward normals (n, 2) and curvatures (n,) [1/m].
+
+        Args:
+            s: Arc lengths from the start of the piece (n,) [m].
+        """
         ...
 
     def foot(self, points: Array) -> Array:
-        """Arc length of the nearest point of the piece (n,) [m].
+        """Arc length of the point of the piece nearest to each given point (n,) [m].
 
-        The points are outside the outline, or inside by less than its radius of
-        curvature.
+        Args:
+            points: Points (n, 2) [m], outside the outline, or inside by less than the
+                radius of curvature of the piece.
         """
         ...
 
@@ -79,7 +84,8 @@ class Arc:
     def largest_radius(self) -> float:
         """See :class:`OutlinePiece`."""
         ends, normals, _ = self.evaluate_at(np.array([0.0, self.length]))
-        # the farthest point of the circle is beyond its centre; is it on the arc?
+        # the point of the circle farthest from the axis is on the ray through its
+        # centre; it counts if it is on the arc
         ox, oy = self.centre
         side = normals[:, 0] * oy - normals[:, 1] * ox
         if side[0] >= 0.0 >= side[1]:
@@ -89,7 +95,7 @@ class Arc:
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """Straight line."""
+    """Straight line between two points."""
 
     start: Point
     """First point [m]."""
@@ -127,8 +133,8 @@ class Line:
 class Parabola:
     r"""Part of the parabola apex + R(turn) (x, -a_p x^2) from x = start down to end.
 
-    The arc length from the apex is :math:`(u\sqrt{1 + u^2} + \sinh^{-1} u)/(4 a_p)`
-    with u = 2 a_p x.
+    R is the matrix of a rotation. The arc length from the apex to x is
+    :math:`(u\sqrt{1 + u^2} + \sinh^{-1} u)/(4 a_p)` with u = 2 a_p x.
     """
 
     apex: Point
@@ -143,6 +149,7 @@ class Parabola:
     """Rotation about the apex, counter-clockwise [rad]."""
 
     def _from_apex(self, x: float) -> float:
+        """Arc length from the apex to the local coordinate x, with its sign [m]."""
         u = 2.0 * self.coefficient * x
         return (u * sqrt(1.0 + u * u) + asinh(u)) / (4.0 * self.coefficient)
 
@@ -171,17 +178,17 @@ class Parabola:
         x = u / (2.0 * a)
         size = np.sqrt(1.0 + u * u)
         local = np.stack([x, -0.5 * u * x], axis=-1)
-        normals = np.stack([u / size, 1.0 / size], axis=-1)  # (3.7)
+        normals = np.stack([u / size, 1.0 / size], axis=-1)  # thesis eq. (3.7)
         points = np.asarray(self.apex) + local @ self._rotation
         return points, normals @ self._rotation, 2.0 * a / size**3
 
     def foot(self, points: Array) -> Array:
         """See :class:`OutlinePiece`.
 
-        The perpendicular through (p, q) meets the parabola at the largest root of
-        x^3 + c x = h with c = (1 + 2 a q)/(2 a^2), h = |p|/(2 a^2). Newton's method
-        starts above this root, where the cubic is convex, and converges to it
-        monotonically.
+        The perpendicular to the parabola through the local point (p, q) meets it at the
+        largest root of x^3 + c x = h with c = (1 + 2 a q)/(2 a^2) and
+        h = |p|/(2 a^2). Newton's method starts above this root, where the cubic is
+        convex, and converges to it monotonically.
         """
         a = self.coefficient
         p, q = ((points - np.asarray(self.apex)) @ self._rotation.T).T

@@ -19,11 +19,14 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 class Radial(ClosedCurve):
-    """Outline r(phi), phi counter-clockwise from +y, at least twice differentiable."""
+    """Outline whose radius is a twice differentiable function of the polar angle phi.
+
+    The angle phi is counted counter-clockwise from +y.
+    """
 
     @abstractmethod
     def radius(self, phi: Array, derivative: int = 0) -> Array:
-        """Radius [m], or its derivative of order n by the angle [m/rad^n].
+        """Radius [m], or its derivative of order n with respect to phi [m/rad^n].
 
         Args:
             phi: Polar angles, counter-clockwise from +y [rad].
@@ -55,7 +58,11 @@ class Radial(ClosedCurve):
         return float(self._panels[1][-1])
 
     def evaluate_at(self, phi: Array) -> tuple[Array, Array, Array]:
-        """Points [m], unit normals and curvatures [1/m] at polar angles phi [rad]."""
+        """Points (n, 2) [m], outward unit normals (n, 2) and curvatures (n,) [1/m].
+
+        Args:
+            phi: Polar angles, counter-clockwise from +y (n,) [rad].
+        """
         r, dr, ddr = (self.radius(phi, k) for k in range(3))
         radial = np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
         across = np.stack([-np.cos(phi), -np.sin(phi)], axis=-1)
@@ -65,7 +72,10 @@ class Radial(ClosedCurve):
         return r[..., None] * radial, normals, curvature
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Evaluate the outline; Newton's method inverts the arc length per panel."""
+        """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
+
+        Newton's method inverts the arc length within a quadrature panel.
+        """
         ends, lengths = self._panels
         along = self._within(s)
         panel = np.clip(np.searchsorted(lengths, along, "right") - 1, 0, len(ends) - 2)
@@ -82,17 +92,19 @@ class Radial(ClosedCurve):
 
     @cached_property
     def _nearest(self) -> tuple[Array, Any]:
+        """Polar angles of sampled outline points [rad] and a search tree of these."""
         from scipy.spatial import cKDTree
 
         phi = np.linspace(0.0, 2.0 * np.pi, 4 * _PANELS, endpoint=False)
         return phi, cKDTree(self.evaluate_at(phi)[0])
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Signed distance by Newton's method for the polar angle of the foot.
+        """Signed distance, normal and curvature; see :class:`ClosedCurve`.
 
-        The iteration starts at the nearest of many sampled outline points. Steps are
-        limited to four sample spacings. Deep inside, where the distance is not a convex
-        function of the angle, the second derivative is kept positive.
+        Newton's method solves for the polar angle of the foot. It starts at the nearest
+        of many sampled outline points, and its steps are limited to four sample
+        spacings. Far inside the outline, where the distance is not a convex function of
+        the angle, the second derivative is kept positive.
         """
         start, tree = self._nearest
         phi = start[tree.query(points)[1]]
@@ -112,7 +124,7 @@ class Radial(ClosedCurve):
         return np.sum((points - foot) * normal, axis=-1), normal, curvature
 
     def least_curvature(self) -> float:
-        """Smallest curvature over the outline, sampled [1/m]."""
+        """Smallest curvature of sampled outline points, negative if concave [1/m]."""
         phi = np.concatenate([self._nearest[0], self._breaks()])
         return float(self.evaluate_at(phi)[2].min())
 
@@ -177,7 +189,11 @@ class TableOutline(Radial):
 
     @cached_property
     def folds(self) -> int:
-        """Order of rotational symmetry, at most 6, within 1e-12 of the radius."""
+        """Order of rotational symmetry, at most 6.
+
+        Two radii are considered equal if they differ by at most 1e-12 of the largest
+        radius.
+        """
         phi = np.linspace(0.0, 2.0 * np.pi, 997)
         here = self.radius(phi)
         for n in range(6, 1, -1):

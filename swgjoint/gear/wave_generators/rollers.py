@@ -19,8 +19,8 @@ from swgjoint.typing import Array
 class FourRoller(ClosedCurve):
     """Two opposite pairs of rollers that touch the circle of radius a (thesis 3.2.4).
 
-    Contact occurs at the nearest roller. The arc length is measured along the taut band
-    around the rollers, whose straight parts are not in contact with a roller.
+    Contact occurs at the nearest roller. The arc length, however, is measured along a
+    taut band around the rollers, whose straight parts do not touch a roller.
     """
 
     major: float
@@ -40,7 +40,8 @@ class FourRoller(ClosedCurve):
     def band(self) -> Chain:
         """Taut band around the four rollers."""
         (x, y), r = self.centre, self.roller_radius
-        # from +y: half of the top line, roller, side line, roller, half a line, twice
+        # counter-clockwise from +y: half of the top line, two rollers with the side
+        # line between them, half of the bottom line, and the same on the right side
         half: list[OutlinePiece] = [
             Line(start=(0.0, y + r), end=(-x, y + r)),
             Arc(centre=(-x, y), radius=r, start=0.5 * pi, end=pi),
@@ -61,11 +62,14 @@ class FourRoller(ClosedCurve):
         return self.band.perimeter
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Evaluate the taut band at arc length s."""
+        """Points, normals and curvatures of the taut band at arc lengths s."""
         return self.band.evaluate(s)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the nearest roller, computed in the first quadrant."""
+        """Signed distance to the nearest roller, with normal and curvature of it.
+
+        The points are mirrored into the first quadrant, which contains one roller.
+        """
         rel = np.abs(points) - np.asarray(self.centre)
         r = np.hypot(rel[:, 0], rel[:, 1])
         normals = rel / np.maximum(r, 1e-300)[:, None]

@@ -23,29 +23,31 @@ class Bearing(Section):
     ball_diameter_mm: Millimetre
     """Diameter of a ball."""
     race_thickness_mm: Millimetre
-    """Thickness of the outer race over its grooves."""
+    """Radial thickness of the outer race, including the depth of its groove."""
     clearance_um: Micrometre = 0.0
-    """Radial internal clearance, measured on the diameter."""
+    """Radial internal clearance as in catalogues, a difference of diameters."""
     race_width_mm: Millimetre | None = None
-    """Width of the outer race along the axis."""
+    """Width of the outer race along the axis; by default the face width."""
     groove_inertia_factor: Reduction | None = None
-    """Second moment of area of the race section over that of its rectangle."""
+    """Second moment of area of the race section, divided by that of a rectangle of the
+    same width and thickness; by default 1."""
     groove_conformity: Annotated[float, Field(gt=0.5, le=1)] | None = None
-    """Radius of the groove, divided by the diameter of the ball."""
+    """Radius of the groove, divided by the diameter of the ball; by default 0.52."""
     fit_clearance_um: Micrometre | None = None
-    """Clearance between race and flexspline, measured on the diameter."""
+    """Clearance between race and flexspline, a difference of diameters; by default
+    0."""
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
-    """Young's modulus of balls and races."""
+    """Young's modulus of balls and races; by default that of the flexspline."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
-    """Poisson's ratio of balls and races."""
+    """Poisson's ratio of balls and races; by default that of the flexspline."""
 
 
 class WaveGeneratorBase(Section):
-    """Keys of every kind of wave generator."""
+    """Keys that every kind of wave generator has."""
 
     bearing: Bearing | None = None
-    """Ball bearing below the flexspline; without a bearing the flexspline slides on the
-    cam."""
+    """Ball bearing between cam and flexspline; without a bearing, the flexspline slides
+    on the cam."""
 
 
 class EllipticalSection(WaveGeneratorBase):
@@ -90,23 +92,27 @@ class ParabolaSide(Section):
 
 
 class AsymmetricParabolic(WaveGeneratorBase):
-    """Parabolic with rotated lobes (``rotation_deg``) or with two different sides."""
+    """Parabolic outline with rotated lobes (``rotation_deg``) or with unequal sides."""
 
     kind: Literal["asymmetric_parabolic"] = "asymmetric_parabolic"
     minor_axis_coefficient: Reduction = 1.0
     """C: semi-minor axis divided by (bore radius minus deflection)."""
     rotation_deg: Annotated[float, Field(gt=-45, lt=45)] | None = None
-    """Rotation of each lobe about its apex."""
+    """Rotation of the parabola of each lobe about its apex, counter-clockwise."""
     parabola_coefficient_per_mm: Positive | None = None
-    """Coefficient c of the parabola y = a - c x², together with rotation_deg."""
+    """Coefficient c of the parabola y = a - c x² at the lobe; required with
+    rotation_deg."""
     parabola_length_coefficient: Reduction | None = None
-    """Half width of the parabola, divided by the semi-minor axis."""
+    """Half width of the parabola, divided by the semi-minor axis; required with
+    rotation_deg."""
     connector_radius_mm: Millimetre | None = None
-    """Radius of the arc that joins the parabola to the lateral arc."""
+    """Radius of the arc that joins the parabola to the lateral arc; required with
+    rotation_deg."""
     left: ParabolaSide | None = None
-    """Side at x < 0 of the upper lobe, instead of rotation_deg."""
+    """Side at x < 0 of the upper lobe; given together with right, instead of
+    rotation_deg."""
     right: ParabolaSide | None = None
-    """Side at x > 0 of the upper lobe."""
+    """Side at x > 0 of the upper lobe; given together with left."""
 
     @model_validator(mode="after")
     def _one_of_two_forms(self) -> AsymmetricParabolic:
@@ -140,7 +146,7 @@ class FourRollerSection(WaveGeneratorBase):
 
 
 class CosineSection(WaveGeneratorBase):
-    """Radius that varies with the cosine of the number of lobes times the angle."""
+    """Outline whose radius varies as cos(n phi), with the number of lobes n."""
 
     kind: Literal["cosine"] = "cosine"
     minor_axis_coefficient: Reduction = 1.0
@@ -148,13 +154,14 @@ class CosineSection(WaveGeneratorBase):
 
 
 class TableSection(WaveGeneratorBase):
-    """Table of the radius against the angle from the major axis over one turn."""
+    """Outline given by a table of radius against angle from the major axis."""
 
     kind: Literal["table"] = "table"
     angle_deg: Annotated[tuple[float, ...], Field(strict=False)]
-    """Angles from the major axis, increasing within one turn."""
+    """Angles from the major axis, counter-clockwise, at least 8 increasing values
+    within one turn."""
     radius_mm: Annotated[tuple[Millimetre, ...], Field(strict=False)]
-    """Radius at every angle."""
+    """Radius of the outline at each angle."""
 
     @model_validator(mode="after")
     def _same_length(self) -> TableSection:

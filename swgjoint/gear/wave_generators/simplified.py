@@ -27,7 +27,11 @@ class Simplified(ClosedCurve):
         return 2.0 * (np.pi * self.pin_radius + straight)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Evaluate quarter circle, line, semicircle, line and quarter circle."""
+        """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
+
+        From +y, the outline consists of a quarter circle, a line, a semicircle, a line
+        and a quarter circle.
+        """
         r, half = self.pin_radius, self.major - self.pin_radius
         quarter, straight = 0.5 * np.pi * r, 2.0 * half
         along = self._within(s)
@@ -44,7 +48,10 @@ class Simplified(ClosedCurve):
         return sign * points, sign * normals, np.where(line, 0.0, 1.0 / r)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the segment between the two centres, minus the radius."""
+        """Signed distance, normal and curvature; see :class:`ClosedCurve`.
+
+        The distance is that to the line between the two centres, minus the radius.
+        """
         half = self.major - self.pin_radius
         foot = np.clip(points[:, 1], -half, half)
         rel = np.stack([points[:, 0], points[:, 1] - foot], axis=-1)

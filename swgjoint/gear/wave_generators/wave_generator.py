@@ -1,7 +1,7 @@
 """Wave generator of a design.
 
-All quantities are in the frame of the wave generator, in metres. The major axis is
-along +y at wave-generator angle zero.
+Lengths are in metres and refer to the frame of the wave generator, whose +y axis is the
+major axis. At wave-generator angle zero, this axis is the +y axis of the drive.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from swgjoint.units import deg, mm
 __all__ = ["WaveGenerator", "lobe_height", "wave_generator", "with_checks"]
 
 WaveGenerator = ClosedCurve
-"""Interface of wave generators for contact and kinematics."""
+"""Outline of a wave generator, as contact and kinematics use it."""
 
 
 def lobe_height(design: Design) -> float:
-    """Radial deflection at the lobe, m (z_cs - z_fs)/2 [m]."""
+    """Radial deflection at the lobe, module times (z_cs - z_fs)/2 [m]."""
     return 0.5 * design.drive.module_mm * design.tooth_difference * mm
 
 
@@ -49,7 +49,7 @@ def wave_generator(design: Design) -> WaveGenerator:
 
 
 def with_checks(design: Design) -> tuple[WaveGenerator, list[Check]]:
-    """Wave generator of a design with the checks of its fit.
+    """Wave generator of a design and the checks of its fit, passed or failed.
 
     Raises:
         DesignError: If the parameters give no outline.
@@ -72,7 +72,7 @@ def with_checks(design: Design) -> tuple[WaveGenerator, list[Check]]:
 def _outline(design: Design, r: float, w0: float) -> ClosedCurve:
     """Outline for the inner radius r [m] and the deflection w0 [m]."""
     spec = design.wave_generator
-    major = r + w0  # (3.3), half of the axis
+    major = r + w0  # semi-major axis, half of thesis eq. (3.3)
     if spec.kind == "four_roller":
         radius = spec.roller_radius_mm * mm
         if radius >= 0.5 * major:
