@@ -1,7 +1,8 @@
-"""Directly defined profiles: double and quadruple circular arc, two-arc.
+"""Profiles defined directly by arcs: double circular, quadruple circular and two-arc.
 
 Angles such as alpha are counted from the +x axis of the tooth frame towards the tip:
-counter-clockwise for external teeth, clockwise (mirrored radially) for internal teeth.
+counter-clockwise for external teeth and clockwise (mirrored radially) for internal
+teeth. Equation numbers are those of the thesis.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from swgjoint.gear.teeth.tooth_bounds import with_bounds
 from swgjoint.units import deg, mm
 
 LARGEST_CORRECTED_ANGLE = 0.5 * pi
-"""Limit of the corrected pressure angle, at which the flank is tangential [rad]."""
+"""Corrected pressure angle of a flank that is tangential to the pitch circle [rad]."""
 TWO_ARC = {
     "addendum_radius_mm": 1.09,  # R_1
     "addendum_offset_mm": 0.71,  # L_1
@@ -29,11 +30,11 @@ TWO_ARC = {
     "dedendum_radius_mm": 1.2,  # R_2
     "dedendum_offset_mm": 1.54,  # L_2
     "dedendum_shift_mm": 0.26,  # X_2
-    "root_radius_mm": 0.6,  # our choice, half of R_2; the article states no radius
+    "root_radius_mm": 0.6,  # chosen as half of R_2; the article states no radius
 }
-"""Proportions of the 80:1 article, multiples of the module."""
+"""Lengths of the article on an 80:1 drive, as multiples of the module."""
 SHORTEST = 1e-9
-"""Smallest length of a straight segment [m]; the direction of shorter ones is lost."""
+"""Smallest length of a straight segment [m]; shorter ones have no exact direction."""
 
 
 def arc_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
@@ -74,10 +75,10 @@ def _along(origin: Point, step: float, direction: Point) -> Point:
 def _reach(
     origin: Point, step: float, radius: float, mirror: float, first: float
 ) -> float | None:
-    """Angle >= first at which origin + step (cos a, mirror sin a) has a given radius.
+    """Smallest angle a >= first at which a point has a given distance from the axis.
 
-    Solves |o|^2 + step^2 + 2 step o.(cos a, mirror sin a) = radius^2 for a; None if
-    there is no solution.
+    The point is o + step (cos a, mirror sin a), so a solves |o|^2 + step^2 + 2 step
+    o.(cos a, mirror sin a) = radius^2. None if there is no solution.
     """
     ox, oy = origin[0], mirror * origin[1]
     size = hypot(ox, oy)
@@ -91,7 +92,7 @@ def _reach(
 
 
 class _Flank:
-    """Pitch point, straight segment and arc centres, thesis eqs 3.23 to 3.33.
+    """Pitch point, normal and straight segment of a flank, thesis eqs 3.23 to 3.33.
 
     External teeth follow the thesis. For internal teeth, the corrected pressure angle
     is alpha + alpha_P, and tangents and normals are mirrored radially, because the
@@ -112,7 +113,7 @@ class _Flank:
         self.t = (-sin(alpha), side * cos(alpha))  # (3.29), towards the tip
 
     def split(self, length: float, share: float) -> tuple[Point, Point]:
-        """End points of the straight segment on the tip side and on the root side."""
+        """End points of the straight segment on the tip side and the root side [m]."""
         p_a = _along(self.pitch_point, share * length, self.t)  # (3.30)
         p_d = _along(self.pitch_point, -(1.0 - share) * length, self.t)  # (3.31)
         return p_a, p_d
@@ -149,7 +150,7 @@ def _check_root_end(start: Blank, gamma: float, key: str) -> None:
 def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
     """Quadruple circular arc profile, thesis section 3.3.3 (eqs 3.21-3.49).
 
-    Both aperture equations are circle intersections and are solved in closed form.
+    Both aperture angles follow from intersections of circles in closed form.
     """
     flank, side = _Flank(start), start.side
     alpha, n_l = flank.alpha, flank.n
@@ -171,7 +172,7 @@ def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
     o_a = _along(p_a, -r_a, n_l)  # (3.32)
     o_d = _along(p_d, r_d, n_l)  # (3.33)
 
-    # (3.47): |O_t| +- r_t = r_A and |O_r| -+ r_r = r_D
+    # (3.47): |O_t| +- r_t = r_A and |O_r| -+ r_r = r_D, upper signs for external teeth
     end_a = _reach(o_a, r_a - r_t, start.tip - side * r_t, side, alpha)
     if end_a is None:
         raise start.fault(
@@ -189,8 +190,8 @@ def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
     # (3.42), (3.43)
     o_t = _along(o_a, r_a - r_t, (cos(end_a), side * sin(end_a)))
     o_r = _along(o_d, -(r_d - r_r), (cos(end_d), side * sin(end_d)))
-    # (3.44): common normals with top and root land, as angles defined like alpha;
-    # normals of an internal tooth point to the axis
+    # (3.44): directions of the common normals with top and root land, counted like
+    # alpha; the normals of an internal tooth point towards the axis
     end_t = atan2(o_t[1], side * o_t[0])
     end_r = atan2(o_r[1], side * o_r[0])
     gamma_t, gamma_r = _angle_of(o_t), _angle_of(o_r)
@@ -220,10 +221,10 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     r"""Double circular arc profile, thesis section 3.3.2 (eqs 3.21-3.39).
 
     The dedendum arc is tangent to the root circle if its centre is at the distance
-    :math:`|O_d| = r_D \pm r_d` from the axis. With
+    :math:`|O_d| = r_D \pm r_d` from the axis (upper sign for external teeth). With
     :math:`O_d = P_P + r_d n_l - (1 - c_l) l\, t_l` this is a quadratic equation for the
-    straight length l. The third condition (3.39) is the same collinearity, and the
-    addendum arc meets the tip circle at an edge.
+    length l of the straight segment. The third condition of (3.39) expresses the same
+    tangency. The addendum arc meets the tip circle at an edge.
     """
     flank, side = _Flank(start), start.side
     alpha = flank.alpha
@@ -232,7 +233,8 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     if share >= 1.0:
         raise start.fault(
             "profile.straight_split",
-            "the dedendum arc reaches the root for no straight length; accepted: < 1",
+            "the dedendum arc cannot reach the root with any length of the straight"
+            " segment; accepted: < 1",
         )
     centre = start.root + side * r_d
     if centre <= 0.0:
@@ -247,7 +249,7 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
         raise start.fault(
             "profile.dedendum_radius_mm", "the arc does not reach the root" + smaller
         )
-    # the solution near the tooth
+    # of the two solutions, the one near the tooth
     reach = along - side * sqrt(square)
     length = reach / (1.0 - share)
     if length < SHORTEST:
@@ -294,15 +296,15 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
 
 
 def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
-    """Convex and concave arc joined by their common tangent, 80:1 article.
+    """Convex and concave arc joined by their common tangent, article on an 80:1 drive.
 
-    In the tooth frame the centres are (-L_1, r_P - X_1) and (L_2, r_P + X_2), as in the
-    coordinates of the article; for an internal tooth, X is mirrored radially. The
+    In the tooth frame, the centres are (-L_1, r_P - X_1) and (L_2, r_P + X_2), as in
+    the article. For an internal tooth, X_1 and X_2 are mirrored radially. The
     expressions of the article for X_1 and L_1 contradict its table and are not used.
-    With the values of the table, the arcs are 0.005 m apart, and the common tangent
-    bridges this gap. Thickness and inclination at the pitch circle follow from the
-    centres. The thickness coefficient rotates the flank by (c_P - 1) alpha_T / 2, so
-    that the backlash is that of (6.3).
+    With the values of the table, the arcs are 0.005 modules apart, and the common
+    tangent bridges this gap. Thickness and inclination at the pitch circle follow from
+    the centres. The thickness coefficient rotates the flank by (c_P - 1) alpha_T / 2,
+    which gives the backlash of thesis (6.3).
     """
     side = start.side
 
@@ -338,7 +340,7 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
         length = 0.0
     if not alpha < LARGEST_CORRECTED_ANGLE:
         raise start.fault(
-            "profile.dedendum_shift_mm", "the flank is tangential to the circle"
+            "profile.dedendum_shift_mm", "the flank is tangential to the pitch circle"
         )
     n = (cos(alpha), side * sin(alpha))
     p_a, p_d = _along(o_1, r_1, n), _along(o_2, -r_2, n)

@@ -16,14 +16,18 @@ from swgjoint.units import deg, mm
 
 
 class ToothFault(DesignError):
-    """A tooth that cannot be built, with the key of the member that causes it."""
+    """Error for a tooth that cannot be built, with the key of the member at fault.
+
+    ``where`` names design and member, ``shown`` is the value of the key with its unit,
+    and ``what`` states what is wrong and which values are accepted.
+    """
 
     def __init__(self, where: str, key: str, shown: str, what: str) -> None:
         super().__init__(f"{where}.{key} = {shown}: {what}")
         self.where, self.key, self.shown, self.what = where, key, shown, what
 
     def __reduce__(self) -> tuple[type[DesignError], tuple[str]]:
-        """Pickle as a plain design error with the message."""
+        """Reduce to a plain design error with the same message for pickling."""
         return DesignError, (str(self),)
 
     def with_bounds(self, accepted: str) -> ToothFault:
@@ -36,12 +40,12 @@ class ToothFault(DesignError):
 
 @dataclass(frozen=True, kw_only=True)
 class Blank:
-    """Dimensions of one member in SI, thesis eqs 3.13, 3.16, 3.17, 3.21, 3.22."""
+    """Dimensions of one member in SI units, thesis eqs 3.13, 3.16, 3.17, 3.21, 3.22."""
 
     member: str
     """``flexspline`` or ``circular_spline``."""
     where: str
-    """Design and member, for messages."""
+    """Names of design and member, for messages."""
     spec: Member
     """Table of the member in the design file."""
     teeth: int
@@ -64,12 +68,12 @@ class Blank:
 
     @property
     def half_pitch(self) -> float:
-        """Half the angular pitch alpha_T [rad]."""
+        """Half the angular pitch, alpha_T [rad]."""
         return pi / self.teeth  # (3.21)
 
     @property
     def half_thickness(self) -> float:
-        """Half the angular thickness alpha_P at the pitch circle [rad]."""
+        """Half the angular tooth thickness at the pitch circle, alpha_P [rad]."""
         return self.spec.thickness_coefficient * self.half_pitch / 2.0  # (3.22)
 
     @property
@@ -90,14 +94,14 @@ class Blank:
         return ToothFault(self.where, key, shown, what)
 
     def value(self, key: str) -> Any:
-        """Value of a dotted key of the member."""
+        """Value of a dotted key of the member, in the unit of the key."""
         value: Any = self.spec
         for name in key.split("."):
             value = getattr(value, name)
         return value
 
     def with_change(self, key: str, value: float) -> Blank:
-        """The blank with a new value for a dotted key, without checks.
+        """Copy of the blank with a new value for a dotted key, which is not checked.
 
         Args:
             key: Dotted key of the member.
@@ -112,11 +116,15 @@ class Blank:
         return replace(self, spec=spec, tip=tip, root=root)
 
     def lands(self, top: float, bottom: float) -> tuple[list[Piece], list[Piece]]:
-        """Half of the top land and of the root land, empty if they have no length.
+        """Right halves of the top land and of the root land.
 
         Args:
-            top: Angle of the end of the top land from the tooth axis [rad].
-            bottom: Angle of the start of the root land from the tooth axis [rad].
+            top: Angle from the tooth axis to the end of the top land [rad].
+            bottom: Angle from the tooth axis to the start of the root land [rad].
+
+        Returns:
+            The piece of the top land and that of the root land, each as a list that is
+            empty if the land has no length.
         """
         convex = not self.internal
         first: list[Piece] = []
@@ -139,19 +147,21 @@ class Blank:
         bottom: float,
         straight_length: float = 0.0,
     ) -> ToothProfile:
-        """Profile from the lands and the pieces between them, without empty pieces.
+        """Profile composed of the lands and the pieces between them.
+
+        Arcs and lines of zero length are omitted.
 
         Args:
-            top: Angle of the end of the top land from the tooth axis [rad].
+            top: Angle from the tooth axis to the end of the top land [rad].
             pieces: Pieces of the flank from tip to root.
-            bottom: Angle of the start of the root land from the tooth axis [rad].
+            bottom: Angle from the tooth axis to the start of the root land [rad].
             straight_length: Length of the straight segment, for reports [m].
         """
         first, last = self.lands(top, bottom)
         kept = [
             piece
             for piece in [*first, *pieces, *last]
-            # a land or an arc of zero length has no direction
+            # an arc or a line of zero length has no direction
             if piece.length > 0.0 or not isinstance(piece, Segment)
         ]
         return ToothProfile(
@@ -196,7 +206,7 @@ def blank(design: Design, member: str) -> Blank:
 def circles(
     spec: Member, pitch: float, module: float, side: float
 ) -> tuple[float, float]:
-    """Radii of tip and root circle of a member [m].
+    """Radii of the tip circle and the root circle of a member [m].
 
     Args:
         spec: Table of the member in the design file.

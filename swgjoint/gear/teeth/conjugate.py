@@ -1,11 +1,12 @@
 """Conjugate tooth profiles by the envelope method, for either member.
 
-The circular spline is generated from the flexspline or vice versa. Its flank is the
-envelope of the moving flank of the other member (80:1 article, "Derivation of the
-conjugate circular spline profile"; the article uses w = w_0 cos 2 theta, this module
-the kinematics of :mod:`swgjoint.gear.teeth.neutral_line`). Below the flank, a straight
-line leaves the envelope, and a circular fillet ends on the root circle, with clearance
-to the mating tip.
+The circular spline is generated from the flexspline or vice versa. The generated flank
+is the envelope of the moving flank of the other member (article on an 80:1 drive,
+section "Derivation of the conjugate circular spline profile"). The article uses the
+deflection w = w_0 cos 2 theta, whereas this module uses the kinematics of
+:mod:`swgjoint.gear.teeth.neutral_line`. Towards the root, a straight line leaves the
+envelope, and a circular fillet joins this line to the root circle. Both keep clear of
+the mating tip.
 """
 
 from __future__ import annotations
@@ -30,20 +31,22 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 DEPARTURES = (45.0 * deg, 30.0 * deg, 20.0 * deg, 12.0 * deg)
-"""Inclinations at which the flank may leave the envelope towards the root [rad].
+"""Inclinations of the normal at which the flank may leave the envelope [rad].
 
-The first one that permits a fillet of :data:`WANTED_FILLET` is used, otherwise the one
-with the largest fillet. Narrow tooth spaces need a steep departure.
+The first inclination that permits a fillet of :data:`WANTED_FILLET` is used, otherwise
+the one with the largest fillet. Narrow tooth spaces need a steep flank there, which has
+a small inclination of its normal.
 """
 WANTED_FILLET = 0.1
-"""Desired radius of the fillet, multiple of the module."""
+"""Desired radius of the fillet, as a multiple of the module [-]."""
 SHARPEST = 0.1
-"""Smallest usable radius of curvature of an edge path, multiple of the module."""
+"""Smallest usable radius of curvature of an edge path, as a multiple of the module
+[-]."""
 OVERLAP = 1e-9
-"""Largest accepted overlap of the pair [m]."""
+"""Largest accepted overlap of the two rigid flanks [m]."""
 NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
-"""Nodes of a flank curve and of an edge path, points that place the nodes, and samples
-of the inclination."""
+"""Numbers of nodes of a flank curve and of an edge path, of points that place the
+nodes, and of samples of the inclination."""
 
 
 def conjugate_profile(
@@ -53,16 +56,17 @@ def conjugate_profile(
     *,
     motions: tuple[ToothMotion, ...] | None = None,
 ) -> ToothProfile:
-    """Profile of ``member`` conjugate to the other member under the wave generator.
+    """Profile of ``member`` that is conjugate to the profile of the other member.
 
-    The pair has no backlash if c_P = 1 for this member. A smaller thickness coefficient
-    rotates the flank back by (1 - c_P) alpha_T / 2 as for other profiles (6.3).
+    The pair has no backlash if the thickness coefficient c_P of ``member`` is 1. A
+    smaller coefficient rotates the flank back by (1 - c_P) alpha_T / 2, as for other
+    profiles (thesis 6.3).
 
     Args:
-        design: The drive; the profile table of ``member`` affects only its root.
+        design: The drive; the profile table of ``member`` affects only the root.
         member: ``flexspline`` or ``circular_spline``.
         given: Profile of the other member.
-        motions: Motions of the teeth; None takes those of the neutral line.
+        motions: Motions of the teeth; None takes those on the neutral line.
 
     Raises:
         DesignError: If there is no conjugate tooth, in one line that names the key.
@@ -79,7 +83,7 @@ def conjugate_profile(
 
 
 class _Builder(RootBuilder):
-    """Builds a closed flank from the branches of an envelope."""
+    """Builds a complete flank from the branches of an envelope."""
 
     def build(self) -> ToothProfile:
         start, envelope = self.start, self.envelope
@@ -145,10 +149,10 @@ class _Builder(RootBuilder):
         return profile
 
     def _sound(self, profile: ToothProfile) -> bool:
-        """Whether the chain is a regular flank that the other member does not overlap.
+        """Whether the flank is regular and the other member does not overlap it.
 
-        Branches of the envelope may end or intersect inside a piece where the curvature
-        of the wave generator is discontinuous; such a chain is rejected.
+        If the curvature of the wave generator is discontinuous, branches of the
+        envelope may end or intersect within a piece. Such a flank is rejected.
         """
         for junction in profile.junctions():
             tangent = junction.edge or junction.corner < TANGENCY_RAD
@@ -167,7 +171,7 @@ class _Builder(RootBuilder):
     # -- the flank ----------------------------------------------------------------
 
     def _with_edge(self, runs: list[EnvelopeRun]) -> list[EnvelopeRun]:
-        """The runs, with the path of the edge added if the flank starts at one."""
+        """The runs, followed by the path of the edge if the flank starts at one."""
         low, last = self.envelope.given.contact_range[0], runs[-1]
         close = last.station[-1] - low < 0.05 * (runs[0].station[0] - low)
         if last.edge or not self.envelope.starts_at_edge or not close:
@@ -178,7 +182,11 @@ class _Builder(RootBuilder):
         return [*runs, edge]
 
     def _trace(self, run: EnvelopeRun) -> Callable[[Array], tuple[Array, Array]]:
-        """Points and normals of the thinned tooth by station or edge position."""
+        """Function for points and normals of the generated tooth along a run.
+
+        Its parameter is the arc length on the given flank or, for an edge, the position
+        of the motion. The points are rotated for the backlash.
+        """
 
         def trace(t: Array) -> tuple[Array, Array]:
             if run.edge:
@@ -196,9 +204,10 @@ class _Builder(RootBuilder):
     def _flank(
         self, runs: list[EnvelopeRun], departure: float
     ) -> tuple[list[Piece], tuple[Point, Array]] | None:
-        """Pieces from the tip circle to the departure, with its point and normal.
+        """Pieces from the tip circle to the departure, and its point and normal.
 
-        None if the flank is nowhere as steep as the departure.
+        The flank leaves the envelope where the inclination of its normal exceeds
+        ``departure`` [rad]. None if the flank is nowhere as steep as this.
         """
         from scipy.optimize import brentq
 
@@ -273,7 +282,7 @@ class _Builder(RootBuilder):
     def _round_part(
         self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
     ) -> float:
-        """Position at which the path of an edge turns too sharply, or its end."""
+        """Position at which the path of an edge turns too sharply, else ``last``."""
         t = np.linspace(first, last, 401)
         points, normals = trace(t)
         turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
@@ -282,7 +291,7 @@ class _Builder(RootBuilder):
         return float(t[np.argmax(sharp)]) if sharp.any() else last
 
     def _summit(self, run: EnvelopeRun, first: float) -> float:
-        """Position at which the path of the edge is deepest in the receiver."""
+        """Position at which the edge is deepest in the tooth space of the receiver."""
         from scipy.optimize import minimize_scalar
 
         trace, side = self._trace(run), self.start.side
@@ -296,7 +305,7 @@ class _Builder(RootBuilder):
         return float(deepest.x)
 
     def _runs_on(self, run: EnvelopeRun, following: EnvelopeRun, low: float) -> bool:
-        """Whether a branch continues smoothly into the path of the edge at its end."""
+        """Whether a branch continues smoothly at its end into the path of the edge."""
         near = abs(run.station[-1] - low) < 0.05 * abs(run.station[0] - low)
         step = abs(following.theta[0] - run.theta[-1])
         return (
@@ -343,7 +352,7 @@ class _Builder(RootBuilder):
         last: float,
         edge: bool,
     ) -> list[Piece]:
-        """Smooth curves, divided at the junctions of the given flank."""
+        """Smooth curves along a run, divided at the junctions of the given flank."""
         given = self.envelope.given
         names = [part.name for part in given.segments]
         cuts: list[float] = []
@@ -375,7 +384,7 @@ class _Builder(RootBuilder):
 
 
 def _crossing(f: Callable[[float], float], guess: float, step: float) -> float:
-    """Root of a monotonic function near a guess; the guess if there is none nearby."""
+    """Root of a monotonic function near a guess; the guess if no root is nearby."""
     from scipy.optimize import brentq
 
     low, high = guess - abs(step), guess + abs(step)

@@ -1,4 +1,4 @@
-"""The root of a conjugate tooth: from the end of the envelope to the root circle."""
+"""The root of a conjugate tooth, from the end of the envelope to the root circle."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 ROOT_END = 0.98
-"""Largest angle to the end of an automatically chosen fillet, as a fraction of half the
-angular pitch; the rest is a short root land."""
+"""Largest angle from the tooth axis to the end of a fillet of default radius, divided
+by half the angular pitch [-]. A short root land remains."""
 SHORTEST = 4e-6
-"""Shorter pieces are omitted, and the chain continues tangentially [m]."""
+"""Smallest length of a piece [m]. Shorter pieces are omitted, and the next piece
+continues in tangential direction."""
 
 
 class RootBuilder:
@@ -31,7 +32,8 @@ class RootBuilder:
                 "thickness_coefficient",
                 "the tooth would be thicker than the conjugate tooth; accepted: <= 1",
             )
-        # clockwise rotation of the envelope: backlash makes the tooth thinner
+        # clockwise rotation of the envelope; it is negative if backlash makes the tooth
+        # thinner
         turn = start.half_thickness - 0.5 * start.half_pitch
         c, d = np.cos(turn), np.sin(turn)
         self.turn = np.array([[c, -d], [d, c]])
@@ -39,11 +41,11 @@ class RootBuilder:
     def _fillet(
         self, leave: tuple[Point, Array], radius: float, limit: float
     ) -> tuple[float, Point] | None:
-        """Length of the line and centre of the arc for a fillet radius, if it fits.
+        """Length of the line and centre of the fillet [m]; None if it does not fit.
 
         The line starts at the departure P with tangent t and normal n. The centre
-        P + l t + r n is at the distance r_D +- r from the axis, which is a quadratic
-        equation for the length l.
+        P + l t + r n of a fillet of radius r is at the distance r_D +- r from the axis,
+        which is a quadratic equation for the length l.
         """
         start = self.start
         (px, py), n = leave
@@ -61,7 +63,11 @@ class RootBuilder:
         return length, (float(centre[0]), float(centre[1]))
 
     def _root(self, leave: tuple[Point, Array]) -> tuple[list[Piece], float] | None:
-        """Line and fillet with the radius of the design or the largest that fits."""
+        """Line and fillet with the radius of the design or the largest that fits.
+
+        The second value is the angle from the tooth axis to the end of the fillet
+        [rad]. None if no fillet fits.
+        """
         spec = self.start.spec.profile
         assert isinstance(spec, Conjugate)
         if spec.root_radius_mm is not None:
@@ -82,9 +88,10 @@ class RootBuilder:
     def _root_with(
         self, leave: tuple[Point, Array], radius: float, limit: float
     ) -> tuple[list[Piece], float] | None:
-        """Pieces of the root for one fillet radius; None if they do not fit.
+        """Line and fillet of a given radius, and the angle to its end [rad].
 
-        The arc must end within the angle ``limit`` from the tooth axis [rad].
+        None if they do not fit. The fillet must end within the angle ``limit`` from the
+        tooth axis [rad].
         """
         start = self.start
         fillet = self._fillet(leave, radius, limit)
@@ -108,7 +115,7 @@ class RootBuilder:
         return (pieces, polar_angle(centre)) if self._clear(pieces) else None
 
     def _clear(self, pieces: list[Piece]) -> bool:
-        """Whether the mating tip does not touch the line and the fillet."""
+        """Whether the mating tip touches neither the line nor the fillet."""
         points = self._tips
         for piece in pieces:
             distance, _, _, inside = piece.project(points, self.start.side)
@@ -118,7 +125,10 @@ class RootBuilder:
 
     @cached_property
     def _tips(self) -> Array:
-        """Points of the mating flank at all positions near the lobe (n, 2) [m]."""
+        """Points of the mating flank at positions near the lobe (n, 2) [m].
+
+        They are in the frame of the generated tooth, rotated for the backlash.
+        """
         envelope = self.envelope
         points, _, _ = envelope.given.evaluate(
             np.linspace(*envelope.given.contact_range, 150)

@@ -1,9 +1,10 @@
 """Envelope of a moving flank: the boundary that a mating tooth must not cross.
 
-In the frame of the receiving tooth, the flank of the other member is closest at one
-position of the motion for each radius. The velocity at that position has no component
-along the common normal, which is the meshing equation of the envelope. Where the flank
-ends at an edge, the path of the edge forms the boundary.
+The other member moves in the frame of the receiving tooth. For each radius there is one
+position of the motion at which its flank is closest to the axis of the receiving tooth.
+At that position, its velocity has no component along the common normal, which is the
+meshing equation of the envelope. Where the moving flank ends at an edge, the path of
+the edge forms the boundary.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion
 from swgjoint.typing import Array
 
 POSITIONS, RADII, PER_PIECE = 601, 241, 48
-"""Number of motion positions, of radii, and of samples per piece of the flank."""
+"""Numbers of positions of the motion, of radii, and of samples per piece of the
+flank."""
 STEEPEST = np.deg2rad(75.0)
-"""Largest inclination of a mating flank; steeper parts are roundings of tip or root."""
+"""Largest inclination of the normal of a mating flank [rad]; parts with a larger
+inclination are roundings of tip or root."""
 SAME_BRANCH = 0.1
-"""Largest step between neighbouring radii on one branch, as a fraction of the flank."""
+"""Largest change of the arc length on the moving flank between neighbouring radii of
+one branch, as a fraction of the length of that flank [-]."""
 ITERATIONS = 100
 """Largest number of iterations for the meshing equation."""
 
@@ -34,9 +38,10 @@ class EnvelopeRun:
     motion: ToothMotion
     """Motion of the moving tooth."""
     station: Array
-    """Arc length on the moving flank, from tip to root of the receiver (n,) [m]."""
+    """Arc lengths on the moving flank, ordered from tip to root of the receiver (n,)
+    [m]."""
     theta: Array
-    """Position of the motion (n,) [rad]."""
+    """Positions of the motion at which these points touch the boundary (n,) [rad]."""
     edge: bool
     """Whether the edge at the tip of the moving flank forms this part."""
 
@@ -50,13 +55,13 @@ class Envelope:
     receiver: Receiver
     """Member whose flank is generated."""
     motions: tuple[ToothMotion, ...]
-    """Different motions of the teeth."""
+    """Distinct motions of the teeth, from :func:`.tooth_motion.tooth_motions`."""
     tip: float
     """Tip radius of the receiving member [m]."""
 
     @property
     def side(self) -> float:
-        """+1 if the receiver has external teeth, -1 for internal teeth."""
+        """+1 if the receiver has external teeth, -1 if it has internal teeth."""
         return -self.given.side
 
     @cached_property
@@ -82,7 +87,9 @@ class Envelope:
         )
 
     def slip(self, motion: ToothMotion, s: Array, theta: Array) -> Array:
-        """Speed n . v towards the receiver along the common normal (n,) [m/rad].
+        """Speed n . v of flank points along the flank normal n (n,) [m/rad].
+
+        It is positive where the flank moves towards the receiver.
 
         Args:
             motion: Motion of the moving tooth.
@@ -98,10 +105,11 @@ class Envelope:
     def contact(self, motion: ToothMotion, s: Array, guess: Array) -> Array:
         """Positions theta at which flank points s touch the envelope (n,) [rad].
 
-        The meshing equation ``slip`` = 0 is solved for a change from positive to
-        negative slip. The root is bracketed about the guess and refined by the Illinois
-        method. If the speed of the motion is discontinuous there (at a step in the
-        curvature of the wave generator), the result is the position of the step.
+        The result is the root of the meshing equation ``slip`` = 0 at which the slip
+        changes from positive to negative. The root is bracketed around the guess and
+        refined by the Illinois method. If the velocity of the motion is discontinuous
+        there, at a step in the curvature of the wave generator, the result is the
+        position of the step.
 
         Args:
             motion: Motion of the moving tooth.
@@ -139,7 +147,7 @@ class Envelope:
         return np.asarray(theta)
 
     def trace(self, run: EnvelopeRun, s: Array) -> tuple[Array, Array, Array]:
-        """Envelope at flank points s.
+        """Envelope at the points s of the given flank.
 
         Args:
             run: Branch of the envelope.
@@ -157,7 +165,7 @@ class Envelope:
         return moved.points(points), -moved.vectors(normals), theta
 
     def trace_edge(self, run: EnvelopeRun, theta: Array) -> tuple[Array, Array]:
-        """Path of the edge of the given flank.
+        """Path of the edge of the given flank in the frame of the receiver.
 
         Args:
             run: Part of the boundary that the edge forms.
@@ -172,15 +180,15 @@ class Envelope:
         velocity = moved.velocities(points)
         normal = np.stack([-velocity[:, 1], velocity[:, 0]], axis=-1)
         normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
-        # out of the steel of the receiver, like the normals of the flank at the edge
+        # out of the steel of the receiver, on the side opposite to the flank normal
         sign = np.sign(np.sum(normal * -moved.vectors(normals), axis=-1))
         return moved.points(points), normal * sign[:, None]
 
     @cached_property
     def _table(self) -> tuple[Array, Array, Array]:
-        """Radii [m] and angles [rad] of the flank samples (motion, theta, s).
+        """Radii [m] and angles from +y [rad] of flank samples, and positions [rad].
 
-        The third value is the grid of positions theta [rad].
+        The first two arrays have the axes motion, position theta and flank sample.
         """
         s = self._stations
         points, _, _ = self.given.evaluate(s)
@@ -194,17 +202,17 @@ class Envelope:
         return np.array(radii), np.array(angles), theta
 
     def _deepest(self, radii: Array) -> float:
-        """The radius nearest to the root of the receiver [m]."""
+        """The radius that is nearest to the root of the receiver [m]."""
         return float(radii.min() if self.side > 0.0 else radii.max())
 
     @property
     def reach(self) -> float:
-        """Deepest radius that the mating flank reaches in the receiver [m]."""
+        """Radius nearest to the receiver's root that the mating flank reaches [m]."""
         return self._deepest(self._table[0])
 
     @property
     def summit(self) -> float:
-        """Deepest radius that the given tooth reaches in the receiver [m]."""
+        """Radius nearest to the receiver's root that the given tooth reaches [m]."""
         top = np.array([0.0, self.given.addendum_radius])
         theta = self._table[2]
         wide = np.broadcast_to(top, (len(theta), 2))
@@ -213,7 +221,10 @@ class Envelope:
 
     @property
     def floor(self) -> float:
-        """Radius that the given root reaches; the receiving tip must avoid it [m]."""
+        """Radius nearest to the receiver's root that the given root reaches [m].
+
+        The tip of the receiver must not extend beyond this radius.
+        """
         return self._deepest(self._table[0][..., -1])
 
     def runs(self) -> list[EnvelopeRun]:
@@ -225,7 +236,8 @@ class Envelope:
         s = self._stations
         wanted = np.linspace(self.tip, self.reach, RADII)[:-1]
         best = np.full(RADII - 1, np.inf)
-        where = np.zeros((3, RADII - 1), dtype=np.int64)  # motion, theta, at an end
+        # per radius: index of the motion, index of theta, whether the flank ends there
+        where = np.zeros((3, RADII - 1), dtype=np.int64)
         station = np.zeros(RADII - 1)
         for m in range(len(self.motions)):
             angle = np.full((POSITIONS, RADII - 1), np.inf)

@@ -1,8 +1,9 @@
 """Motion of rigid flexspline teeth on the deflected neutral line of the rim.
 
-The rim follows the wave generator: its neutral line is the outline offset by half the
-rim thickness, and the teeth are normal to it. The undeflected neutral line is a circle
-of radius r_m; points keep their arc length from the lobe.
+The rim follows the wave generator: its neutral line is the outline, offset by half the
+rim thickness, and the teeth are normal to this line. The undeflected neutral line is a
+circle of radius r_m. The arc length of a point from the lobe does not change when the
+rim is deflected, except for the correction in :class:`NeutralLine`.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ from swgjoint.units import mm
 
 @dataclass(frozen=True, kw_only=True)
 class Pose:
-    """Rigid motion of the tooth frame with its derivative by the motion parameter.
+    """Position of a tooth and its derivative with respect to the motion parameter.
 
-    A point p of the tooth frame moves to R(angle) (p - (0, r_m)) + point.
+    A point p of the tooth frame moves to R(angle) (p - (0, r_m)) + point, with the
+    rotation matrix R and the radius r_m of the undeflected neutral line.
     """
 
     point: Array
-    """Position of the point of the tooth on the neutral line (n, 2) [m]."""
+    """Position of the point where the tooth axis meets the neutral line (n, 2) [m]."""
     angle: Array
     """Rotation of the tooth, counter-clockwise (n,) [rad]."""
     d_point: Array
-    """Derivative of ``point`` by the parameter (n, 2) [m/rad]."""
+    """Derivative of ``point`` with respect to the parameter (n, 2) [m/rad]."""
     d_angle: Array
-    """Derivative of ``angle`` by the parameter (n,) [-]."""
+    """Derivative of ``angle`` with respect to the parameter (n,) [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,18 +44,18 @@ class NeutralLine:
     r"""Neutral line of the rim on a wave generator, as a motion of one tooth.
 
     A tooth at the angle :math:`\theta` of the undeflected rim (counter-clockwise from
-    a lobe) is at the arc length :math:`\sigma(\theta)` of the deflected line. The
-    offset outline is slightly longer or shorter than the circle. An inextensible rim
-    could not accommodate this difference :math:`\delta`, so it is distributed to where
-    teeth do not touch:
+    a lobe) is at the arc length :math:`\sigma(\theta)` of the deflected line. Between
+    two lobes, the deflected line is longer than the circle by a small difference
+    :math:`\delta`, which may be negative. An inextensible rim could not accommodate
+    this difference, so the model stretches the rim where teeth do not touch:
 
     .. math:: \sigma = r_m\theta + \delta\,\bigl(u - \tfrac{\sin 2\pi u}{2\pi}\bigr)
 
-    between neighbouring lobes (u from 0 to 1). The line is therefore inextensible to
-    second order at the lobes, and its stretch is largest half-way between them. If the
-    rim does not follow the outline everywhere (reduced minor axis, rollers), the model
-    still follows the outline like a taut string. The positions of teeth near a lobe are
-    then correct, but those half-way between lobes are not.
+    where u goes from 0 at one lobe to 1 at the next. The stretch of the line is zero at
+    the lobes, grows there with the square of u, and is largest half-way between them.
+    If the real rim does not follow the outline everywhere (reduced minor axis,
+    rollers), the rim of the model still does, like a taut string. The positions of
+    teeth near a lobe are then correct, but those half-way between lobes are not.
     """
 
     outline: WaveGenerator
@@ -72,7 +74,7 @@ class NeutralLine:
 
     @cached_property
     def _lobe_stations(self) -> Array:
-        """Arc lengths of the deflected line at the polar angles of the lobes [m]."""
+        """Arc lengths of the deflected line at the lobes (lobes + 1,) [m]."""
         wanted = 2.0 * np.pi * np.arange(self.lobes + 1) / self.lobes
         perimeter = self.outline.perimeter
         low = np.full(self.lobes + 1, -0.25 * perimeter)
@@ -88,13 +90,13 @@ class NeutralLine:
 
     @property
     def extension(self) -> float:
-        """Largest stretch of the line, which occurs half-way between the lobes [-]."""
+        """Largest magnitude of the stretch, which occurs half-way between lobes [-]."""
         gaps = np.diff(self._lobe_stations)
         arc = 2.0 * np.pi * self.radius / self.lobes
         return float(np.max(np.abs(2.0 * (gaps - arc) / arc)))
 
     def _arc_length(self, theta: Array) -> tuple[Array, Array]:
-        """Arc length sigma of the deflected line [m] and its derivative by theta."""
+        """Arc length sigma [m] of the deflected line and d sigma/d theta [m/rad]."""
         pitch = 2.0 * np.pi / self.lobes
         turns = np.floor(theta / pitch)
         u = theta / pitch - turns
@@ -137,7 +139,10 @@ class NeutralLine:
 
 
 def _turn(vectors: Array, s: Array, perimeter: float) -> Array:
-    """Angle of vectors from +y, on the branch that belongs to the arc length [rad]."""
+    """Angle of vectors from +y, counter-clockwise and continuous over turns [rad].
+
+    The arc lengths ``s`` of the vectors select the multiple of 2 pi.
+    """
     angle = np.arctan2(-vectors[:, 0], vectors[:, 1])
     near = 2.0 * np.pi * s / perimeter
     return np.asarray(angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi)))
@@ -147,8 +152,9 @@ def neutral_line(design: Design) -> NeutralLine:
     """Neutral line of the rim of a design on its wave generator.
 
     Raises:
-        DesignError: If the wave generator cannot be built, if the rim is not in contact
-            at a lobe, or if outline and bore differ too much in length.
+        DesignError: If the wave generator cannot be built, if the rim bridges a lobe
+            without following the outline, or if the lengths of outline and bore differ
+            too much.
     """
     half = 0.5 * design.flexspline.rim_mm * mm
     outline = wave_generator(design)

@@ -1,8 +1,8 @@
 """Tooth flanks as chains of circular arcs, straight lines and smooth curves.
 
-Flanks are described in the frame of their tooth, which is centred on the +y axis with
-the gear axis at the origin. The chain is the right flank (x > 0) and runs from the
-middle of the top land to the middle of the root land; normals point out of the steel.
+A flank is described in the frame of its tooth, which is centred on the +y axis with the
+gear axis at the origin. The chain represents the right flank (x > 0) and runs from the
+middle of the top land to the middle of the root land. Normals point out of the steel.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Junction:
 
 @dataclass(frozen=True, kw_only=True)
 class ToothProfile:
-    """Right flank of one tooth, from the middle of the top land to that of the root."""
+    """Right half of one tooth, from the middle of its top land to that of the root."""
 
     member: str
     """``flexspline`` or ``circular_spline``."""
@@ -74,7 +74,10 @@ class ToothProfile:
 
     @property
     def contact_range(self) -> tuple[float, float]:
-        """Arc length from the end of the top land to the start of the root land [m]."""
+        """Arc lengths at the end of the top land and at the start of the root land [m].
+
+        The part of the profile between them can touch the mating tooth.
+        """
         s = self.stations
         low = s[1] if self.segments[0].name == "top_land" else s[0]
         high = s[-2] if self.segments[-1].name == "root_land" else s[-1]
@@ -86,13 +89,16 @@ class ToothProfile:
         Args:
             first: Name of the first segment.
             last: Name of the last segment.
+
+        Raises:
+            ValueError: If the profile has no segment of one of these names.
         """
         names = [p.name for p in self.segments]
         s = self.stations
         return float(s[names.index(first)]), float(s[names.index(last) + 1])
 
     def junctions(self) -> tuple[Junction, ...]:
-        """Gap and corner at every junction, from the ends of both segments."""
+        """Gap and corner angle at the junctions of consecutive segments."""
         junctions = []
         for left, right in pairwise(self.segments):
             (end,), (before,), _ = left.evaluate_at(np.array([left.length]), self.side)
@@ -104,13 +110,14 @@ class ToothProfile:
         return tuple(junctions)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Point, outward normal and signed curvature at arc length s.
+        """Points, outward normals and signed curvatures at given arc lengths.
 
         Args:
             s: Arc lengths from the middle of the top land (n,) [m].
 
         Returns:
-            Points (n, 2) [m], unit normals (n, 2), curvatures (n,) [1/m].
+            Points (n, 2) [m]; outward unit normals (n, 2); curvatures (n,) [1/m],
+            positive where the steel is convex.
         """
         s = np.asarray(s, dtype=float)
         stations = self.stations
@@ -135,9 +142,10 @@ class ToothProfile:
     def _arcs(self) -> Array | None:
         """Parameters of arcs and lines; None if there is a piece of another kind.
 
-        The point is base + s way + radius (cos, sin) and the normal sign (cos, sin) of
-        the angle ``first`` + ``rate`` s, where ``rate`` is zero for a line. Rows: base
-        x, y, way x, y, radius, first, rate, sign, curvature (9, n_segments).
+        With the angle a = first + rate s, the point is base + s way + radius (cos a,
+        sin a) and the normal is sign (cos a, sin a); ``radius`` and ``rate`` are zero
+        for a line. The rows contain base x, base y, way x, way y, radius, first, rate,
+        sign and curvature (9, n_segments).
         """
         columns = []
         for part in self.segments:
@@ -157,7 +165,11 @@ class ToothProfile:
     def _at_once(
         self, along: Array, index: NDArray[np.int64]
     ) -> tuple[Array, Array, Array]:
-        """:meth:`evaluate` without a loop, by segment index and arc length therein."""
+        """Result of :meth:`evaluate` without a loop over the segments.
+
+        ``index`` is the segment of each point and ``along`` the arc length from its
+        start [m].
+        """
         assert self._arcs is not None
         x, y, way_x, way_y, radius, first, rate, sign, bend = self._arcs[:, index]
         angle = first + rate * along
@@ -170,17 +182,17 @@ class ToothProfile:
         return points, normals, bend
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance of points near the flank, positive outside the steel.
+        """Signed distance of points from the flank, with normal and curvature.
 
-        The result refers to the closest foot on any segment or edge. The distance of
-        points that project on neither (beyond the ends of the chain) is infinite.
+        The result refers to the closest foot on any segment or edge. The distance is
+        infinite for points beyond the ends of the chain, which have no foot on it.
 
         Args:
             points: Points of shape (n, 2) [m].
 
         Returns:
-            Distances (n,) [m]; outward normals (n, 2) and curvatures (n,) [1/m] at the
-            foot.
+            Distances (n,) [m], positive outside the steel; outward normals (n, 2) and
+            curvatures (n,) [1/m] at the foot.
         """
         n = len(points)
         best = np.full(n, np.inf)
@@ -193,7 +205,7 @@ class ToothProfile:
             normals[take] = normal[take]
             curvature[take] = bend if isinstance(bend, float) else bend[take]
         for vertex, before, after in self._edges:
-            # in a wedge outside an edge, the edge itself is the closest point
+            # between the two normals at an edge, the edge itself is the closest point
             rel = points - vertex
             r = np.hypot(rel[:, 0], rel[:, 1])
             wedge = (rel @ before >= 0.0) & (rel @ after <= 0.0)

@@ -18,8 +18,9 @@ Point = tuple[float, float]
 class Piece(Protocol):
     """Interface of the segments of a flank.
 
-    ``side`` is +1 for an external tooth and -1 for an internal tooth: on the way from
-    tip to root along the right flank, the steel of an external tooth is on the right.
+    ``side`` is +1 for an external tooth and -1 for an internal tooth. On the way from
+    tip to root along the right flank, the steel is on the right-hand side of the path
+    for an external tooth and on the left-hand side for an internal tooth.
     """
 
     @property
@@ -53,7 +54,9 @@ class Piece(Protocol):
         ...
 
     def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
-        """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m].
+        """Points (n, 2) [m], outward unit normals (n, 2) and curvatures (n,) [1/m].
+
+        Curvatures are positive where the steel is convex.
 
         Args:
             s: Arc lengths from the start of the segment (n,) [m].
@@ -64,15 +67,16 @@ class Piece(Protocol):
     def project(
         self, points: Array, side: float
     ) -> tuple[Array, Array, Array | float, Bools]:
-        """Foot of the perpendicular from points to the segment.
+        """Distances of points from the segment along its normal.
 
         Args:
             points: Points of shape (n, 2) [m].
             side: +1 for an external tooth, -1 for an internal tooth.
 
         Returns:
-            Signed distance (n,) [m], positive outside the steel; outward normal (n, 2)
-            and curvature [1/m] at the foot; whether the foot is on the segment (n,).
+            Distances (n,) [m], positive outside the steel; outward normals (n, 2) and
+            curvatures [1/m] at the feet of the perpendiculars, one value for arcs and
+            lines; whether the feet are on the segment (n,).
         """
         ...
 
@@ -135,7 +139,7 @@ class Segment:
         return points, normals, np.full(t.shape, self.curvature)
 
     def project(self, points: Array, side: float) -> tuple[Array, Array, float, Bools]:
-        """Foot of the perpendicular on the line or the arc; see :class:`Piece`.
+        """Distances of points from the line or arc; see :meth:`Piece.project`.
 
         Args:
             points: Points of shape (n, 2) [m].

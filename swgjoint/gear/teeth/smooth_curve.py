@@ -15,9 +15,10 @@ from swgjoint.typing import Array
 NODES = 33
 """Default number of nodes; involutes and fillets then have errors below 1e-13 m."""
 CLOSEST = 1e-6
-"""Smallest distance of nodes [m]; tangents of closer nodes are lost in round-off."""
+"""Smallest distance between nodes [m]. Round-off would affect the tangents of closer
+nodes too much."""
 DENSE = 1025
-"""Default number of points that place the nodes."""
+"""Default number of points from which equally spaced nodes are determined."""
 STEPS = 8
 """Largest number of Newton steps to a foot; four are usually sufficient."""
 
@@ -28,10 +29,10 @@ _GAUSS_X, _GAUSS_W = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SmoothCurve:
-    """Quintic curve by arc length, exact in point, normal and curvature at its nodes.
+    """Quintic curve over the arc length with exact values at its nodes.
 
-    The curve is twice continuously differentiable, as required by the Newton iterations
-    of contact.
+    At the nodes, points, normals and curvatures are exact. The curve is twice
+    continuously differentiable, as the Newton iterations of contact require.
     """
 
     name: str
@@ -39,8 +40,9 @@ class SmoothCurve:
     stations: Array
     """Arc length at the nodes, starting at zero (n,) [m]."""
     coefficients: Array
-    """Power coefficients per interval (n - 1, 6, 2) [m], for the arc length from the
-    start of the interval divided by its length."""
+    """Coefficients of the polynomial in each interval, from the constant upwards
+    (n - 1, 6, 2) [m]. The variable is the arc length from the start of the interval,
+    divided by the length of the interval."""
     edge: bool = False
     """Whether the curve starts at an edge instead of a tangent junction."""
 
@@ -71,7 +73,7 @@ class SmoothCurve:
         return float(x), float(y)
 
     def _derivatives(self, s: Array) -> tuple[Array, Array, Array]:
-        """Points and their first two derivatives by the arc length, each (n, 2)."""
+        """Points [m] and their first two derivatives along the arc, each (n, 2)."""
         k = np.searchsorted(self.stations[1:-1], s, side="right")
         h = self._steps[k]
         t = (s - self.stations[k]) / h
@@ -115,13 +117,19 @@ class SmoothCurve:
 
     @cached_property
     def _coarse(self) -> tuple[Array, Array]:
-        """Arc length and point of every fourth node, as starts of foot searches."""
+        """Arc lengths [m] and points [m] of every fourth node and the last one.
+
+        The search for a foot starts at one of them.
+        """
         index = np.unique(np.append(np.arange(0, len(self.stations), 4), -1))
         s = self.stations[index % len(self.stations)]
         return np.sort(s), self._derivatives(np.sort(s))[0]
 
     def project(self, points: Array, side: float) -> tuple[Array, Array, Array, Bools]:
-        """Foot of the perpendicular by Newton's method from the nearest coarse node.
+        """Distances of points from the curve along its normal.
+
+        Newton's method finds the foot of each perpendicular, starting at the nearest
+        coarse node.
 
         Args:
             points: Points of shape (n, 2) [m].
@@ -131,7 +139,7 @@ class SmoothCurve:
             See :meth:`.segments.Piece.project`.
         """
         coarse_s, coarse = self._coarse
-        # squared distances except for a term common to all nodes
+        # squared distances without the term that is the same for all nodes
         near = np.sum(coarse**2, axis=-1) - 2.0 * points @ coarse.T
         s = coarse_s[np.argmin(near, axis=1)]
         moving = np.arange(len(s))
@@ -178,7 +186,7 @@ def smooth_curve(
         last: Parameter at the root end.
         side: +1 for an external tooth, -1 for an internal tooth.
         nodes: Largest number of nodes, equally spaced along the curve.
-        dense: Number of points that place the nodes.
+        dense: Number of points from which the positions of the nodes are determined.
         edge: Whether the curve starts at an edge instead of a tangent junction.
     """
     from scipy.interpolate import make_interp_spline
@@ -197,7 +205,7 @@ def smooth_curve(
     inner = (u[:-1, None] + chord[:, None] * _GAUSS_X).ravel()
     speed = np.linalg.norm(spline(inner, 1), axis=-1).reshape(-1, _GAUSS_X.size)
     stations = np.concatenate([[0.0], np.cumsum(speed @ _GAUSS_W * chord)])
-    # the normal rotates by -curvature per arc length, as seen from the steel
+    # along the arc, the normal rotates by -side times the curvature
     turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
     rate = make_interp_spline(u, turn, k=5)(u, 1)
     curvature = -side * rate / np.linalg.norm(spline(u, 1), axis=-1)

@@ -1,4 +1,4 @@
-"""Values with which an infeasible tooth becomes feasible."""
+"""Changes of single values that make an infeasible tooth feasible."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ MEMBER_KEYS = {
     "thickness_coefficient": 1.5,
     "pressure_angle_deg": 59.0,
 }
-"""Keys outside the profile that shape a tooth, with their largest trial value."""
+"""Keys outside the profile table that affect a tooth, with their largest trial value in
+the unit of the key."""
 SHOWN = 2
-"""Number of bounds in a message."""
+"""Largest number of bounds in a message."""
 
 
 def with_bounds(
     fault: ToothFault, start: Blank, build: Callable[[Blank], ToothProfile]
 ) -> ToothFault:
-    """The fault with the accepted values; unchanged if the search finds none.
+    """The fault with accepted values in its message; unchanged if none are found.
 
-    The message states bounds of single keys that make the tooth feasible: first that of
-    the key in the fault, then that of the smallest change. If there is none, it states
-    the factor by which all lengths of the profile must change.
+    The message states bounds of single keys within which the tooth becomes feasible:
+    first the bound of the key in the fault, then the one that needs the smallest
+    change. If no single key has a bound, the message states the factor by which all
+    lengths of the profile must be multiplied.
 
     Args:
         fault: Reason why the tooth cannot be built.
@@ -63,17 +65,17 @@ def with_bounds(
         for key in nearest[:SHOWN]
     ]
     if not texts and (common := _common(start, lengths, builds)) is not None:
-        texts = [f"all lengths of the profile times {_text('', common)}"]
+        texts = [f"all lengths of the profile times a factor {_text('', common)}"]
         if fault.key in lengths:
             size = start.value(fault.key) * common.accepted
-            texts[0] += f", this one {size:.4g}{_unit(fault.key)}"
+            texts[0] += f", which makes this value {size:.4g}{_unit(fault.key)}"
     return fault.with_bounds(" or ".join(texts)) if texts else fault
 
 
 def _common(
     start: Blank, lengths: list[str], builds: Callable[[Blank], bool]
 ) -> AcceptedBound | None:
-    """Bound of a common factor of all lengths, starting from the rejected factor 1."""
+    """Bound of a common factor of all lengths; None if the search finds no factor."""
 
     def builds_with(factor: float) -> bool:
         changed = start

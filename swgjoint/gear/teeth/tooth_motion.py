@@ -2,7 +2,8 @@
 
 The teeth are rigid and move with the deflected neutral line. The parameter theta is the
 angle of the tooth on the undeflected rim, counter-clockwise from the lobe of the wave
-generator. At zero, the tooth is in the middle of its tooth space for every layout.
+generator. At theta = 0, the tooth is in the middle of its tooth space, whichever member
+of the drive is fixed.
 """
 
 from __future__ import annotations
@@ -20,34 +21,35 @@ from swgjoint.typing import Array
 Receiver = Literal["flexspline", "circular_spline"]
 
 SAME = 1e-9
-"""Largest difference of identical motions, relative to the radius."""
+"""Largest difference between motions that count as identical, relative to the radius
+[-]."""
 
 _MIRROR = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class MovedFlank:
-    """Rigid motions of vectors, one per parameter: q = turn (p) + shift."""
+    """Rigid motions q = turn p + shift of points p, one for each value of theta."""
 
     turn: Array
     """Rotation or reflection matrices (n, 2, 2)."""
     shift: Array
     """Translations (n, 2) [m]."""
     d_turn: Array
-    """Derivative of ``turn`` by theta (n, 2, 2)."""
+    """Derivatives of ``turn`` with respect to theta (n, 2, 2) [1/rad]."""
     d_shift: Array
-    """Derivative of ``shift`` by theta (n, 2) [m/rad]."""
+    """Derivatives of ``shift`` with respect to theta (n, 2) [m/rad]."""
 
     def points(self, p: Array) -> Array:
         """Images of points p (n, ..., 2) [m]; the first axis matches the motions."""
         return _apply(self.turn, p) + _wide(self.shift, p)
 
     def vectors(self, v: Array) -> Array:
-        """Images of directions v (n, ..., 2)."""
+        """Images of direction vectors v (n, ..., 2), which are not translated."""
         return _apply(self.turn, v)
 
     def velocities(self, p: Array) -> Array:
-        """Derivative of the images of points p by theta (n, ..., 2) [m/rad]."""
+        """Derivatives of the images of p with respect to theta (n, ..., 2) [m/rad]."""
         return _apply(self.d_turn, p) + _wide(self.d_shift, p)
 
 
@@ -60,7 +62,7 @@ def _wide(shift: Array, like: Array) -> Array:
 
 
 def _rotation(angle: Array) -> tuple[Array, Array]:
-    """Rotation matrices and their derivative by the angle, each (n, 2, 2)."""
+    """Rotation matrices and their derivatives by the angle, each (n, 2, 2)."""
     c, d = np.cos(angle), np.sin(angle)
     turn = np.stack([np.stack([c, -d], -1), np.stack([d, c], -1)], axis=-2)
     return turn, np.stack([np.stack([-d, -c], -1), np.stack([c, -d], -1)], axis=-2)
@@ -78,12 +80,17 @@ class TeethOnRim(Protocol):
         """Radius of the reference point of the tooth [m]."""
 
     def pose(self, theta: ArrayLike) -> Pose:
-        """Pose of a tooth at the angle theta [rad] from a lobe on the rim."""
+        """Pose of a tooth in the frame of the wave generator.
+
+        Args:
+            theta: Angles on the undeflected rim from the first lobe, counter-clockwise
+                (n,) [rad].
+        """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothMotion:
-    """Relative motion of the teeth at one lobe of the wave generator."""
+    """Relative motion of the teeth of both members at one lobe."""
 
     line: TeethOnRim
     """Motion of the teeth on the rim."""
@@ -92,25 +99,29 @@ class ToothMotion:
     teeth_circular_spline: int
     """Number of teeth of the circular spline."""
     lobe: int = 0
-    """Index of the lobe."""
+    """Index of the lobe, counter-clockwise from 0."""
     mirrored: bool = False
-    """Whether left and right are exchanged, which gives the motion of left flanks."""
+    """Whether left and right are exchanged; right flanks then move like left ones."""
 
     @property
     def half_range(self) -> float:
-        """Half the angle between two lobes [rad]."""
+        """Half the angle between neighbouring lobes [rad]."""
         return np.pi / self.line.lobes
 
     def in_space(self, theta: Array) -> MovedFlank:
         """Map from the frame of the flexspline tooth to the frame of the tooth space.
 
-        The space of the circular spline is centred on +y with the gear axis at the
-        origin.
+        The frame of the tooth space in the circular spline has the gear axis as its
+        origin and the middle of the space on +y.
+
+        Args:
+            theta: Positions of the motion (n,) [rad].
         """
         sign = -1.0 if self.mirrored else 1.0
         at_lobe = 2.0 * np.pi * self.lobe / self.line.lobes
         pose = self.line.pose(sign * theta + at_lobe)
-        # the wave generator turns by alpha = -theta z_fs/z_cs about the circular spline
+        # angle of the wave generator relative to the circular spline,
+        # alpha = -theta z_fs/z_cs
         rate = -self.teeth_flexspline / self.teeth_circular_spline
         alpha = sign * theta * rate - at_lobe
         turn, d_turn = _rotation(pose.angle + alpha)
@@ -149,7 +160,11 @@ class ToothMotion:
         )
 
     def to_flexspline(self, theta: Array) -> MovedFlank:
-        """Inverse map, from a right flank of the circular spline to the flexspline."""
+        """Inverse of :meth:`to_circular_spline`, from circular spline to flexspline.
+
+        Args:
+            theta: Positions of the motion (n,) [rad].
+        """
         forward = self.to_circular_spline(theta)
         turn = np.swapaxes(forward.turn, -1, -2)
         d_turn = np.swapaxes(forward.d_turn, -1, -2)
@@ -164,7 +179,7 @@ class ToothMotion:
         """Map from the right flank of the other member to that of the receiver.
 
         Args:
-            receiver: Member in whose tooth frame the result is.
+            receiver: Member whose tooth frame contains the result.
             theta: Positions of the motion (n,) [rad].
         """
         if receiver == "flexspline":
@@ -177,7 +192,7 @@ def _like(vector: Array, matrix: Array) -> Array:
 
 
 def _facing(teeth: int) -> Array:
-    """Map from the frame of a tooth space to that of its mirrored right tooth."""
+    """Matrix from the frame of a tooth space to that of its mirrored right tooth."""
     c, d = np.cos(np.pi / teeth), np.sin(np.pi / teeth)
     return np.array([[-c, d], [d, c]])
 
@@ -185,7 +200,7 @@ def _facing(teeth: int) -> Array:
 def tooth_motions(
     design: Design, line: TeethOnRim | None = None
 ) -> tuple[ToothMotion, ...]:
-    """Distinct motions of the teeth at all lobes, and of both flanks if they differ.
+    """Distinct motions of right and left flanks at all lobes.
 
     Args:
         design: The drive.

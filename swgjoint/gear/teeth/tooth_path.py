@@ -1,8 +1,9 @@
 """Rigid flexspline teeth passing through the tooth spaces: path, clearance, overlap.
 
-Teeth and rim deform no further than the shape of the neutral line, so overlap measures
-what elastic deformation must take up and is not a stress. One tooth, followed to half
-the angle to the next lobe on either side, represents all teeth at all times.
+The teeth are rigid and follow the prescribed neutral line. An overlap is therefore the
+distance that elastic deformation would have to take up; it is not a measure of stress.
+One tooth, followed from half-way before a lobe to half-way after it, represents all
+teeth at all times.
 """
 
 from __future__ import annotations
@@ -22,28 +23,36 @@ from swgjoint.typing import Array
 Where = Literal["flank", "flexspline_tip", "circular_spline_tip"]
 
 POSITIONS, POINTS = 721, 401
-"""Default number of positions of the tooth and of points on either flank."""
+"""Default numbers of positions of the tooth and of points on either flank."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothPath:
-    """Passage of a rigid flexspline tooth through a space of the circular spline."""
+    """Passage of a rigid flexspline tooth through a space of the circular spline.
+
+    ``clearance``, ``station``, ``point`` and ``where`` are, at every position, those of
+    the lobe and flank with the smallest clearance. ``tip``, ``angle`` and ``flank``
+    describe the motion at the first lobe.
+    """
 
     theta: Array
     """Angle of the tooth from the lobe, on the undeflected rim (n,) [rad]."""
     tip: Array
     """Middle of the tooth's top land in the frame of the space (n, 2) [m]."""
     angle: Array
-    """Inclination of the tooth to the axis of the space (n,) [rad]."""
+    """Inclination of the tooth to the axis of the space, counter-clockwise (n,)
+    [rad]."""
     clearance: Array
-    """Smallest distance of the flanks, negative where they overlap and infinite where
-    the tooth is outside the space (n,) [m]."""
+    """Smallest distance between the flanks, negative where they overlap and infinite
+    where the tooth is outside the space (n,) [m]."""
     station: Array
     """Arc length of the closest point on the flexspline profile (n,) [m]."""
     point: Array
-    """Position of that point in the frame of the right half of the space (n, 2) [m]."""
+    """Position of the closest point in the frame of the circular-spline tooth that
+    :meth:`.ToothMotion.to_circular_spline` describes (n, 2) [m]."""
     where: tuple[Where, ...]
-    """Closest features: the flanks, or the edge or rounding at a tip."""
+    """Location of the closest point at every position: a flank, or the edge or rounding
+    at the tip of a member (n,)."""
     flank: Array
     """Right flank of the tooth at every position, in the frame of the space, for
     drawing (n, m, 2) [m]."""
@@ -57,12 +66,12 @@ class ToothPath:
 
     @property
     def smallest_clearance(self) -> float:
-        """Smallest clearance over the passage, negative for overlap [m]."""
+        """Smallest clearance during the passage, negative for overlap [m]."""
         return float(self.clearance.min())
 
     @property
     def interference(self) -> float:
-        """Largest overlap over the passage; zero if there is none [m]."""
+        """Largest overlap during the passage [m]; zero if there is none."""
         return max(0.0, -self.smallest_clearance)
 
     @property
@@ -83,7 +92,7 @@ def tooth_path(
     """Passage of the flexspline tooth through the space, for the worst lobe and flank.
 
     Args:
-        design: Drive with both profiles and a wave generator.
+        design: The drive.
         positions: Number of positions from half-way before the lobe to half-way after.
         points: Number of points on either flank that are tested against the other
             flank.
@@ -122,8 +131,9 @@ def tooth_path(
 def _tip_end(profile: ToothProfile) -> float:
     """Arc length at which the tip of a flank ends [m].
 
-    The tip is a tip arc, or 0.1 % of the flank after an edge, because a touching edge
-    is found at the end of the flank itself.
+    The tip is the tip arc of the profile. A profile that starts at an edge has no such
+    arc; contact at the edge is then found at the first points of the flank, so the tip
+    is the first 0.1 % of the flank.
     """
     low, high = profile.contact_range
     names = [part.name for part in profile.segments]
@@ -139,10 +149,11 @@ def _passage(
     theta: Array,
     count: int,
 ) -> tuple[Array, Array, Array, Array]:
-    """Clearance, station, point and kind of the closest point per position.
+    """Clearance [m], station [m], point [m] and kind of the closest point per position.
 
-    Points of the flexspline flank are tested against the circular spline and vice
-    versa, so that an edge is found as a point of its own flank.
+    The kind is an index into the values of ``Where``. Points of the flexspline
+    flank are tested against the circular spline and vice versa, so that contact at an
+    edge is found as a point of the flank that ends there.
     """
     n = len(theta)
     low, high = flexspline.contact_range

@@ -10,13 +10,14 @@ from swgjoint.gear.teeth.profile import ToothProfile
 
 
 def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
-    """Tooth profile of ``flexspline`` or ``circular_spline``.
+    """Tooth profile of a member, of the kind in its profile table.
 
     Args:
         design: The drive.
         member: ``flexspline`` or ``circular_spline``.
         bounds: Whether an error for an arc profile states which values would be
-            accepted, which takes as long as building a thousand arc profiles.
+            accepted. The search for them takes as long as building a thousand arc
+            profiles.
 
     Raises:
         DesignError: If the tooth cannot be built, in one line that names the key.
