@@ -9,7 +9,8 @@ from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import CatalogueRow, table
 
 SIMILAR = 1.6
-"""Largest factor between the torsion T1/K1 of a size and the median of its ratio class.
+"""Largest factor between the torsion T1/K1 of a size and the median of its ratio class
+[-].
 
 T1 and K1 both grow with the cube of the size, so their quotient is nearly the same for
 all sizes. A larger factor indicates a misplaced digit."""

@@ -18,7 +18,7 @@ _ANGLES: dict[str, tuple[tuple[int, int], tuple[int, int]]] = {
 
 
 def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> float:
-    """Signed ratio i of input to output rotation.
+    """Signed ratio i of input to output rotation [-].
 
     With the wave generator as input, :math:`i = z_D/(z_D - z_F)`, where D is the driven
     and F the fixed member: for 120/122 teeth, -60 with the circular spline fixed and

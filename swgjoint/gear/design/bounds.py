@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from math import floor, isfinite, log, log10
 
 STEP = 1.05
-"""Factor between successive trial values."""
+"""Factor between successive trial values [-]."""
 REACH = 20.0
-"""Largest factor between a trial value and the rejected value."""
+"""Largest factor between a trial value and the rejected value [-]."""
 DIGITS = 4
 """Significant digits of a bound, which is rounded towards the accepted values."""
 

@@ -83,6 +83,7 @@ class Design(Section):
 
     @model_validator(mode="after")
     def _members_fit(self) -> Self:
+        """Check the keys of different tables against each other."""
         faults: list[tuple[str, str]] = []
         radius = self.flexspline_inner_radius / mm
         if radius <= 0:

@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from swgjoint.gear.teeth.tooth_path import ToothPath
 
 MEMBERS = ("flexspline", "circular_spline")
+"""The toothed members."""
 CLOSED = 1e-12
 """Largest accepted gap between two segments of a flank [m]."""
 OVERLAP = 0.01
-"""Largest accepted overlap of rigid flanks, as a fraction of the module.
+"""Largest accepted overlap of rigid flanks, as a fraction of the module [-].
 
 Elastic deformation must take up this overlap. The limit is a rule of thumb: in all
 bundled designs, teeth without backlash overlap by 0.05 to 0.32 % of the module, and

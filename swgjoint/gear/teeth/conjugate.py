@@ -86,6 +86,7 @@ class _Builder(RootBuilder):
     """Builds a complete flank from the branches of an envelope."""
 
     def build(self) -> ToothProfile:
+        """Complete profile of the generated member."""
         start, envelope = self.start, self.envelope
         reach, floor = envelope.summit, envelope.floor
         if start.side * (reach - start.root) <= 0.0:
@@ -282,7 +283,7 @@ class _Builder(RootBuilder):
     def _round_part(
         self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
     ) -> float:
-        """Position at which the path of an edge turns too sharply, else ``last``."""
+        """Position at which the path of an edge turns too sharply, or ``last`` [rad]."""
         t = np.linspace(first, last, 401)
         points, normals = trace(t)
         turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
@@ -291,7 +292,7 @@ class _Builder(RootBuilder):
         return float(t[np.argmax(sharp)]) if sharp.any() else last
 
     def _summit(self, run: EnvelopeRun, first: float) -> float:
-        """Position at which the edge is deepest in the tooth space of the receiver."""
+        """Position at which the edge is deepest in the space of the receiver [rad]."""
         from scipy.optimize import minimize_scalar
 
         trace, side = self._trace(run), self.start.side

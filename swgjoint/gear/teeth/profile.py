@@ -217,7 +217,7 @@ class ToothProfile:
 
     @cached_property
     def _edges(self) -> tuple[tuple[Array, Array, Array], ...]:
-        """Edge points with the directions of the chain before and after them."""
+        """Edge points [m] with the directions of the chain before and after them."""
         edges = []
         for left, right in pairwise(self.segments):
             if right.edge:

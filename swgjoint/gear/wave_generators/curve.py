@@ -56,7 +56,7 @@ class ClosedCurve(ABC):
         """
 
     def _within(self, s: ArrayLike) -> Array:
-        """Arc length reduced to the first turn."""
+        """Arc lengths reduced to the first turn [m]."""
         return np.asarray(np.mod(np.asarray(s, dtype=float), self.perimeter))
 
     def outline(self, count: int) -> Array:

@@ -67,14 +67,14 @@ class Arc:
         return self.radius * (self.end - self.start)
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`OutlinePiece`."""
+        """Points, normals and curvatures; see :meth:`OutlinePiece.evaluate_at`."""
         angle = self.start + s / self.radius
         normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         points = np.asarray(self.centre) + self.radius * normals
         return points, normals, np.full(np.shape(s), 1.0 / self.radius)
 
     def foot(self, points: Array) -> Array:
-        """See :class:`OutlinePiece`."""
+        """Arc length of the nearest point (n,) [m]; see :meth:`OutlinePiece.foot`."""
         middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
         rel = points - np.asarray(self.centre)
         c, d = cos(middle), sin(middle)  # angle from the middle, away from branch cuts
@@ -82,7 +82,7 @@ class Arc:
         return np.asarray(self.radius * (np.clip(angle, -half, half) + half))
 
     def largest_radius(self) -> float:
-        """See :class:`OutlinePiece`."""
+        """Largest distance of the piece from the axis [m]."""
         ends, normals, _ = self.evaluate_at(np.array([0.0, self.length]))
         # the point of the circle farthest from the axis is on the ray through its
         # centre; it counts if it is on the arc
@@ -112,7 +112,7 @@ class Line:
         return np.subtract(self.end, self.start) / self.length
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`OutlinePiece`."""
+        """Points, normals and curvatures; see :meth:`OutlinePiece.evaluate_at`."""
         s = np.asarray(s, dtype=float)
         direction = self._direction
         points = np.asarray(self.start) + s[:, None] * direction
@@ -120,12 +120,12 @@ class Line:
         return points, normals, np.zeros(s.shape)
 
     def foot(self, points: Array) -> Array:
-        """See :class:`OutlinePiece`."""
+        """Arc length of the nearest point (n,) [m]; see :meth:`OutlinePiece.foot`."""
         along = (points - np.asarray(self.start)) @ self._direction
         return np.asarray(np.clip(along, 0.0, self.length))
 
     def largest_radius(self) -> float:
-        """See :class:`OutlinePiece`."""
+        """Largest distance of the piece from the axis [m]."""
         return max(hypot(*self.start), hypot(*self.end))
 
 
@@ -165,7 +165,10 @@ class Parabola:
         return np.array([[c, d], [-d, c]])
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`OutlinePiece`; Newton's method inverts the arc length."""
+        """Points, normals and curvatures; see :meth:`OutlinePiece.evaluate_at`.
+
+        Newton's method inverts the arc length.
+        """
         a = self.coefficient
         wanted = self._from_apex(self.start) - np.asarray(s, dtype=float)
         u = 2.0 * a * wanted
@@ -183,7 +186,7 @@ class Parabola:
         return points, normals @ self._rotation, 2.0 * a / size**3
 
     def foot(self, points: Array) -> Array:
-        """See :class:`OutlinePiece`.
+        """Arc length of the nearest point (n,) [m]; see :meth:`OutlinePiece.foot`.
 
         The perpendicular to the parabola through the local point (p, q) meets it at the
         largest root of x^3 + c x = h with c = (1 + 2 a q)/(2 a^2) and
@@ -207,7 +210,7 @@ class Parabola:
         return np.asarray(self._from_apex(self.start) - along)
 
     def largest_radius(self) -> float:
-        """See :class:`OutlinePiece`."""
+        """Largest distance of the piece from the axis [m]."""
         a = self.coefficient
         ox, oy = -self._rotation @ np.asarray(self.apex)
         roots = np.roots([2.0 * a * a, 0.0, 1.0 + 2.0 * a * oy, -ox])

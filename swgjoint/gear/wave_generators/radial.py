@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.typing import Array
 
-_PANELS = 720
+_PANELS = 720  # quadrature panels per turn
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
