@@ -21,10 +21,12 @@ from math import cos, cosh, sin, sinh, sqrt, tanh
 
 EDGE_LAYER = 1.5
 """Width over which both edges together relieve the axial stress, divided by the square
-root of module times rim thickness. The value is calibrated with solid models of the
-rings of eleven drives in CalculiX (C3D20R, quarter models bent by a traction cos 2 phi
-on the bore; rims of 0.4 to 2 mm, modules of 0.2 to 1 mm, widths of 1 to 40 rim
-thicknesses). With it, the two-lobe stiffness is within 0.8 % of every solid model, and
+root of module times rim thickness [-].
+
+The value is calibrated with solid models of the rings of eleven drives in CalculiX
+(elements C3D20R; quarter models that a traction cos 2 phi on the bore bends; rims of
+0.4 to 2 mm, modules of 0.2 to 1 mm, widths of 1 to 40 rim thicknesses). With this
+value, the stiffness against two-lobe bending is within 0.8 % of every solid model, and
 within 0.5 % for widths of at least four rim thicknesses."""
 
 

@@ -331,7 +331,7 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
         raise start.fault(
             "profile.dedendum_offset_mm",
             f"the arcs intersect: their centres are {distance / mm:.4g} mm apart;"
-            " accepted: an offset for a distance of at least"
+            " accepted: an offset that gives a distance of at least"
             f" {(r_1 + r_2) / mm:.4g} mm",
         )
     alpha = atan2(apart[1], apart[0]) + acos((r_1 + r_2) / distance)

@@ -283,7 +283,7 @@ class _Builder(RootBuilder):
     def _round_part(
         self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
     ) -> float:
-        """Position at which the path of an edge turns too sharply, or ``last`` [rad]."""
+        """Position where the path of an edge turns too sharply, else ``last`` [rad]."""
         t = np.linspace(first, last, 401)
         points, normals = trace(t)
         turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))

@@ -176,6 +176,7 @@ def neutral_line(design: Design) -> NeutralLine:
         raise DesignError(
             f"{design.drive.name}: wave_generator: the length of its outline, "
             f"{outline.perimeter / mm:.4g} mm, differs too much from that of the bore, "
-            f"{2 * np.pi * design.flexspline_inner_radius / mm:.4g} mm"
+            f"{2 * np.pi * design.flexspline_inner_radius / mm:.4g} mm; accepted: a "
+            "smaller difference"
         )
     return line

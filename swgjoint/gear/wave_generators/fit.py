@@ -183,7 +183,8 @@ def _lobes_reach(design: Design, outline: TableOutline) -> Check:
         value=least,
         unit="mm",
         limit=bore,
-        fault=f"{design.drive.name}: wave_generator.radius_mm: {least:.6g} mm at one of"
-        f" {design.lobes} lobes, the first at angle 0; accepted: more than the inner"
-        f" radius of the flexspline, {bore:.6g} mm",
+        fault=f"{design.drive.name}: wave_generator.radius_mm: the radius is"
+        f" {least:.6g} mm at one of the {design.lobes} lobes, of which the first is at"
+        " angle 0; accepted: more than the inner radius of the flexspline,"
+        f" {bore:.6g} mm",
     )
