@@ -2,8 +2,8 @@
 
 The circular spline is generated from the flexspline or vice versa. The generated flank
 is the envelope of the moving flank of the other member (article on an 80:1 drive,
-section "Derivation of the conjugate circular spline profile"). The article uses the
-deflection w = w_0 cos 2 theta, whereas this module uses the kinematics of
+"Derivation of the conjugate circular spline profile"). The article uses the deflection
+w = w_0 cos 2 theta, whereas this module uses the kinematics of
 :mod:`swgjoint.gear.teeth.neutral_line`. Towards the root, a straight line leaves the
 envelope, and a circular fillet joins this line to the root circle. Both keep clear of
 the mating tip.

@@ -23,7 +23,15 @@ continues in tangential direction."""
 
 
 class RootBuilder:
-    """Builds the straight line and the fillet that join the envelope to the root."""
+    """Builds the straight line and the fillet that join the envelope to the root.
+
+    Args:
+        start: Blank of the generated member.
+        envelope: Envelope of the flank of the other member.
+
+    Raises:
+        DesignError: If the thickness coefficient of the member exceeds 1.
+    """
 
     def __init__(self, start: Blank, envelope: Envelope) -> None:
         self.start, self.envelope = start, envelope
