@@ -29,7 +29,7 @@ from swgjoint.gear.design.design import Design, MemberName
 
 
 def torque_shares(design: Design) -> dict[MemberName, float]:
-    """Torque on the mounting of each toothed member over the output torque [-]."""
+    """Signed torque on each toothed member's mounting over the output torque [-]."""
     rest = 1.0 - 1.0 / design.ratio
     flexspline, circular_spline = {
         "circular_spline_fixed": (1.0, rest),
@@ -40,7 +40,7 @@ def torque_shares(design: Design) -> dict[MemberName, float]:
 
 
 def coupling_share(design: Design) -> float:
-    """Torque on the coupling, divided by the output torque [-]; it has a sign."""
+    """Signed torque on the coupling, divided by the output torque [-]."""
     if design.drive.layout == "wave_generator_fixed":
         return 1.0 - 1.0 / design.ratio
     return 1.0 / design.ratio

@@ -1,10 +1,10 @@
 r"""Closed-form force, stress and fatigue strength of the flexspline as a thin shell.
 
-The formulas come from two articles, which are called "deformation force" (the force
-that deforms the flexspline XB1-100-80) and "stress and fatigue" (stress and fatigue
-strength of the flexible gear) here. The articles do not number their equations, so each
-equation is cited by the symbol of its result. ``models/studies/articles.toml`` contains
-the values that the articles print.
+The formulas come from two articles. This module calls them "deformation force" (on the
+force that deforms the flexspline XB1-100-80) and "stress and fatigue" (on stress and
+fatigue strength of the flexible gear). The articles do not number their equations, so
+each equation is cited by the symbol of its result. ``models/studies/articles.toml``
+contains the values that the articles print.
 
 The wall is inextensional. Its radial deflection at the open end is
 :math:`w = w_0\cos 2\varphi` on a wave generator and a Fourier series under point loads.

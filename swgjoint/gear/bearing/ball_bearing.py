@@ -187,7 +187,7 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
             - larger / smaller
         )
 
-    # K - E is zero at m = 0, so almost equal curvatures are treated as a circle
+    # K - E is zero at m = 0, so almost equal curvatures are treated as equal
     kappa = 1.0
     if larger / smaller > 1.0 + 1e-6:
         kappa = brentq(missed, 1.0 + 1e-7, 10.0 * larger / smaller, xtol=1e-13)

@@ -177,8 +177,8 @@ class TwoArc(Section):
 
     The centre of each arc is given by its ``offset`` from the tooth axis and by its
     ``shift`` from the pitch circle along the radius. By default, the dimensions have
-    the proportions of the article; the article does not state a root radius. The design
-    ``dca-80-to-1`` describes the drive of the article.
+    the proportions of the article. The article states no root radius; the default is
+    0.6 modules. The design ``dca-80-to-1`` describes the drive of the article.
     """
 
     kind: Literal["two_arc"] = "two_arc"

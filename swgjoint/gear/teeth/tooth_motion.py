@@ -101,7 +101,8 @@ class ToothMotion:
     lobe: int = 0
     """Index of the lobe, counter-clockwise from 0."""
     mirrored: bool = False
-    """Whether left and right are exchanged; right flanks then move like left ones."""
+    """Whether left and right are exchanged, so that a right flank represents a left
+    flank."""
 
     @property
     def half_range(self) -> float:
