@@ -60,7 +60,7 @@ def conjugate_profile(
 
     The pair has no backlash if the thickness coefficient c_P of ``member`` is 1. A
     smaller coefficient rotates the flank back by (1 - c_P) alpha_T / 2, as for other
-    profiles (thesis 6.3).
+    profiles, thesis (6.3).
 
     Args:
         design: The drive; the profile table of ``member`` affects only the root.
