@@ -1,1 +1,1 @@
-"""Finite elements of the drive; the only place where scikit-fem is imported."""
+"""Finite-element models of the drive; only this package imports scikit-fem."""

@@ -47,13 +47,14 @@ def simulate_meshing(
         model: Fidelity, ``2d`` or, for a design with a cup, ``3d``.
         torque: Torque T that the drive exerts on the output, constant over the turn
             [N·m].
-        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1. None chooses
-            35, or the nearest number whose positions spread over the tooth pitch (see
-            :mod:`swgjoint.fe.meshing_phases`). An explicit number that does not spread
-            is used as it is, and the ``warnings`` of the result say so.
-        turn: Turns of the input.
-        nonlinear: Whether sectors rotate by large angles; False selects the cheap
-            linear level.
+        steps: Number of input positions; position k, from 0 to steps - 1, is at
+            k turn/steps turns. None chooses 35 or the nearest number whose positions
+            spread over the tooth pitch (see :mod:`swgjoint.fe.meshing_phases`). An
+            explicit number is used even if its positions do not spread; the
+            ``warnings`` of the result then report this.
+        turn: Rotation of the input [turns].
+        nonlinear: Whether sectors may rotate by large angles; False selects the cheaper
+            linear model.
         half: Whether to use the half model, which needs even tooth counts and a
             symmetric wave generator without errors; ``auto`` uses it wherever it
             applies.
@@ -62,8 +63,12 @@ def simulate_meshing(
         throw: Whether a position that cannot be solved raises an error. If not, the
             position keeps its outcome and the next one starts from the last solved one.
         progress: Called with the stage, the number of finished steps and their total.
-        keep: Folder for the state of every position of a 3D run; None keeps none.
+        keep: Folder in which a 3D run stores the state of every position; None stores
+            none.
         resume: Whether to resume the interrupted run in that folder.
+
+    Returns:
+        Results at all positions and at the equilibria before the first one.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.
@@ -130,12 +135,13 @@ def simulate_meshing(
         elif torque == 0.0:
             tried = follow.turn_unloaded(unloaded, angle)
             current = tried.state
-            # a failed one may be the last good state under the small torque
+            # a failed attempt may hold a state under the small torque: go on from the
+            # last solved position
             unloaded = tried if current.outcome.ok else unloaded
         else:
             current = follow.to_angle(state, angle)
         if throw:
-            checked(current, f"the input position {angle / deg:g} deg")
+            checked(current, f"solve at input angle {angle / deg:g} deg")
         if current.outcome.ok:
             state = current
         rows.append(_step(drive, follow, current, angle, torque, series))
@@ -181,7 +187,7 @@ def _step(
 
 
 def _pairs(model: SectorModel, state: State) -> int:
-    """Loaded tooth pairs of the whole drive; both flanks of a tooth count once."""
+    """Number of loaded tooth pairs, whole drive; two loaded flanks count as one."""
     if state.contacts is None:
         return 0
     return model.copies * len(set(state.contacts.sector.tolist()))

@@ -1,14 +1,14 @@
-r"""Phases within a tooth pitch of the positions of a simulation of meshing.
+r"""Phases of the input positions of a meshing simulation within the tooth pitch.
 
-A perfect drive repeats after :math:`2\pi/z` of the input, where z is the number of
-teeth of the fixed member (of the input member if the wave generator is fixed). The
-positions k t/N, k = 0 to N - 1, of t turns have the phases
+A perfect drive repeats after an input rotation of :math:`2\pi/z`, where z is the number
+of teeth of the fixed member (of the input member if the wave generator is fixed). If t
+turns are divided into N positions, position k = 0 to N - 1 has the phase
 
 .. math:: \varphi_k = k\,t z/N \bmod 1 .
 
-If t z and N have a large common divisor, many positions share one phase: with 162 teeth
-the nine positions of half a turn are nine pitches apart and therefore equivalent.
-Extremes and means then describe that phase, not the passage of a tooth.
+If t z and N have a large common divisor, many positions share one phase. With 162
+teeth, for example, nine positions over half a turn are nine pitches apart and therefore
+equivalent. Extremes and means then describe that phase, not the passage of a tooth.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array
 
 STEPS = 35
-"""Positions of the thesis (section 3.4.5); the default if they spread over the pitch.
-"""
+"""Number of input positions in the thesis (section 3.4.5); the default number if these
+positions spread over the pitch."""
 ENOUGH = 5
-"""Least number of phases of positions that spread over the pitch; no gap between
-neighbouring phases exceeds that of this many equally spaced ones."""
+"""Smallest number of phases that resolves the passage of a tooth: gaps between
+neighbouring phases must not exceed one pitch divided by this number."""
 LOOSE = 1.5
-"""Factor by which a gap may exceed the equal spacing if there are fewer positions than
-:data:`ENOUGH`."""
+"""Largest gap in multiples of the equal spacing if there are fewer positions than
+:data:`ENOUGH` [-]."""
 OVERLOAD = 10.0
-"""Multiple of the rated torque from which a torque is more likely a mistake than a
-load: strain wave gears ratchet below it [-]."""
+"""Multiple of the rated torque at which strain wave gears have already ratcheted, so
+that a larger torque is probably a mistake [-]."""
 _ROUND_OFF = 1e-6  # pitches
 
 
@@ -39,8 +39,8 @@ def phases_of(design: Design, steps: int, turn: float) -> Array:
 
     Args:
         design: The drive.
-        steps: Wave-generator positions.
-        turn: Turns of the input.
+        steps: Number of input positions.
+        turn: Rotation of the input [turns].
     """
     way = turn * design.periodicity / steps * np.arange(steps)
     phases = np.sort((way + 0.5 * _ROUND_OFF) % 1.0)
@@ -48,16 +48,17 @@ def phases_of(design: Design, steps: int, turn: float) -> Array:
 
 
 def spreads(design: Design, steps: int, turn: float) -> bool:
-    """Whether the positions resolve the passage of a tooth, or follow a part of it.
+    """Whether the positions spread over the pitch or closely follow a part of it.
 
-    They resolve it if the gap between neighbouring phases never exceeds a fifth of a
-    pitch; fewer than five positions may have gaps of 1.5 times their equal spacing.
-    Positions at most a fifth of a pitch apart follow the motion itself.
+    Positions spread if no gap between neighbouring phases exceeds a fifth of a pitch;
+    the gaps between fewer than five positions may reach 1.5 times the equal spacing.
+    Successive positions at most a fifth of a pitch apart follow the motion itself and
+    are always accepted.
 
     Args:
         design: The drive.
-        steps: Wave-generator positions.
-        turn: Turns of the input.
+        steps: Number of input positions.
+        turn: Rotation of the input [turns].
     """
     if abs(turn) * design.periodicity / steps <= 1.0 / ENOUGH:
         return True
@@ -68,37 +69,37 @@ def spreads(design: Design, steps: int, turn: float) -> bool:
 
 
 def spreading_steps(design: Design, steps: int, turn: float) -> int:
-    """Nearest number of positions that spread over the pitch; the larger if two are.
+    """Nearest number of positions that spread over the pitch; the larger one in a tie.
 
     Args:
         design: The drive.
         steps: Number of positions from which the search starts.
-        turn: Turns of the input.
+        turn: Rotation of the input [turns].
     """
     for apart in range(steps + int(ENOUGH * abs(turn) * design.periodicity) + 2):
         for wanted in (steps + apart, steps - apart):
             if wanted >= 1 and spreads(design, wanted, turn):
                 return wanted
-    raise AssertionError("positions a fifth of a pitch apart spread")
+    raise AssertionError("positions a fifth of a pitch apart are accepted")
 
 
 def default_steps(design: Design, turn: float) -> int:
-    """35 positions, or the nearest number that spreads over the pitch.
+    """Default number of positions: 35 or the nearest that spreads over the pitch.
 
     Args:
         design: The drive.
-        turn: Turns of the input.
+        turn: Rotation of the input [turns].
     """
     return spreading_steps(design, STEPS, turn)
 
 
 def unspread(design: Design, steps: int, turn: float) -> str | None:
-    """Number of phases that the positions hit, in words; None if they spread.
+    """Text that reports how few phases the positions have; None if they spread.
 
     Args:
         design: The drive.
-        steps: Wave-generator positions.
-        turn: Turns of the input.
+        steps: Number of input positions.
+        turn: Rotation of the input [turns].
     """
     if spreads(design, steps, turn):
         return None
@@ -107,33 +108,36 @@ def unspread(design: Design, steps: int, turn: float) -> str | None:
 
 
 def alike(design: Design, steps: int, turn: float) -> str | None:
-    """Warning that the positions miss the passage of a tooth; None if they spread.
+    """Warning that the positions do not resolve a tooth's passage; None if they do.
 
     Args:
         design: The drive.
-        steps: Wave-generator positions.
-        turn: Turns of the input.
+        steps: Number of input positions.
+        turn: Rotation of the input [turns].
     """
     where = unspread(design, steps, turn)
     if where is None:
         return None
     return (
-        f"{steps} positions over {turn:g} turns fall {where}, with"
-        f" {design.periodicity} pitches per turn: they do not spread over the pitch, so"
-        " output error and mean stresses do not describe the passage of a tooth;"
-        f" accepted without warning: --steps {spreading_steps(design, steps, turn)}"
+        f"{steps} positions over {turn:g} turns, with {design.periodicity} pitches per"
+        f" turn, fall {where}: they do not spread over the pitch, so the output error"
+        " and the mean stresses do not describe the passage of a tooth; to spread them,"
+        f" use --steps {spreading_steps(design, steps, turn)}"
     )
 
 
 def overload(design: Design, torque: float) -> str | None:
-    """Torque in multiples of the rated torque, in words; None below the overload.
+    """Text that compares an excessive torque with the rated torque.
 
     Args:
         design: The drive.
         torque: Output torque, of either sign [N·m].
+
+    Returns:
+        The text; None for torques below :data:`OVERLOAD` times the rated torque.
     """
     rated = ratings_of(design).rated_torque
     times = abs(torque) / rated
     if times < OVERLOAD:
         return None
-    return f"{torque:g} N·m is {times:.4g} x the rated torque of {rated:g} N·m"
+    return f"{torque:g} N·m ({times:.4g} times the rated torque of {rated:g} N·m)"

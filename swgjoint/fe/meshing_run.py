@@ -1,4 +1,4 @@
-"""Results of a simulation of meshing."""
+"""Results of a meshing simulation."""
 
 from __future__ import annotations
 
@@ -27,19 +27,21 @@ from swgjoint.units import arcsec, deg
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SetupState:
-    """One of the equilibria before the first wave-generator position."""
+    """One of the equilibria that precede the first input position."""
 
     name: str
     """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
     state: State
+    """The equilibrium."""
     stress: MemberMaxima
+    """Largest stresses of each member [Pa]."""
 
     @classmethod
     def from_state(cls, model: SectorModel, name: str, state: State) -> SetupState:
-        """Recover the stresses of a state.
+        """Setup state with the stresses recovered from its equilibrium.
 
         Args:
-            model: Ring model of the drive.
+            model: 2D sector model of the drive.
             name: Name of the equilibrium, see :attr:`name`.
             state: The equilibrium.
         """
@@ -48,11 +50,12 @@ class SetupState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Position:
-    """Results at one wave-generator position; NaN and None where the solve failed."""
+    """Results at one input position; NaN or None where the solve failed."""
 
     input_angle: float
     """Input angle theta [rad]."""
     outcome: Outcome = Outcome.CONVERGED
+    """Outcome of the solve."""
     output_error: float = nan
     """Output angle minus theta/i, measured from the undeformed position [rad]."""
     input_torque: float = nan
@@ -64,50 +67,58 @@ class Position:
     energy: float = nan
     """Strain energy [J]."""
     pairs_in_contact: int | None = None
+    """Number of loaded tooth pairs, whole drive."""
     iterations: int = 0
+    """Number of iterations of the solve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshingStep(Position):
-    """Results at one position of a 2D model."""
+    """Results of a 2D model at one input position."""
 
     wave_generator_angle: float = nan
-    """Angle of the wave generator in the frame of the fixed flexspline or circular
-    spline [rad]."""
+    """Angle of the wave generator in the frame of the fixed member [rad]; zero if the
+    wave generator itself is fixed."""
     friction_work: float = nan
-    """Work of tooth friction since the deflection [J]."""
+    """Work dissipated by tooth friction since the deflection [J]."""
     contact_nodes: int | None = None
-    """Bore nodes that touch the wave generator, whole drive."""
+    """Number of bore nodes that touch the wave generator, whole drive."""
     stress: MemberMaxima | None = None
+    """Largest stresses of each member [Pa]."""
     state: State | None = None
-    """The equilibrium, from which fields and pictures are evaluated."""
+    """The equilibrium, from which fields and figures are computed."""
 
 
 class Positions:
-    """Results that the runs of every model derive from their positions, ``steps``."""
+    """Results that 2D and 3D runs derive from their input positions."""
 
     design: Design
+    """The drive."""
     torque: float
+    """Torque T that the drive exerts on the output [N·m]."""
     steps: tuple[Any, ...]
+    """Results at every input position."""
 
     @property
     def turn(self) -> float:
-        """Turns of the input; zero for a single position."""
+        """Rotation of the input [turns]; zero for a single position."""
         if len(self.steps) < 2:
             return 0.0
         return float(self.steps[1].input_angle * len(self.steps) / (2.0 * pi))
 
     @property
     def unspread(self) -> str | None:
-        """Number of phases that the positions hit, in words; None if they spread."""
+        """Text that reports how few phases the positions have; None if they spread."""
         return unspread(self.design, len(self.steps), self.turn)
 
     def warnings(self) -> list[str]:
-        """Limits of the validity of the results, one line each."""
+        """Warnings that limit the validity of the results, one line each."""
         lines = [alike(self.design, len(self.steps), self.turn)]
         over = overload(self.design, self.torque)
         if over is not None:
-            lines.append(f"{over}: far above the load capacity of a strain wave gear")
+            lines.append(
+                f"torque = {over}: far above the load capacity of a strain wave gear"
+            )
         return [line for line in lines if line is not None]
 
     @property
@@ -126,13 +137,13 @@ class Positions:
         return np.array([getattr(step, name) for step in self.steps], dtype=float)
 
     def averages(self) -> dict[str, Any]:
-        """Means of the per-step maxima by member, null for a rigid member [MPa]."""
+        """Means of the per-step stress maxima by member [MPa]; None for a rigid one."""
         solved = [step.stress for step in self.steps if step.stress is not None]
         members = ("flexspline", "circular_spline")
         return {name: _averages([getattr(s, name) for s in solved]) for name in members}
 
     def common_series(self) -> dict[str, list[Any]]:
-        """Lists of ``per_step`` for every model; the stresses are the flexspline's."""
+        """Entries of ``per_step`` that 2D and 3D runs share; flexspline stresses."""
         return {
             "angle_deg": list(self.series("input_angle") / deg),
             **{
@@ -156,14 +167,20 @@ class Positions:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshingRun(Positions):
-    """A simulation of meshing."""
+    """Results of a meshing simulation with the 2D model."""
 
     design: Design
+    """The drive."""
     model: SectorModel
+    """2D sector model of the drive."""
     torque: float
+    """Torque T that the drive exerts on the output [N·m]."""
     steps: tuple[MeshingStep, ...]
+    """Results at every input position."""
     setup: tuple[SetupState, ...]
+    """Equilibria before the first position: deflected, meshed and under torque."""
     wall_s: float
+    """Wall-clock time of the run [s]."""
 
     def _members(self) -> list[tuple[Superelement, int]]:
         compliance = self.model.circular_spline.compliance
@@ -174,7 +191,7 @@ class MeshingRun(Positions):
 
     @property
     def nodes(self) -> int:
-        """Nodes of the deformable members before condensation."""
+        """Number of nodes of the deformable members before condensation."""
         total = 0
         for element, sectors in self._members():
             face = element.face_size
@@ -184,11 +201,11 @@ class MeshingRun(Positions):
 
     @property
     def elements(self) -> int:
-        """Elements of the deformable members before condensation."""
+        """Number of elements of the deformable members before condensation."""
         return sum(int(e.mesh.mesh.t.shape[1]) * n for e, n in self._members())
 
     def to_json(self) -> dict[str, Any]:
-        """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
+        """JSON object that ``swgjoint meshing`` writes."""
         elastic = self.model.circular_spline.compliance is not None
         cup = None if self.design.cup is None else "closed-form torsion in series"
         rim = f"elastic, outside {self.design.circular_spline.outer_rim}"
@@ -247,7 +264,7 @@ class MeshingRun(Positions):
         return {"right": list(force[:, 0]), "left": list(force[:, 1])}
 
     def _root_stress(self) -> dict[str, Any] | None:
-        """Stress at one tooth root as the lobe passes."""
+        """Stresses at one tooth root over the position of the lobe [MPa]."""
         if not self.states:
             return None
         stress = root_stress(self.model, self.states, self.design.lobes)
@@ -261,7 +278,7 @@ class MeshingRun(Positions):
 
 
 def _averages(maxima: Sequence[StressMaxima | None]) -> dict[str, Any]:
-    """Means of the per-step maxima, null for a rigid member."""
+    """Means of the per-step stress maxima [MPa]; None for a rigid member."""
     rows = [m.to_json() for m in maxima if m is not None]
     return {
         "average_max_MPa": {

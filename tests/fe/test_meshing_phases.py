@@ -94,5 +94,5 @@ def test_positions_a_pitch_apart_are_alike():
 def test_a_torque_in_another_unit_is_called_by_its_size():
     """A thousand times the rated torque is said; its repeated peak is not."""
     design = few_teeth()
-    assert names(overload(design, -2e4), "-20000 N·m", "1000 x", "20 N·m")
+    assert names(overload(design, -2e4), "-20000 N·m", "1000 times", "20 N·m")
     assert overload(design, 60.0) is None
