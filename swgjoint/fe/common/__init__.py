@@ -1,1 +1,1 @@
-"""Common parts of the 2D and 3D models: contact, algebra, load paths, sampling."""
+"""Parts that the 2D and 3D models share: contact, algebra, load paths, sampling."""

@@ -1,4 +1,7 @@
-"""Columns of equilibria at one input angle each: solution and storage."""
+"""Columns of equilibria: solution and storage.
+
+A column contains the equilibria of a drive under several torques at one input angle.
+"""
 
 from __future__ import annotations
 
@@ -37,20 +40,21 @@ class AngleColumn(Generic[AnyState]):
     changes: dict[tuple[float, float], ContactChanges | None] = field(
         default_factory=dict
     )
-    """Contact changes that an equilibrium predicts, by its torque and the sign."""
+    """Contact changes that an equilibrium predicts, by its torque [N·m] and the sign of
+    the torques of the load curve; None without a prediction."""
     paths: dict[float, tuple[LoadPath, tuple[Array, Array]]] = field(
         default_factory=dict
     )
-    """Latest curve of each sign, see :meth:`ColumnGrid.path`."""
+    """Latest load curve for each sign of the torque, see :meth:`ColumnGrid.path`."""
 
     def start_towards(self, torque: float) -> AnyState:
-        """State at which loading by a torque of this sign starts."""
+        """State from which loading by a torque of this sign [N·m] starts."""
         if self.rest.sides is None:
             return self.rest.state
         return self.rest.sides[0 if torque > 0.0 else 1]
 
     def nearest(self, torque: float) -> AnyState:
-        """The equilibrium at the nearest torque of the same sign."""
+        """Equilibrium at the nearest torque of this sign or at the start of loading."""
         near = {t: s for t, s in self.states.items() if t * torque > 0.0}
         near[0.0] = self.start_towards(torque)
         return near[min(near, key=lambda t: abs(t - torque))]
@@ -60,51 +64,52 @@ class AngleColumn(Generic[AnyState]):
 class SolvedColumns(Generic[AnyState]):
     """Columns of equilibria at neighbouring angles, solved in sequence and stored.
 
-    Angles are identified by their index on the finest grid of the pitch. The order of
-    all solves depends on the results only, so that an interrupted run repeats it and
-    reads the stored results.
+    Angles are identified by their place on the finest grid of the pitch: an integer for
+    the columns of the samples, a fraction between them. The order of all solves depends
+    on nothing but the results, so that a resumed run repeats the order and can read the
+    stored results.
     """
 
     follow: Follower[AnyState]
-    """The drive."""
+    """Solver that follows the equilibria of the drive."""
     period: float
     """Period of the pattern in the input angle [rad]."""
     finest: int
     """Number of angles of the finest grid."""
     levels: list[float]
-    """Torques of every column [N·m]; torques that fail, and larger ones of the same
-    sign, are removed."""
+    """Torques of every column [N·m]. If a torque fails in one column, it is removed
+    together with all larger ones of the same sign."""
     small: float
-    """Torque that takes up a clearance [N·m]."""
+    """Torque that takes up the clearance of the teeth [N·m]."""
     tick: Callable[[], None]
     """Called after every solve."""
     keep: Unfinished | None
     """Store of solved equilibria; None stores none."""
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
-    """Columns by the index of their angle."""
+    """Columns by their place on the finest grid."""
     failed: list[float] = field(default_factory=list)
     """Torques between the levels whose solves failed [N·m]."""
     beyond: list[float] = field(default_factory=list)
-    """Torques of every column beyond the levels, at most one of each sign [N·m]."""
+    """Additional torques beyond the largest level, at most one of each sign [N·m]."""
     solves: int = 0
-    """Number of counted solves."""
+    """Number of solves that count against the budget."""
     tried: int = 0
-    """Number of all attempted solves, which numbers the stored results."""
+    """Number of attempted solves; the stored results are numbered by it."""
     like: AnyState | None = None
     """First state; stored states of another type or shape are rejected."""
 
     @property
     def free(self) -> bool:
-        """Whether clearance leaves the output free without torque somewhere."""
+        """Whether clearance leaves the unloaded output free at any of the angles."""
         return any(one.rest.sides is not None for one in self.columns.values())
 
     @property
     def signs(self) -> list[float]:
-        """Signs of the torque levels, 1.0 and -1.0 or one of them."""
+        """Signs that occur among the torque levels: 1.0, -1.0 or both."""
         return [s for s in (1.0, -1.0) if any(t * s > 0.0 for t in self.levels)]
 
     def angles(self, count: int) -> Array:
-        """Input angles of ``count`` equally spaced columns (count,) [rad]."""
+        """Input angles of ``count`` equally spaced columns [rad], shape (count,)."""
         return self.period * np.arange(count) / count
 
     def chosen(self, count: int) -> Iterator[tuple[int, AngleColumn[AnyState]]]:
@@ -115,11 +120,14 @@ class SolvedColumns(Generic[AnyState]):
     def states(
         self, count: int, torques: Iterable[float]
     ) -> dict[float, list[AnyState]]:
-        """Equilibria by torque, without torque and at levels that all columns have.
+        """Equilibria of equally spaced columns at zero torque and at common torques.
 
         Args:
             count: Number of equally spaced columns.
-            torques: Torques of interest [N·m]; those that are no levels are ignored.
+            torques: Torques of interest [N·m]; those that are not levels are ignored.
+
+        Returns:
+            One state per column, by torque.
         """
         columns = [column for _, column in self.chosen(count)]
         rest = {0.0: [one.rest.state for one in columns]}
@@ -129,18 +137,18 @@ class SolvedColumns(Generic[AnyState]):
     # -- solving -----------------------------------------------------------------------
 
     def solve_columns(self, count: int) -> None:
-        """Solve the missing ones of ``count`` equally spaced columns."""
+        """Solve those of ``count`` equally spaced columns that are still missing."""
         step = self.finest // count
         for place in range(0, self.finest, step):
             if place not in self.columns:
                 self.columns[place] = self._column(place)
 
     def unseen_column(self, place: float) -> AngleColumn[AnyState]:
-        """Solve a column between those of the samples without adding it to them."""
+        """Validation column at a place between the samples; it is not added to them."""
         return self._column(place)
 
     def _column(self, place: float) -> AngleColumn[AnyState]:
-        """Solve a column at all levels, starting from the column before if any."""
+        """Column solved at all levels, starting from the preceding column if any."""
         theta = self.period * place / self.finest
         before = max((p for p in self.columns if p < place), default=None)
         if before is None:
@@ -154,7 +162,7 @@ class SolvedColumns(Generic[AnyState]):
         return column
 
     def _first(self) -> AngleColumn[AnyState]:
-        """Load the first column from zero torque outwards until a solve fails."""
+        """First column, loaded from zero torque outwards until a solve fails."""
 
         def unloaded() -> Unloaded[AnyState]:
             state = self.follow.engage(self.follow.deflect())
@@ -178,7 +186,10 @@ class SolvedColumns(Generic[AnyState]):
     def _beside(
         self, before: AngleColumn[AnyState], theta: float
     ) -> AngleColumn[AnyState]:
-        """Solve the same torques one angle on, up to the first that fails."""
+        """Column at the next angle, solved from the equilibria of the preceding one.
+
+        Torques beyond one that fails are skipped.
+        """
         column = self._rest(
             theta, partial(self.follow.turn_unloaded, before.rest, theta)
         )
@@ -204,7 +215,7 @@ class SolvedColumns(Generic[AnyState]):
     def _rest(
         self, theta: float, solve: Callable[[], Unloaded[AnyState]]
     ) -> AngleColumn[AnyState]:
-        """Start a column with its equilibrium without torque."""
+        """New column that contains its unloaded equilibrium only."""
 
         def sound() -> Unloaded[AnyState]:
             unloaded = solve()
@@ -223,10 +234,11 @@ class SolvedColumns(Generic[AnyState]):
         torques: list[float],
         beside: Sequence[AngleColumn[AnyState]] = (),
     ) -> None:
-        """Solve other torques of a column, each from a nearby equilibrium.
+        """Solve additional torques of a column, each from a nearby equilibrium.
 
-        The start is the equilibrium at the same torque in a neighbouring column, which
-        halves the iterations, or else the nearest one at the same angle.
+        The search starts from the equilibrium at the same torque in a neighbouring
+        column ``beside``, which halves the number of iterations, or otherwise from the
+        nearest torque in the same column.
         """
         for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
             there = [one.states[torque] for one in beside if torque in one.states]
@@ -252,12 +264,12 @@ class SolvedColumns(Generic[AnyState]):
     def solve_at(
         self, theta: float, torque: float, solve: Callable[[], AnyState]
     ) -> AnyState | None:
-        """An equilibrium, solved now or read from the store of an interrupted run.
+        """Equilibrium under a torque, either solved or read from the store.
 
         Args:
             theta: Input angle [rad].
-            torque: Output torque [N·m].
-            solve: Function that solves for it.
+            torque: Output torque, not zero [N·m].
+            solve: Function that solves for the equilibrium.
 
         Returns:
             The equilibrium; None if the solve failed.
@@ -270,7 +282,7 @@ class SolvedColumns(Generic[AnyState]):
         return self._recalled(theta, torque, sound)
 
     def _recalled(self, theta: float, torque: float, solve: Callable[[], T]) -> T:
-        """Result of a solve or of its failure, from the store if it has one."""
+        """Result of a solve, read from the store if the store contains it."""
         name, self.tried = _SOLVE.format(self.tried), self.tried + 1
         if self.keep is not None:
             stored = self.keep.read(name, partial(self._taken, theta, torque))
@@ -285,34 +297,34 @@ class SolvedColumns(Generic[AnyState]):
     def _taken(
         self, theta: float, torque: float, arrays: Mapping[str, Any]
     ) -> tuple[Unloaded[AnyState] | AnyState | None]:
-        """A stored equilibrium from its arrays.
+        """Stored result from its arrays, as a tuple because None marks a failed solve.
 
         Raises:
-            ValueError: If it is not the equilibrium that comes next.
+            ValueError: If the result does not belong to this angle, torque and model.
         """
         if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
             raise ValueError("stored equilibrium has another angle or torque")
         stored: Any = unpack(arrays, _STATE)
         if isinstance(stored, Unloaded) != (torque == 0.0):
-            raise ValueError("stored equilibrium has another torque")
+            raise ValueError("stored equilibrium has the wrong type for its torque")
         states = [stored] if torque else [stored.state, *(stored.sides or ())]
         for state in states:
             if state is not None:
                 _check_like(state, self.like)
         return (stored,)
 
-    # -- figures -----------------------------------------------------------------------
+    # -- values ------------------------------------------------------------------------
 
     def figures(self, state: AnyState, theta: float) -> Array:
-        """Figures of an equilibrium that enter the tables.
+        """Values of an equilibrium that enter the tables.
 
         Args:
             state: The equilibrium.
             theta: Its input angle [rad].
 
         Returns:
-            Output error [rad], energy [J], compliance [rad/(N·m)] and input torque
-            [N·m] (4,).
+            Output error [rad], strain energy [J], compliance [rad/(N·m)] and input
+            torque [N·m], shape (4,).
         """
         follow = self.follow
         error = follow.output_angle(state) - theta / follow.ratio
@@ -328,7 +340,7 @@ def _check_like(state: Any, like: Any) -> None:
     ):
         raise ValueError("stored state belongs to another model")
     if not np.isfinite(state.faces).all():
-        raise ValueError("stored positions are not finite")
+        raise ValueError("stored state contains values that are not finite")
 
 
 def _no_rest(theta: float, state: AnyState) -> ComputationError:

@@ -8,13 +8,14 @@ from swgjoint.typing import Array, Index
 
 
 def respond(offsets: Index, blocks: Array, force: Array) -> Array:
-    """Displacement of all teeth under forces on their flanks.
+    """Displacements of all teeth under forces on their flanks.
 
     Args:
         offsets: Offsets k - j of the responding tooth k from the loaded tooth j
             (n_offsets,).
-        blocks: Response in the frames of the teeth (n_offsets, n_rows, n_b) [m/N].
-        force: Forces on the flanks of every tooth (N, n_b) [N].
+        blocks: Displacements of the responding tooth per force on the loaded one, in
+            the frames of the teeth (n_offsets, n_rows, n_b) [m/N].
+        force: Forces at the n_b flank freedoms of each of the N teeth (N, n_b) [N].
 
     Returns:
         Displacements (N, n_rows) [m].
@@ -33,19 +34,21 @@ def contact_compliance(
 
     Args:
         offsets: Offsets of the teeth as in :func:`respond` (n_offsets,).
-        blocks: Response of the flanks (n_offsets, n_b, n_b) [m/N].
+        blocks: Displacements of one flank per force on another (n_offsets, n_b, n_b)
+            [m/N].
         tooth: Tooth of each point (n,).
-        weight: Derivative of its gap by the flank displacement (n, n_b).
+        weight: Derivative of each gap with respect to the flank displacements (n, n_b)
+            [-].
         teeth: Number of teeth in the model.
 
     Returns:
-        Matrix (n, n) [m/N].
+        Compliance matrix (n, n) [m/N].
     """
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
     for offset, block in zip(offsets, blocks, strict=True):
         i, j = np.nonzero(apart == offset % teeth)
         if i.size:
-            # few pairs have this offset: multiply only those
+            # only few pairs of points have this offset: skip all others
             result[i, j] += np.einsum("kb,kb->k", weight[i] @ block, weight[j])
     return result

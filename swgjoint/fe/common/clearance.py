@@ -1,4 +1,4 @@
-"""Rows of a map across a clearance in which the output is free without torque."""
+"""Rows of a map across a clearance in which the unloaded output is free."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from swgjoint.typing import Array
 
 FAINT = 1e-8
-"""Torque at the ends of a clearance as a fraction of the torque that takes it up [-];
-it is not zero, so that no stiffness is zero."""
+"""Torque at the ends of a clearance as a fraction of the torque that takes it up [-].
+It is greater than zero so that the stiffness inside the clearance is not zero."""
 
 
 def across_clearance(
@@ -16,20 +16,21 @@ def across_clearance(
 ) -> tuple[float, Array]:
     r"""Point at which the teeth begin to hold an output that is free without torque.
 
-    From the middle of the clearance the torque rises to the fraction :data:`FAINT` of
-    the torque T that takes up the clearance. There the stiffness begins to grow; it
-    reaches K under T after a further rotation :math:`\ell = 3 T / 2 K`. A linear spring
-    would begin T/K before and store the energy :math:`T^2 / 2 K`; the growing stiffness
-    stores nearly the same energy over :math:`\ell`.
+    From the middle of the clearance to this point the torque rises to the fraction
+    :data:`FAINT` of the torque T that takes up the clearance. There the stiffness
+    begins to grow, and it reaches K under T after a further rotation
+    :math:`\ell = 3 T / 2 K`. A linear spring would reach T after a rotation of T/K and
+    store the energy :math:`T^2 / 2 K`; the growing stiffness stores nearly the same
+    energy over :math:`\ell`.
 
     Args:
-        rest: Output error, energy, compliance and input torque in the middle (4, n).
-        taken_up: Output error, energy, compliance and input torque under ``torque``
-            (4, n).
-        torque: Small torque T that takes up the clearance [N·m].
+        rest: Output error [rad], energy [J], compliance [rad/(N·m)] and input torque
+            [N·m] in the middle of the clearance (4, n).
+        taken_up: The same quantities under ``torque`` (4, n).
+        torque: Small torque T that takes up the clearance, of either sign [N·m].
 
     Returns:
-        Torque [N·m] and table (4, n) of that point.
+        Torque at the point [N·m] and the four quantities there (4, n).
     """
     begin = FAINT * torque
     apart = taken_up[0] - rest[0]  # against the sign of the torque

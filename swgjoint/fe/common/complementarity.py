@@ -26,21 +26,21 @@ def solve_mixed(
 
     .. math:: 0 \le z_i \perp g_i \ge 0 \quad (i < m), \qquad g_i = 0 \quad (i \ge m)
 
-    A primal-dual active-set method needs a few small solves. If it cycles (nearly equal
-    contact points), the free unknowns are eliminated and the rest is solved as a
-    non-negative least-squares problem.
+    A primal-dual active-set method finds the solution in a few small solves. If it
+    cycles, as nearly coincident contact points may cause, the free unknowns are
+    eliminated and the active set follows from a non-negative least-squares problem.
 
     Args:
         matrix: Matrix M (n, n), symmetric, positive definite after elimination of the
             free unknowns.
         offset: Offset q (n,).
         inequalities: Number m of unilateral unknowns.
-        multipliers: Number of the last unknowns that are multipliers of equations; the
-            other free unknowns have a negative or zero diagonal.
+        multipliers: Number of unknowns at the end of z that are multipliers of
+            equations; the other free unknowns have a negative or zero diagonal.
         start: Guess of the active set (m,).
 
     Returns:
-        Solution z (n,) and active set (m,).
+        Solution z (n,) and the active set of the unilateral unknowns (m,).
 
     Raises:
         ActiveSetError: If no active set is found or its system is singular.
@@ -70,12 +70,12 @@ def solve_mixed(
     active = _least_squares(scaled, q, m, multipliers)
     z = _solve_active(scaled, q, active)
     if (np.where(active, -z[:m], -(q + scaled @ z)[:m]) > 1e3 * tolerance).any():
-        raise ActiveSetError("active set cycles")
+        raise ActiveSetError("the active-set iteration cycles")
     return z / scale, active
 
 
 def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
-    """Solution z (n,) with the unilateral unknowns outside the active set zero."""
+    """Solution z (n,) in which unilateral unknowns outside the active set are zero."""
     n, m = len(offset), len(active)
     index = np.concatenate([np.flatnonzero(active), np.arange(m, n)])
     z = np.zeros(n)

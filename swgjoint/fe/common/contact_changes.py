@@ -1,4 +1,4 @@
-"""Contact changes over the torque, as predicted by a drive linearised at one state."""
+"""Contact changes over the torque, predicted by a drive linearised at one state."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from swgjoint.arrays import frozen_array
 from swgjoint.typing import Array, Index
 
 LONE = 0.3
-"""Uncertainty of the place of a step that only one end predicts, as a fraction of the
-interval [-]."""
+"""Uncertainty of the position of a step that only one end predicts, as a fraction of
+the interval [-]."""
 FITS = 3
-"""Number of linearisations in a fit."""
+"""Number of linearised corrections in a fit of the step positions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,8 +23,8 @@ class ContactChanges:
     torque: Array
     """Torques of the changes, increasing (k,) [N·m]."""
     contact: Index
-    """Number of the contact that changes, the same for predictions at all states (k,).
-    """
+    """Number of the contact that changes (k,). It identifies the contact in the
+    predictions at all states."""
     compliance: Array
     """Compliance before, between and after the changes (k + 1,) [rad/(N·m)]."""
 
@@ -38,7 +38,7 @@ class ContactChanges:
         object.__setattr__(self, "compliance", compliance)
 
     def mirror(self) -> ContactChanges:
-        """Changes of the mirrored drive, under the opposite torque."""
+        """Changes of the mirrored drive, which occur under the opposite torques."""
         return ContactChanges(
             torque=-self.torque[::-1],
             contact=self.contact[::-1],
@@ -66,20 +66,22 @@ class Steps:
     """Steps of the compliance in an interval of length 1."""
 
     place: Array
-    """Places of the steps, in [0, 1] (n,)."""
+    """Positions of the steps in the interval, from 0 to 1 (n,)."""
     jump: Array
     """Jumps of the compliance (n,) [rad/(N·m)]."""
     contact: Index
     """Number of the contact that changes (n,)."""
     doubt: Array
-    """Uncertainties of the places, as fractions of the interval (n,)."""
+    """Uncertainties of the positions, as fractions of the interval (n,)."""
 
     @classmethod
     def merge(cls, first: Steps, last: Steps) -> Steps:
-        """Merge predictions at both ends, whose errors grow with distance squared.
+        """Steps that combine the predictions of both ends of an interval.
 
-        A change that both ends predict becomes one step between the two predictions; a
-        change that only one end predicts becomes a fraction of a step.
+        The error of a prediction is assumed to grow with the square of the distance
+        from its end. A change that both ends predict becomes one step between the two
+        predicted positions. A change that only one end predicts keeps its position, and
+        its height is reduced to the weight of that end.
 
         Args:
             first: Steps that the equilibrium at the start of the interval predicts.
@@ -110,17 +112,18 @@ class Steps:
         )
 
     def fit_moments(self, mean: float, moment: float, smooth: float) -> Steps:
-        """Move the steps so that the compliance C has a given mean and first moment.
+        """Steps moved so that the compliance C has a given mean and first moment.
 
         Both are linear in small shifts of the steps and in the coefficients of a cubic
-        correction. The solution has the least sum of squares of the shifts, relative to
-        their uncertainties, and of the cubic, relative to its usual size.
+        correction. Of all solutions, the one is chosen that has the least sum of
+        squares of the shifts, relative to their uncertainties, and of the cubic's
+        coefficients, relative to their usual size.
 
         Args:
-            mean: Mean of C minus its value at the start and a linear change
-                [rad/(N·m)].
-            moment: Mean of (1 - x) C minus the same two terms [rad/(N·m)].
-            smooth: Usual deviation of C from a linear change [rad/(N·m)].
+            mean: Mean of C - L, where L is the straight line between the values of C at
+                both ends of the interval [rad/(N·m)].
+            moment: Mean of (1 - x) (C - L) [rad/(N·m)].
+            smooth: Usual size of the coefficients of the cubic [rad/(N·m)].
         """
         if not self.place.size:
             return self
@@ -146,7 +149,7 @@ class Steps:
 
 
 def _pairs(first: Index, last: Index) -> tuple[Index, Index]:
-    """Indices of equal numbers in both arrays, paired in order of occurrence."""
+    """Indices of numbers that both arrays contain, paired in order of occurrence."""
     here, there = list[int](), list[int]()
     for number in np.unique(first):
         one, two = np.flatnonzero(first == number), np.flatnonzero(last == number)

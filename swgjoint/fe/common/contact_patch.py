@@ -2,10 +2,10 @@ r"""Displacement of a flank at a contact, averaged over a patch of fixed length.
 
 The displacement under a point force on an elastic half-plane diverges with the
 logarithm of the mesh size, and between coarse nodes it depends on the position within
-the element. This would be a kinematic error of the mesh, a tenth of that of the drive.
-A contact force is therefore spread over a patch of the flank whose length depends on
-the tooth and not on the mesh, and the gap is closed by the displacement averaged with
-the same weights:
+the element. The mesh would thus cause a kinematic error of its own, a tenth of that of
+the drive. A contact force is therefore spread over a patch of the flank whose length
+depends on the tooth and not on the mesh, and the gap is evaluated with the displacement
+averaged by the same weights:
 
 .. math:: \bar u(s) = \int \phi\left(\frac{t}{a}\right) u(s + t)\,\frac{dt}{a}, \quad
     \phi(x) \propto (1 - x^2)^3 .
@@ -23,31 +23,32 @@ from scipy.interpolate import CubicSpline
 from swgjoint.typing import Array
 
 PATCH_PARTS = 14
-"""Length of the flank between the lands divided by the half length of a patch [-]. The
-half length is 0.15 mm at module 1, one and a half elements of the thesis mesh."""
+"""Length of the flank between the lands divided by the half length of a patch [-]. With
+a module of 1 mm the half length is 0.15 mm, one and a half elements of the thesis
+mesh."""
 FINENESS = 6
-"""Knots of the averaged displacement per half length of the patch."""
+"""Number of spline knots per half length of the patch."""
 QUADRATURE = 24
-"""Gauss points per patch."""
+"""Number of Gauss points per patch."""
 
 
 def half_length(stations: Array) -> float:
-    """Half length a [m] of the patches on a flank with nodes at arc lengths [m]."""
+    """Half length a [m] of the patches on a flank, from its nodes' arc lengths [m]."""
     return float(stations[-1] - stations[0]) / PATCH_PARTS
 
 
 def average_spline(stations: Array, half: float | None = None) -> CubicSpline:
     """Weights of the flank nodes in the displacement averaged around an arc length.
 
-    Beyond its ends the displacement of a flank is continued by odd reflection, so that
-    fields linear in the arc length are reproduced everywhere.
+    Beyond the ends of the flank the displacement is continued by odd reflection, so
+    that fields linear in the arc length are reproduced everywhere.
 
     Args:
         stations: Arc lengths of the nodes, equally spaced (n,) [m].
         half: Half length a of the patch [m]; by default that of :func:`half_length`.
 
     Returns:
-        Cubic spline with values of shape (n,).
+        Cubic spline over the arc length, whose values are the n weights.
     """
     nodal = CubicSpline(stations, np.eye(stations.size))
     first, last = float(stations[0]), float(stations[-1])

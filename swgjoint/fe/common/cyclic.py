@@ -1,4 +1,4 @@
-"""Direct solution of rings of condensed sectors, and shifts of fields around them."""
+"""Direct solution of rings of condensed sectors, and shifts of fields around a ring."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from swgjoint.typing import Array, Index
 
 
 class SingularCyclicError(ArithmeticError):
-    """The ring of sectors has a zero pivot."""
+    """The system of equations of the ring of sectors is singular."""
 
 
 class Insides:
-    """Interior unknowns of all sectors, eliminated before those of the faces."""
+    """Elimination of the interior unknowns of all sectors before those of the faces."""
 
     def __init__(self, blocks: Array, face: int) -> None:
         """Eliminate the interior unknowns.
@@ -37,7 +37,7 @@ class Insides:
         size = 2 * face
         self._reach = np.empty((len(blocks), n - size, size))
         self.schur = np.empty((len(blocks), size, size))
-        """Schur complements between both faces of a sector (N, 2 face, 2 face)."""
+        """Schur complement of each sector on its two faces (N, 2 face, 2 face)."""
         for block, inverse, reach, schur in zip(
             blocks, self._inverse, self._reach, self.schur, strict=True
         ):
@@ -55,7 +55,7 @@ class Insides:
         return np.asarray(outer[:, :face] + np.roll(outer[:, face:], 1, axis=0))
 
     def with_faces(self, faces: Array, rhs: Array) -> Array:
-        """Solution of the sectors from that of the faces.
+        """Solution at all degrees of freedom from the solution at the faces.
 
         Args:
             faces: Solution at the faces (N, face, k).
@@ -73,7 +73,7 @@ class Insides:
 
 
 class CyclicFactor:
-    """Factorised ring of sectors that couple first face, interior and last face.
+    """Factorised ring of sectors, each coupling its first face, interior and last face.
 
     The interior unknowns are eliminated sector by sector; the faces form a cyclic block
     tridiagonal matrix, which becomes banded when the ring is folded (order 0, N-1, 1,
@@ -135,7 +135,7 @@ class CyclicFactor:
             raise SingularCyclicError
 
     def solve(self, rhs: Array) -> Array:
-        """Solve for many right-hand sides.
+        """Solution for k right-hand sides.
 
         Args:
             rhs: Contributions of each sector (N, n, k); contributions to a shared face
@@ -143,6 +143,9 @@ class CyclicFactor:
 
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).
+
+        Raises:
+            SingularCyclicError: If LAPACK rejects the system.
         """
         face = self._face
         faces = self._insides.face_loads(rhs)
@@ -156,7 +159,7 @@ class CyclicFactor:
 
 
 def shift_rows(values: Array, shift: float) -> Array:
-    """Shift rows around the ring, interpolated by the cubic through four neighbours.
+    """Rows shifted around the ring, interpolated by a cubic through four neighbours.
 
     Args:
         values: One row per sector (N, ...).

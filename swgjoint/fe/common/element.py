@@ -1,4 +1,4 @@
-"""Elements with incompatible modes, for bending without locking."""
+"""Elements with incompatible modes, which bend without shear locking."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from skfem.element import DiscreteField
 
 
 class IncompatibleModes:
-    r"""Adds the modes :math:`4x(1-x)`, one per direction, to a linear element.
+    r"""Mixin that adds the modes :math:`4x(1-x)`, one per direction, to an element.
 
-    The modes are interior degrees of freedom. Their gradients use the Jacobian at the
-    element centre,
+    The modes are interior degrees of freedom of a linear element. Their gradients use
+    the Jacobian at the element centre,
 
     .. math:: \nabla\phi = \frac{\det J_0}{\det J} J_0^{-T} \hat\nabla\phi,
 
@@ -22,10 +22,12 @@ class IncompatibleModes:
 
     Source:
         Taylor, Beresford and Wilson (1976), "A non-conforming element for stress
-        analysis", IJNME 10, 1211-1219.
+        analysis", International Journal for Numerical Methods in Engineering 10(6),
+        1211-1219.
     """
 
     corners: ClassVar[int]
+    """Number of shape functions of the linear element, one per corner."""
 
     def lbasis(self, X: Any, i: int) -> tuple[Any, Any]:
         """Local shape functions: those of the corners, then the incompatible modes.
@@ -35,7 +37,7 @@ class IncompatibleModes:
             i: Number of the shape function.
 
         Returns:
-            Value and gradient.
+            Value (...) and gradient (dim, ...) in the reference element.
         """
         if i < self.corners:
             return super().lbasis(X, i)  # type: ignore[misc, no-any-return]

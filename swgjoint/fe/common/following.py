@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 
 
 HALVINGS = 5
-"""Most halvings of an increment that fails."""
+"""Largest number of halvings of a failing increment."""
 TAKE_UP = 150
-"""Rotation over which the output is turned in search of contact, in hundredths of a
-pitch [-]."""
+"""Largest rotation of the output in search of contact, in hundredths of a pitch [-]."""
 
 AnyState = TypeVar("AnyState", "State", "SolidState")
 
 
 def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyState:
-    """Follow a change from fraction 0 to 1; a failure halves the increment.
+    """State after a gradual change, whose increment is halved whenever a solve fails.
 
     Args:
         state: State at the start.
-        step: Function from a state and a fraction of the change to the state there.
+        step: Function that takes a nearby state and a fraction of the change, from 0 to
+            1, and returns the state at that fraction.
 
     Returns:
-        The state at the end, or, if the search is stuck, the last converged state with
-        the outcome of the failed attempt.
+        State after the whole change or, if the smallest increment fails, the last
+        converged state with the outcome of the failed attempt.
     """
     current, done, increment = state, 0.0, 1.0
     while done < 1.0:
@@ -56,6 +56,7 @@ class Unloaded(Generic[AnyState]):
     """Equilibrium of the drive without torque."""
 
     state: AnyState
+    """The equilibrium; an output that is free is midway between ``sides``."""
     small: float
     """Torque that takes up the clearance [N·m]."""
     sides: tuple[AnyState, AnyState] | None = None
@@ -63,7 +64,7 @@ class Unloaded(Generic[AnyState]):
 
 
 class Follower(ABC, Generic[AnyState]):
-    """Follows equilibria and halves steps that fail."""
+    """Continuation of equilibria, with halved steps where a solve fails."""
 
     ratio: float
     """Signed gear ratio i [-]."""
@@ -87,14 +88,18 @@ class Follower(ABC, Generic[AnyState]):
 
     @abstractmethod
     def deflect(self, angle: float = 0.0) -> AnyState:
-        """Deflect the rim at the ideal member angles, without tooth contact."""
+        """Rim deflected at the ideal member angles, without tooth contact.
+
+        Args:
+            angle: Input angle [rad].
+        """
 
     @abstractmethod
     def load(self, start: AnyState, torque: float, angle: float) -> AnyState:
         """Equilibrium under an output torque.
 
         Args:
-            start: Start of the search, with its input at ``angle``.
+            start: State from which the search starts, with its input at ``angle``.
             torque: Output torque T [N·m].
             angle: Input angle [rad].
         """
@@ -105,7 +110,7 @@ class Follower(ABC, Generic[AnyState]):
 
     @abstractmethod
     def predict(self, state: AnyState, angle: float) -> AnyState:
-        """Predictor that turns input and output by the ideal ratio.
+        """Predicted state after input and output have turned by the ideal ratio.
 
         Args:
             state: State to start from.
@@ -114,7 +119,7 @@ class Follower(ABC, Generic[AnyState]):
 
     @abstractmethod
     def rotate_output(self, state: AnyState, output: float) -> AnyState:
-        """Predictor that turns the output at a fixed input.
+        """Predicted state after the output has turned at a fixed input.
 
         Args:
             state: State to start from.
@@ -124,7 +129,7 @@ class Follower(ABC, Generic[AnyState]):
     def predicted_changes(
         self, state: AnyState, low: float, high: float
     ) -> ContactChanges | None:
-        """Contact changes over a torque range, as an equilibrium predicts them.
+        """Contact changes over a torque range that an equilibrium predicts.
 
         Args:
             state: The equilibrium.
@@ -147,17 +152,19 @@ class Follower(ABC, Generic[AnyState]):
         """The same drive with manufacturing errors of its teeth and its axis.
 
         Args:
-            flexspline: Shifts of its teeth in their frames (N, 2) [m].
-            circular_spline: Shifts of its teeth in their frames (N_c, 2) [m].
-            tilt: Slope of the axis of the circular spline over z (2,) [rad].
+            flexspline: Shifts of the flexspline's N teeth in their frames (N, 2) [m].
+            circular_spline: Shifts of the circular spline's N_c teeth in their frames
+                (N_c, 2) [m].
+            tilt: Slope of the circular spline's axis in x and y per length along z
+                (2,) [rad].
         """
 
     def engage(self, deflected: AnyState) -> AnyState:
-        """Bring the teeth into contact at the given angles; the torque is a result."""
+        """Equilibrium with tooth contact at the same angles; the torque is a result."""
         return self.hold_output(deflected)
 
     def to_torque(self, state: AnyState, torque: float) -> AnyState:
-        """Change the torque at a fixed input.
+        """Equilibrium under another torque at the same input angle.
 
         If torque control fails (across the clearance of the teeth, or far from
         contact), the output is first turned until the teeth resist.
@@ -167,7 +174,7 @@ class Follower(ABC, Generic[AnyState]):
             torque: New output torque [N·m].
 
         Returns:
-            The equilibrium, or the last state with the outcome of the failed attempt.
+            The equilibrium, or a state with the outcome of the failed attempt.
         """
         angle = self.input_angle(state)
 
@@ -186,17 +193,18 @@ class Follower(ABC, Generic[AnyState]):
         return loaded(against) if against.outcome.ok else against
 
     def to_angle(self, state: AnyState, angle: float) -> AnyState:
-        """Turn the input at constant torque.
+        """Equilibrium at another input angle under the same torque.
 
-        An output that is free in the clearance of the teeth keeps its place in it. If
-        an angle cannot be reached, it is approached again from the undeformed drive.
+        An output that is free in the clearance of the teeth keeps its position within
+        the clearance. If an angle cannot be reached from the given state, it is
+        approached from the undeformed drive.
 
         Args:
             state: Equilibrium to start from.
             angle: New input angle [rad].
 
         Returns:
-            The equilibrium, or the last state with the outcome of the failed attempt.
+            The equilibrium, or a state with the outcome of the failed attempt.
         """
         first = self.input_angle(state)
 
@@ -217,10 +225,10 @@ class Follower(ABC, Generic[AnyState]):
         return again if again.outcome.ok else turned
 
     def unload(self, state: AnyState, small: float) -> Unloaded[AnyState]:
-        """Equilibrium without torque at a fixed input.
+        """Equilibrium without torque at the same input angle.
 
-        An output that is free in a clearance is placed midway between its positions at
-        the torques +-``small``.
+        An output that is free in the clearance is placed midway between its positions
+        under the torques +-``small``.
 
         Args:
             state: Equilibrium to start from.
@@ -236,7 +244,7 @@ class Follower(ABC, Generic[AnyState]):
     def turn_unloaded(
         self, unloaded: Unloaded[AnyState], angle: float
     ) -> Unloaded[AnyState]:
-        """Turn the input without torque.
+        """Equilibrium without torque at another input angle.
 
         Args:
             unloaded: Equilibrium without torque to start from.
@@ -267,7 +275,10 @@ class Follower(ABC, Generic[AnyState]):
         return Unloaded(state=centred, small=small, sides=sides)
 
     def _taken_up(self, state: AnyState, torque: float) -> AnyState:
-        """Turn the output until the teeth resist with at most a given torque."""
+        """State whose output has turned until the teeth resist.
+
+        Bisection lowers the resisting torque towards the given one from above.
+        """
         pitch = 2.0 * pi / self.teeth
         first = self.output_angle(state)
         direction = -1.0 if torque > 0.0 else 1.0
