@@ -1,16 +1,17 @@
 r"""Coulomb friction between the flanks, regularised by a soft stick spring.
 
-The facing material points of both flanks have the arc lengths s_f and s_c, both counted
-from tip to root and hence in opposite directions. Rolling leaves their sum
-:math:`\sigma = s_f + s_c` unchanged; sliding changes it. With the friction force t on
-the flexspline, positive from tip to root, a step from :math:`(\sigma_0, t_0)` ends at
+At a contact the material points of both flanks have the arc lengths s_f (flexspline)
+and s_c (circular spline), each counted from tip to root and hence in opposite
+directions. Rolling leaves their sum :math:`\sigma = s_f + s_c` unchanged; sliding
+changes it. Let t be the friction force on the flexspline, positive from tip to root. A
+step from :math:`(\sigma_0, t_0)` ends at
 
 .. math:: t = \mathrm{clip}(t_0 + k (\sigma - \sigma_0), -\mu F, \mu F) ,
 
-the implicit Euler step of a spring k and a slider in series, whose dissipation
-:math:`t\,(\sigma - \sigma_0 - (t - t_0)/k)` is never negative. The history includes
-:math:`\sigma` of points that are close but not yet in contact, so that the sliding
-direction of a new contact is known.
+where F is the normal force. This is the implicit Euler step of a spring k and a slider
+in series, whose dissipation :math:`t\,(\sigma - \sigma_0 - (t - t_0)/k)` is never
+negative. The history also contains :math:`\sigma` of points that are close but not yet
+in contact, so that the sliding direction of a new contact is known.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ from swgjoint.typing import Array, Index
 STICK_STIFFNESS = 0.05
 """Stick stiffness k divided by face width and Young's modulus [-].
 
-A tooth sticks over a few tens of nanometres, far less than its sliding of micrometres,
-and the spring is no stiffer than the tooth."""
+The spring deforms by a few tens of nanometres before a contact slides, far less than
+the sliding distance of micrometres, and it is no stiffer than the tooth."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoulombFriction:
-    """Friction law of the flanks."""
+    """Parameters of the friction law of the flanks."""
 
     coefficient: float
     """Friction coefficient mu [-]."""
@@ -45,11 +46,11 @@ class SlipHistory:
     """Flank pairs close to contact at the end of a step or iteration."""
 
     contacts: Contacts
-    """Contact candidates of these pairs."""
+    """Contact candidates (n) on these pairs."""
     normal: Array
     """Normal force at each candidate (n,) [N]."""
     force: Array
-    """Friction on the flexspline at each candidate, from tip to root (n,) [N]."""
+    """Friction force t on the flexspline at each candidate (n,) [N]."""
 
     @cached_property
     def pairs(self) -> Pairs:
@@ -61,24 +62,24 @@ class SlipHistory:
 class Pairs:
     """Contacts grouped by the two flanks that touch; each pair has one stick spring.
 
-    The points of a pair share its friction in proportion to their normal forces: on
-    conforming flanks the force jumps between points that slide alike.
+    The contacts of a pair share its friction in proportion to their normal forces,
+    because on conforming flanks the force jumps between points that slide equally.
     """
 
     key: Index
-    """Sector, side and tooth of each pair (n_pairs, 3)."""
+    """Sector, side and circular-spline tooth of each pair (n_pairs, 3)."""
     pair: Index
-    """Pair of each contact (n,)."""
+    """Number of the pair to which each contact belongs (n,)."""
     share: Array
     """Share of each contact in the force of its pair (n_pairs, n) [-]."""
     slip: Array
-    """Sum of arc lengths sigma of each pair (n_pairs,) [m]."""
+    """Sum of arc lengths sigma of each pair, weighted by the shares (n_pairs,) [m]."""
 
     @classmethod
     def from_contacts(cls, contacts: Contacts, normal: Array) -> Pairs:
-        """Group contacts by flank pair.
+        """Flank pairs of given contacts.
 
-        In a pair without force the closest contact gets the whole share.
+        In a pair without force the contact with the smallest gap gets the whole share.
 
         Args:
             contacts: Contact candidates.
@@ -97,7 +98,7 @@ class Pairs:
         return cls(key=key, pair=pair, share=share, slip=share @ contacts.slip)
 
     def find_in(self, others: Pairs) -> Index:
-        """Index of each pair in ``others``; -1 if it is not there (n_pairs,)."""
+        """Index of each pair in ``others``, -1 if it is absent; shape (n_pairs,)."""
         index = np.full(len(self.key), -1, dtype=np.int64)
         same = (self.key[:, None] == others.key).all(axis=-1)
         mine, theirs = np.nonzero(same)
@@ -106,7 +107,7 @@ class Pairs:
 
 
 def _since(history: SlipHistory | None, pairs: Pairs) -> tuple[Array, Array, Index]:
-    """Slip of pairs since the last step, their friction and their index in it."""
+    """Slip of each pair since a history, its friction there and its index in it."""
     slip, force = np.zeros(len(pairs.key)), np.zeros(len(pairs.key))
     if history is None:
         return slip, force, np.full(len(pairs.key), -1, dtype=np.int64)
@@ -120,7 +121,7 @@ def _since(history: SlipHistory | None, pairs: Pairs) -> tuple[Array, Array, Ind
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sliding:
-    """Contacts of one iteration as lines of force: normal, then tangential."""
+    """Lines of action of the contact forces in one iteration, normal and tangential."""
 
     lines: Contacts
     """All normal lines, then all tangential lines. The gap of a tangential line is the
@@ -128,10 +129,10 @@ class Sliding:
     stick: Array
     """Shares of the contacts in the pairs that stick (n_stick, n) [-]."""
     push: Array
-    """Ratio of friction t to normal force at sliding contacts, zero elsewhere (n,) [-].
+    """Ratio of friction t to normal force at sliding contacts; zero elsewhere (n,) [-].
     """
     fixed: Array
-    """Prescribed friction t (n,) [N]."""
+    """Prescribed part of the friction t (n,) [N]."""
     limit: Array
     """Friction limit under the normal forces of the last iteration (n,) [N]."""
     softness: float
@@ -145,17 +146,17 @@ class Sliding:
         history: SlipHistory | None,
         last: SlipHistory | None,
     ) -> Sliding:
-        """Decide which pairs stick and which slide, from the trial force of the spring.
+        """Sticking and sliding contacts, from the trial force of the stick spring.
 
         A pair whose sliding direction has reversed since the last iteration is assumed
         to stick, because it sticks somewhere between the two directions.
 
         Args:
             friction: Friction law.
-            contacts: Candidates of this iteration.
-            history: History at the end of the last step; None at the first contact,
-                which has no friction yet.
-            last: Forces of the last iteration; None in the first one.
+            contacts: Contact candidates (n) of this iteration.
+            history: History at the end of the last step; None before the first contact,
+                when there is no friction yet.
+            last: Forces of the last iteration; None in the first iteration.
         """
         normal, before = np.zeros(len(contacts)), np.zeros(len(contacts))
         if last is not None:
@@ -171,7 +172,7 @@ class Sliding:
         limit = friction.coefficient * (member @ normal)
         turned_over = trial * (member @ before) < 0.0
         sticks = (np.abs(trial) < limit) | turned_over
-        sticks &= (limit > 0.0) & (known >= 0)  # no past, no friction yet
+        sticks &= (limit > 0.0) & (known >= 0)  # a new pair has no friction yet
         condition = (-slip - force / friction.stiffness)[pairs.pair]
         return cls(
             lines=Contacts.join(contacts, contacts.tangential(condition)),
@@ -185,12 +186,15 @@ class Sliding:
         )
 
     def lag(self) -> Sliding:
-        """Friction limits from the last iteration, which makes the system symmetric."""
+        """Copy with prescribed sliding friction, which makes the system symmetric.
+
+        Its magnitude is the friction limit of the last iteration.
+        """
         fixed = self.limit * np.sign(self.push)
         return replace(self, push=np.zeros_like(self.push), fixed=fixed)
 
     def forces(self, unknowns: Array) -> Array:
-        """Forces of all lines (2 n,) [N] from the unknowns (n + n_stick,) [N]."""
+        """Forces along all lines (2 n,) [N] from the unknowns (n + n_stick,) [N]."""
         result = self._carried() @ unknowns
         result[len(self.push) :] += self.fixed
         return np.asarray(result)
@@ -205,10 +209,11 @@ class Sliding:
         return np.concatenate([top, np.hstack([np.diag(self.push), self.stick.T])])
 
     def reduce(self, matrix: Array, offset: Array) -> tuple[Array, Array]:
-        """Reduce the system of all lines to normal and sticking forces.
+        """System of all lines, reduced to normal and sticking forces.
 
         Args:
-            matrix: Matrix of the lines, then p other unknowns (2 n + p, 2 n + p).
+            matrix: Matrix of the 2 n lines, followed by p other unknowns
+                (2 n + p, 2 n + p).
             offset: Offset of the same rows (2 n + p,).
 
         Returns:
@@ -237,8 +242,8 @@ def dissipated_work(
 
     Args:
         friction: Friction law.
-        history: History at the start of the step; None at the first contact.
-        now: History at its end.
+        history: History at the start of the step; None before the first contact.
+        now: History at the end of the step.
     """
     if history is None:
         return 0.0
@@ -248,14 +253,14 @@ def dissipated_work(
     known = index >= 0
     slid = slip - (force - before) / k
     work = float(np.sum(force[known] * slid[known]))
-    # the spring of a pair that separated loses its energy
+    # the spring of a pair that has separated loses its energy
     old = (history.pairs.share > 0.0) @ history.force
     parted = np.setdiff1d(np.arange(len(old)), index)
     return work + float(np.sum(old[parted] ** 2)) / (2.0 * k)
 
 
 def spring_energy(friction: CoulombFriction, now: SlipHistory) -> float:
-    """Energy of the stick springs [J].
+    """Energy stored in the stick springs [J].
 
     Args:
         friction: Friction law.

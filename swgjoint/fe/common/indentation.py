@@ -1,10 +1,11 @@
-r"""Local indentation of two flanks by the narrow strip of their contact.
+r"""Local indentation of two flanks under the narrow strip of their contact.
 
-The flanks of :mod:`swgjoint.fe.common.contact_patch` deform as if a contact force were
-spread over a patch of half length a, a tenth of a millimetre. The real contact strip is
-ten times narrower. The additional approach of the flanks follows from the closed form
-of an elastic half-plane: under a force F the centre of a strip of half width b with
-Hertzian pressure is deeper than the average over the patch by
+In :mod:`swgjoint.fe.common.contact_patch` the flanks deform as if a contact force were
+spread over a patch of half length a, about a tenth of a millimetre. The real contact
+strip is ten times narrower, so the flanks approach further. The closed form of an
+elastic half-plane gives this additional approach: under a force F with Hertzian
+pressure on a strip of half width b, the centre of the strip is displaced further than
+the average over the patch by
 
 .. math:: h = k F \left(\ln\frac{a}{b} + c\right), \quad
     k = \frac{2}{\pi w} \sum_j \frac{1}{E'_j}, \quad
@@ -14,15 +15,14 @@ Hertzian pressure is deeper than the average over the patch by
 with the face width w, the in-plane moduli :math:`E'` and the radius R of relative
 curvature (K. L. Johnson, *Contact Mechanics*, Cambridge 1985, section 2.3 for the
 surface displacement under a strip, eq. (4.43) for b). The terms ln 2 + 1/2 come from
-the centre of the strip, 1727/840 - ln 2 from the weights of the patch. A strip as wide
-as the patch, or wider, needs no correction, and the slope must stay finite at zero
-force. The model therefore uses
+the centre of the strip, and 1727/840 - ln 2 comes from the weights of the patch. A
+strip as wide as the patch or wider needs no correction, and the slope must stay finite
+at zero force. With b_0, the half width at zero force, the model therefore uses
 
 .. math:: h(F) = \frac{k F}{2} \ln\left(1 + \frac{A}{b_0^2 + 2 k R F}\right), \quad
     A = (a e^c)^2 .
 
-The law depends on the force alone and thus has a potential: R is a constant of the
-drive.
+R is a constant of the drive, so the law depends on the force alone and has a potential.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from swgjoint.typing import Array, Index
 CENTRE_OVER_PATCH = 2.0 * log(2.0) + 0.5 - 1727.0 / 840.0
 """Constant c for patch weights (1 - x^2)^3 [-]."""
 NARROWEST = 0.01
-"""Half width b_0 of the strip without force, in half lengths of the patch [-]."""
+"""Half width b_0 of the strip at zero force, relative to that of the patch [-]."""
 ABOUT_PITCH_POINT = 0.5
-"""Length of flank on either side of the pitch point whose curvatures count, in modules
-[-]: teeth make contact there."""
+"""Length of flank on either side of the pitch point over which curvatures are averaged,
+in modules [-]. The teeth make contact there."""
 STRAIGHT = 1e-4
-"""Relative curvature times module below which a pair of points is conforming [-]."""
+"""Relative curvature times module below which two points count as conforming [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,16 +52,16 @@ class Indentation:
     """Indentation law of the flanks of a drive."""
 
     softness: float
-    """Compliance factor k [m/N]."""
+    """Compliance factor k of the law [m/N]."""
     patch: float
-    """Half length a of a patch [m]."""
+    """Half length a of a contact patch [m]."""
     radius: float
     """Radius R of relative curvature [m]; infinite for conforming flanks."""
 
     def __post_init__(self) -> None:
         for key in ("softness", "patch", "radius"):
             if not getattr(self, key) > 0.0:
-                raise ValueError(f"{key} = {getattr(self, key)!r}: expected above 0")
+                raise ValueError(f"{key} = {getattr(self, key)!r}: expected > 0")
 
     @classmethod
     def from_members(
@@ -70,11 +70,11 @@ class Indentation:
         patch: tuple[float, ...],
         profiles: tuple[ToothProfile, ToothProfile],
     ) -> Indentation:
-        """Law of a drive from the properties of its members.
+        """Indentation law of a drive from the properties of its members.
 
         Args:
             softness: Contributions 2 / (pi w E') of the elastic members to k [m/N].
-            patch: Half length of a patch on each of them [m].
+            patch: Half length of a patch on each of these members [m].
             profiles: Tooth profiles of flexspline and circular spline.
         """
         total = sum(softness)
@@ -97,18 +97,18 @@ class Indentation:
 
     @property
     def _growth(self) -> float:
-        """Derivative of b^2 by the force [m^2/N]."""
+        """Derivative of b^2 with respect to the force [m^2/N]."""
         return 2.0 * self.softness * self.radius
 
     def approach(self, force: Array) -> Array:
-        """Approach h [m] under non-negative forces [N]."""
+        """Additional approach h [m] under non-negative forces [N]."""
         if np.isinf(self.radius):
             return np.zeros_like(force)
         width = self._narrowest + self._growth * force
         return 0.5 * self.softness * force * np.log1p(self._widest / width)
 
     def slope(self, force: Array) -> Array:
-        """Slope dh/dF [m/N], always positive."""
+        """Slope dh/dF [m/N]: positive, or zero for conforming flanks."""
         if np.isinf(self.radius):
             return np.zeros_like(force)
         width, most = self._narrowest + self._growth * force, self._widest
@@ -117,7 +117,7 @@ class Indentation:
         return np.asarray(0.5 * self.softness * (steady - falling))
 
     def energy(self, force: Array) -> Array:
-        r"""Strain energy :math:`\int F\,dh` [J]."""
+        r"""Strain energy :math:`\int F\,dh` under non-negative forces F [J]."""
         if np.isinf(self.radius):
             return np.zeros_like(force)
         outer, inner = self._narrowest + self._widest, self._narrowest
@@ -145,11 +145,11 @@ class Indentation:
 def relative_radius(own: ToothProfile, other: ToothProfile) -> float:
     """Radius R of relative curvature of two flanks near the pitch point.
 
-    Any point of one flank may meet any point of the other, so R is the geometric mean
-    over all pairs of points within half a module of the pitch point that can touch,
-    those with positive relative curvature. The contact width varies with the square
-    root of R and the approach with the logarithm of the width: a factor of two in R
-    changes h by a tenth.
+    Any point of one flank may meet any point of the other. R is therefore the geometric
+    mean over all pairs of points within half a module of the pitch point whose relative
+    curvature is positive, so that they can touch. The contact width varies with the
+    square root of R and the approach with the logarithm of the width. A factor of two
+    in R thus changes h by a tenth only.
 
     Args:
         own: Profile of one member.
@@ -168,7 +168,7 @@ def relative_radius(own: ToothProfile, other: ToothProfile) -> float:
 
 
 def _curvatures(profile: ToothProfile, reach: float) -> Array:
-    """Curvatures at equal steps around the pitch point (n,) [1/m]."""
+    """Curvatures at equally spaced points near the pitch point (n,) [1/m]."""
     stations = np.linspace(*profile.contact_range, 501)
     points, _, curvature = profile.evaluate(stations)
     radius = np.hypot(points[:, 0], points[:, 1])
@@ -191,16 +191,17 @@ def softness_of(modulus: float, width: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Strips:
-    """Contacts grouped by their two flanks: all points of a pair form one strip.
+    """Contacts grouped by flank pair: all points of a pair form one contact strip.
 
-    On conforming flanks the force moves between points that are closer than a patch;
-    treated separately, each would indent as if the others were far away.
+    On conforming flanks the force moves between points that are closer together than a
+    patch. If they were treated separately, each would indent as if the others were far
+    away.
     """
 
     law: Indentation
     """Indentation law of the drive."""
     strip: Index
-    """Strip of each contact (n,)."""
+    """Number of the strip to which each contact belongs (n,)."""
     force: Array
     """Force of each strip at which the law is linearised (n_strips,) [N]."""
 
@@ -208,13 +209,13 @@ class Strips:
     def from_contacts(
         cls, law: Indentation, contacts: Contacts, held: Contacts | None, force: Array
     ) -> Strips:
-        """Group candidates into strips under the forces of earlier contacts.
+        """Strips of contact candidates under the forces of earlier contacts.
 
         Args:
             law: Indentation law of the drive.
             contacts: Contact candidates.
-            held: Points that carry force, not necessarily the candidates; None if
-                there are none.
+            held: Points that carry force and need not be candidates; None if there
+                are none.
             force: Normal forces of these points (n_held,) [N].
         """
         keys = _keys(contacts)
@@ -232,15 +233,16 @@ class Strips:
 
     @property
     def compliance(self) -> Array:
-        """Approach of each contact per force on each other contact (n, n) [m/N]."""
+        """Approach of each contact per force on each contact (n, n) [m/N]."""
         same = self.strip[:, None] == self.strip
         return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
 
     def linearise(self) -> tuple[Array, Array]:
         """Linear law for a drive that is linearised once to superpose tooth errors.
 
-        A loaded strip gets its tangent. An unloaded strip may later carry about as much
-        as the others, so it gets the secant up to their mean force.
+        A loaded strip gets its tangent compliance. An unloaded strip may later carry
+        about as much force as the others, so it gets the secant up to their mean force.
+        At least one strip must be loaded.
 
         Returns:
             Compliance (n, n) [m/N] and approach at zero force (n,) [m].
@@ -254,7 +256,7 @@ class Strips:
 
     @property
     def offset(self) -> Array:
-        """Approach of each contact at zero force by the linearised law (n,) [m]."""
+        """Approach of each contact at zero force in the linearised law (n,) [m]."""
         law, force = self.law, self.force
         return (law.approach(force) - law.slope(force) * force)[self.strip]
 
@@ -267,15 +269,15 @@ class Strips:
 
 
 def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> float:
-    """Strain energy of the indentation.
+    """Strain energy of the indentation of all strips.
 
     Args:
         law: Indentation law of the drive.
         contacts: Points that carry force; None if there are none.
-        force: Their normal forces (n,) [N].
+        force: Normal forces of these points (n,) [N].
 
     Returns:
-        Energy of all strips [J].
+        Strain energy [J].
     """
     if contacts is None or not len(contacts):
         return 0.0
@@ -284,5 +286,5 @@ def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> 
 
 
 def _keys(contacts: Contacts) -> Index:
-    """Sector, side and tooth of each contact (n, 3)."""
+    """Sector, side and circular-spline tooth of each contact (n, 3)."""
     return np.stack([contacts.sector, contacts.side, contacts.tooth], axis=-1)

@@ -1,17 +1,19 @@
 r"""Influence of every tooth gap on the output: the drive linearised at one state.
 
 A perfect drive at equilibrium is condensed to its unilateral contacts: those of the
-teeth and those of the wave generator. The unknown v of a contact is its force if it is
-open at the equilibrium and its opening if it is closed. With tooth errors that change
-the gaps by :math:`\delta g`, and with another torque,
+teeth and those of the wave generator. If a contact is open at the equilibrium, its
+unknown v is its force and its slack w is its gap. If it is closed, v is its opening and
+w is its force. Under tooth errors that change the gaps by :math:`\delta g`, and under
+another torque T,
 
 .. math:: 0 \le v \perp w = w_0 + Q\,\delta g + r\,(T - T_0) + M v \ge 0 , \quad
     \psi = \psi_0 + a^T v + b^T \delta g + c\,(T - T_0) .
 
-Without errors v is zero. To first order in the gaps the response would follow from the
-forces of the perfect drive, but errors of a few micrometres change which teeth carry
-load and where the rim lifts off. The influences are therefore superposed in this
-problem and not in its solution.
+Without errors and at the torque T_0 of the equilibrium, v is zero. To first order in
+the gap changes the response would follow from the contact forces of the perfect drive,
+but errors of a few micrometres change which teeth carry load and where the rim lifts
+off. The influences are therefore superposed in the data of this problem rather than in
+its solution.
 """
 
 from __future__ import annotations
@@ -25,69 +27,76 @@ from swgjoint.fe.common.pivoting import exchange, solve_active, solve_many
 from swgjoint.typing import Array, Index, Mask
 
 MOST_CHANGES = 60
-"""Most contact changes that are followed on one side of a torque."""
+"""Largest number of contact changes that are followed in each direction of torque."""
 SOFTEST = 3e-6
-"""Smallest stiffness of a motion that opens contacts, relative to that of a single
-contact [-]."""
+"""Lower bound of the stiffness against motions that open several contacts, relative to
+the stiffness against opening a single one [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """Equilibria with errors, one entry per set of errors; NaN if not solved."""
+    """Equilibria with errors, one entry per set of errors; NaN if unsolved."""
 
     output_angle: Array
     """Output angle psi (n_sets,) [rad]."""
     potential: Array
-    """Potential U + T psi, up to a constant of the influence (n_sets,) [J]."""
+    """Potential U + T psi relative to the equilibrium at which the drive is linearised
+    (n_sets,) [J]."""
     compliance: Array
     """Compliance -d(psi)/dT at fixed input (n_sets,) [rad/(N·m)]."""
     active: Mask
-    """Contacts whose state differs from the perfect drive, a start for other torques
-    (n_sets, m)."""
+    """Contacts whose state differs from that in the perfect drive (n_sets, m); an
+    initial guess for other torques."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Influence:
-    """The drive condensed at one equilibrium to m contacts, the first n at teeth."""
+    """Drive condensed at one equilibrium to m contacts, n of them at teeth.
+
+    The contacts at teeth come first.
+    """
 
     sector: Index
     """Flexspline tooth of each tooth contact (n,)."""
     tooth: Index
     """Circular-spline tooth of each tooth contact (n,)."""
     direction: Array
-    """Derivatives of the tooth gaps by the shifts of these teeth (2, n, 2) [-]."""
+    """Derivatives of the tooth gaps with respect to the shifts of the flexspline tooth
+    and of the circular-spline tooth (2, n, 2) [-]."""
     by_tilt: Array
-    """Derivatives of the tooth gaps by the slope of the circular spline's axis (n, 2)
-    [m/rad]."""
+    """Derivatives of the tooth gaps with respect to the slope of the circular spline's
+    axis (n, 2) [m/rad]."""
     closed: Mask
     """Whether each contact carries force in the perfect drive (m,)."""
     torque: float
     """Torque T_0 of the equilibrium [N·m]."""
     matrix: Array
-    """Matrix M (m, m)."""
+    """Matrix M (m, m): derivatives of the slacks with respect to the unknowns."""
     slack: Array
-    """Slacks w_0 at the equilibrium (m,)."""
+    """Slacks w_0 at the equilibrium (m,): gaps of open contacts [m], forces of closed
+    contacts [N]."""
     by_gap: Array
-    """Derivatives Q of the slacks by the gap changes (m, n)."""
+    """Derivatives Q of the slacks with respect to the gap changes (m, n)."""
     by_torque: Array
-    """Derivatives r of the slacks by the torque (m,)."""
+    """Derivatives r of the slacks with respect to the torque (m,)."""
     angle: float
     """Output angle psi_0 of the equilibrium [rad]."""
     angle_by_value: Array
-    """Derivatives a of the output angle by the unknowns v (m,)."""
+    """Derivatives a of the output angle with respect to the unknowns v (m,)."""
     angle_by_gap: Array
-    """Derivatives b of the output angle by the gap changes (n,) [rad/m]."""
+    """Derivatives b of the output angle with respect to gap changes (n,) [rad/m]."""
     angle_by_torque: float
-    """Derivative c of the output angle by the torque [rad/(N·m)]."""
+    """Derivative c of the output angle with respect to the torque [rad/(N·m)]."""
     supports: Array | None = None
     """Positions of the other contacts in the frame of the wave generator (m - n, 2)
     [m]; 2D models only."""
 
     def with_supports(self) -> Influence:
-        """Append gap changes of the wave generator to those of the teeth.
+        """Influence that also accepts gap changes at the wave generator.
 
-        Such a change adds to the gap of an open contact. The unknown of a closed
-        contact is its opening; a receding outline opens it without motion of the node.
+        They follow those of the teeth, so that there are m gap changes. At an open
+        contact the change adds to the gap. At a closed contact, whose unknown is the
+        opening, a receding outline opens the contact without any motion of the node.
         """
         n = len(self.sector)
         closed = self.closed[n:]
@@ -103,12 +112,12 @@ class Influence:
     def gap_change(
         self, flexspline: Array, circular_spline: Array, tilt: Array | None = None
     ) -> Array:
-        """Change of the tooth gaps by shifts of the teeth in their frames.
+        """Changes of the tooth gaps due to shifts of the teeth in their frames.
 
         Args:
             flexspline: Shifts of the flexspline's teeth (..., N, 2) [m].
             circular_spline: Shifts of the circular spline's teeth (..., N_c, 2) [m].
-            tilt: Slope of the circular spline's axis (..., 2) [rad].
+            tilt: Slope of the circular spline's axis (..., 2) [rad]; None for zero.
 
         Returns:
             Gap changes (..., n) [m].
@@ -130,9 +139,10 @@ class Influence:
         """Equilibria of the linearised drive with tooth errors.
 
         Args:
-            gap_change: Gap changes, one set of errors per row (n_sets, n) [m].
+            gap_change: Gap changes, one set of errors per row (n_sets, n) [m]; m
+                columns after :meth:`with_supports`.
             torque: Torque T [N·m].
-            start: Active sets of a nearby solution (n_sets, m).
+            start: Active sets of a nearby solution (n_sets, m); None for empty sets.
         """
         load = torque - self.torque
         dg = gap_change
@@ -162,7 +172,7 @@ class Influence:
         )
 
     def changes(self, low: float, high: float, contact: Index) -> ContactChanges:
-        """Contact changes over a torque range, without errors of the teeth.
+        """Contact changes over a torque range in the drive without tooth errors.
 
         Args:
             low: Smallest torque [N·m].
@@ -183,10 +193,11 @@ class Influence:
     def _followed(
         self, sign: float, reach: float
     ) -> tuple[list[tuple[int, float]], list[float]]:
-        """Follow the solution over the torque; it is linear between contact changes.
+        """Contact changes on the path of the solution over the torque.
 
-        Each change exchanges one unknown (parametric principal pivoting). The path ends
-        after :data:`MOST_CHANGES` changes.
+        The solution is linear between the changes, each of which exchanges one unknown
+        (parametric principal pivoting). The path ends after :data:`MOST_CHANGES`
+        changes at the latest.
 
         Args:
             sign: Sign of the change of torque.
@@ -222,17 +233,18 @@ class Influence:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gaps:
-    """Tooth contacts of a condensed drive, with derivatives by errors of the teeth."""
+    """Tooth contacts of a condensed drive and the effect of errors on their gaps."""
 
     sector: Index
     """Flexspline tooth of each contact (n,)."""
     tooth: Index
     """Circular-spline tooth of each contact (n,)."""
     direction: Array
-    """Derivatives of the gaps by the shifts of these teeth (2, n, 2) [-]."""
+    """Derivatives of the gaps with respect to the shifts of the flexspline tooth and of
+    the circular-spline tooth (2, n, 2) [-]."""
     by_tilt: Array
-    """Derivatives of the gaps by the slope of the circular spline's axis (n, 2)
-    [m/rad]."""
+    """Derivatives of the gaps with respect to the slope of the circular spline's axis
+    (n, 2) [m/rad]."""
     carries: Mask
     """Whether each contact carries force (n,)."""
 
@@ -249,21 +261,25 @@ def pivot_system(
     angle: float,
     torque: float,
 ) -> Influence:
-    """The complementarity problem of a condensed drive, relative to its equilibrium.
+    """Complementarity problem of a condensed drive, relative to its equilibrium.
 
     Args:
-        system: Matrix (k, k). Its rows are the tooth gaps, the responses of the other
-            supports and equations of further unknowns. Its columns are the tooth
-            forces, the unknowns of the supports (forces, or openings of those that are
-            closed) and the further unknowns.
-        offset: Values of the rows at zero unknowns (k,).
-        gaps: Tooth contacts, the first n rows.
-        closed_supports: Whether each support in the next rows is closed (m - n,).
-        free: Further unknowns that their equations determine.
-        output: Row of the output angle or, if that is an unknown, of its torque.
-        sign: Sign and factor of T in that row.
+        system: Matrix (k, k). Its rows are the tooth gaps, the responses of the
+            supports on the wave generator and the equations of further unknowns. Its
+            columns are the tooth forces, the unknowns of the supports (the opening of a
+            closed support, the force of an open one) and the further unknowns.
+        offset: Values of the rows if all unknowns are zero (k,).
+        gaps: Tooth contacts, to which the first n rows belong.
+        closed_supports: Whether each support in the next m - n rows is closed (m - n,).
+        free: Numbers of the further unknowns that are determined by their equations.
+        output: Row of the output angle or, if the angle is an unknown, of its torque.
+        sign: Factor of the torque T in that row, including its sign.
         angle: Output angle of the equilibrium [rad].
         torque: Torque T of the equilibrium [N·m].
+
+    Raises:
+        numpy.linalg.LinAlgError: If a closed contact opens without resistance or the
+            system is singular.
     """
     n = len(gaps.carries)
     m = n + len(closed_supports)
@@ -292,11 +308,11 @@ def pivot_system(
 
 
 def _stiffening(block: Array) -> Array:
-    """Diagonal that makes the stiffness against openings positive definite (n,).
+    """Addition to the diagonal that makes the stiffness against openings positive (n,).
 
-    If all contacts open, the flexspline moves freely, and under preload the stiffness
-    of that motion may be slightly negative, by a millionth. No equilibrium has this
-    contact state, but the search may pass through it.
+    If all contacts open, the flexspline moves freely. Under preload the relative
+    stiffness of that motion may be negative by about a millionth. No equilibrium has
+    this contact state, but the search may pass through it.
     """
     size = np.diag(block)
     if not (size > 0.0).all():

@@ -1,4 +1,7 @@
-"""Curves of the compliance between two equilibria of a load path."""
+"""Compliance curves between neighbouring equilibria of a load path.
+
+The torque x of each interval runs from 0 to 1.
+"""
 
 from __future__ import annotations
 
@@ -13,25 +16,25 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Compliance over intervals of length 1: a cubic plus jumps."""
+    """Compliance C over n intervals of length 1, each a cubic plus m jumps."""
 
     power: Array
     """Coefficients of the cubic in ascending powers (n, 4) [rad/(N·m)]."""
     place: Array
-    """Places of the jumps, in [0, 1] (n, m)."""
+    """Positions of the jumps, from 0 to 1 (n, m)."""
     jump: Array
     """Jumps of the compliance (n, m) [rad/(N·m)]."""
     feasible: NDArray[np.bool_]
-    """Whether a curve of this form exists (n,)."""
+    """Whether a curve of this form meets the given values (n,)."""
 
     @classmethod
     def where(cls, mask: Mask, one: Curves, other: Curves) -> Curves:
-        """Choose between two sets of curves by interval.
+        """Curves chosen from two sets, interval by interval.
 
         Args:
-            mask: Where to take ``one`` (n,).
+            mask: Intervals that take their curve from ``one`` (n,).
             one: Curves where the mask is true.
-            other: Curves elsewhere.
+            other: Curves where it is false.
         """
         place, jump = [
             np.concatenate([mask[:, None] * a, ~mask[:, None] * b], axis=1)
@@ -46,7 +49,7 @@ class Curves:
 
     @property
     def bend(self) -> Curves:
-        """Deviation of the cubic from a straight line, without the jumps."""
+        """Deviation of the cubics from the straight lines between their end values."""
         power = self.power.copy()
         power[:, 1] = -power[:, 2:].sum(axis=1)
         power[:, 0] = 0.0
@@ -62,7 +65,7 @@ class Curves:
         )
 
     def integrals(self, x: Array) -> tuple[Array, Array, Array]:
-        """C at x (n,), and its first and second integrals from 0 to x."""
+        """Compliance C at x (n,), and its first and second integrals from 0 to x."""
         k = np.arange(4)
         powers = x[:, None] ** k
         after = np.maximum(x[:, None] - self.place, 0.0)
@@ -75,7 +78,7 @@ class Curves:
         return c, once, twice
 
     def integrals_on(self, grid: Array) -> tuple[Array, Array]:
-        """First and second integrals at places of every interval (n, m)."""
+        """First and second integrals of C at grid points of every interval (n, m)."""
         n, m = grid.shape
         k = np.repeat(np.arange(n), m)
         _, once, twice = self.select(k).integrals(grid.ravel())
@@ -85,9 +88,9 @@ class Curves:
 def one_jump(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
     r"""Curves C0 + g x + (Delta - g) H(x - a) with given mean and moment.
 
-    With p = 1 - a the mean is g/2 + (Delta - g) p and the moment g/6 + (Delta - g)
-    p^2/2. Eliminating p leaves a quadratic for the slope g; the root with the smaller
-    magnitude is used.
+    H is the unit step. With p = 1 - a the mean is g/2 + (Delta - g) p and the moment is
+    g/6 + (Delta - g) p^2/2. Eliminating p leaves a quadratic equation for the slope g,
+    whose root of smaller magnitude is used.
 
     Args:
         c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
@@ -119,7 +122,7 @@ def one_jump(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
 
 
 def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
-    """Curves with constant C0 and two jumps of half the change each.
+    """Curves that are constant except for two jumps of half the change each.
 
     Args:
         c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
@@ -130,7 +133,7 @@ def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
     scale = np.abs(c0) + np.abs(mean)
     flat = np.abs(change) <= 1e-12 * scale
     by = np.where(flat, 1.0, change)
-    # p = 1 - a and q = 1 - b of both places: their sum, and the sum of their squares
+    # jumps at a and b: sum of p = 1 - a and q = 1 - b, and sum of their squares
     total, squares = 2.0 * mean / by, 4.0 * moment / by
     apart = 2.0 * squares - total**2
     half = np.sqrt(np.maximum(apart, 0.0))
@@ -149,14 +152,14 @@ def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
 def steps_on_cubic(
     c0: Array, change: Array, mean: Array, moment: Array, steps: list[Steps]
 ) -> Curves:
-    """Curves with given steps, plus the cubic that meets the four figures.
+    """Curves with given steps, plus the cubic that then meets the four values.
 
     Args:
         c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
         change: Change of C over the interval (n,) [rad/(N·m)].
         mean: Mean of C - C0 (n,) [rad/(N·m)].
         moment: Mean of (1 - x) (C - C0) (n,) [rad/(N·m)].
-        steps: Steps of each interval, n of them.
+        steps: Steps in each of the n intervals.
     """
     most = max((one.place.size for one in steps), default=0)
     place, jump = np.zeros((c0.size, most)), np.zeros((c0.size, most))
@@ -173,7 +176,9 @@ def steps_on_cubic(
 
 
 def fit_cubic(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
-    """Curves C0 + Delta x + x (1 - x) (a + b x): the quintic Hermite curve of G.
+    """Curves C0 + Delta x + x (1 - x) (a + b x) with given mean and moment.
+
+    Their second integral is the quintic Hermite curve of the complementary potential.
 
     Args:
         c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].

@@ -1,18 +1,18 @@
 r"""Load curve of a drive over its torque at a fixed input angle, from few equilibria.
 
-Tooth pairs come into contact one by one: the tangent compliance C over the torque T is
-nearly constant between such events and jumps at them. An equilibrium gives the output
-error e, the strain energy U and C. With the complementary potential
+Tooth pairs come into contact one by one. Over the torque T the tangent compliance C is
+therefore nearly constant between such events and jumps at them. An equilibrium gives
+the output error e, the strain energy U and C. With the complementary potential
 
 .. math:: G = U + T e, \quad \frac{dG}{dT} = e, \quad \frac{de}{dT} = -C
 
-two equilibria give C at both ends of the interval between them, its mean (from e) and
-its first moment (from G). If both equilibria predict which contacts change between
-them, see :mod:`swgjoint.fe.plane.contact_prediction`, the curve has those jumps plus a
-cubic that meets the four figures. Otherwise the four figures determine two candidate
-curves: one jump on a common slope, and two equal jumps. If the predictions of both
-ends, or both candidates, agree, the curve is known; otherwise their difference
-estimates its error.
+two equilibria give four values for the interval between them: C at both ends, the mean
+of C (from e) and its first moment (from G). If both equilibria predict which contacts
+change between them (see :mod:`swgjoint.fe.plane.contact_prediction`), the curve has
+those jumps plus a cubic that meets the four values. Otherwise the four values determine
+two candidate curves: one jump on a common slope, and two equal jumps. The difference
+between the predictions of both ends, or between the two candidates, estimates the error
+of the curve.
 """
 
 from __future__ import annotations
@@ -36,25 +36,27 @@ from swgjoint.fe.common.load_curves import (
 from swgjoint.typing import Array, Mask
 
 CHANCE = 0.01
-"""Error that is always assumed for an interval, as a fraction of its length times the
-change of its compliance [-]: several jumps may look like one."""
+"""Error that is always assumed for an interval without predicted changes, as a fraction
+of its length times the change of its compliance [-]. It allows for several jumps that
+look like one."""
 AGREED = 0.5
 """Estimated error of the merged prediction, as a fraction of the difference between the
-predictions of both ends [-]. On five designs the true errors are 0.5 to 1.6 times the
+predictions of both ends [-]. In five designs the true errors are 0.5 to 1.6 times this
 estimate."""
 BENT = 0.1
-"""Estimated error of the cubic correction, as a fraction of its deviation from a line
-[-]."""
+"""Estimated error of the cubic correction, as a fraction of its deviation from a
+straight line [-]."""
 SMOOTH = 0.4
 """Typical smooth variation of the compliance between two steps, as a fraction of the
 compliance [-]."""
 STRONG = 0.02
-"""Smallest step of the compliance that the torques of a table follow, as a fraction of
-the largest compliance [-]."""
+"""Smallest step of the compliance around which the torques of a table become denser, as
+a fraction of the largest compliance [-]."""
 _GRID = np.linspace(0.0, 1.0, 17)
-"""Places in an interval where candidate curves are compared."""
+"""Points of an interval at which candidate curves are compared [-]."""
 _NEAR_END = 0.1
-"""Smallest distance of a division from the ends of an interval, as a fraction of it."""
+"""Smallest distance of a division from the ends of an interval, relative to its length
+[-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +72,8 @@ class LoadPath:
     compliance: Array
     """Tangent compliance C = -de/dT (n,) [rad/(N·m)]."""
     changes: tuple[ContactChanges | None, ...] = ()
-    """Contact changes that each equilibrium predicts: n entries, or empty."""
+    """Contact changes that each equilibrium predicts, None without a prediction (n
+    entries); empty without any predictions."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -88,7 +91,7 @@ class LoadPath:
 
     @property
     def length(self) -> Array:
-        """Length of the intervals (n - 1,) [N·m]."""
+        """Lengths of the torque intervals (n - 1,) [N·m]."""
         return np.diff(self.torque)
 
     def evaluate_at(self, torque: ArrayLike) -> Array:
@@ -134,10 +137,10 @@ class LoadPath:
 
     @property
     def division(self) -> Array:
-        """Torque of the most informative next equilibrium in each interval [N·m].
+        """Torque at which an additional equilibrium helps most, by interval [N·m].
 
-        It is where the candidate curves differ most, or in the middle if they agree.
-        Shape (n - 1,).
+        There the candidate curves or the predictions of both ends differ most; if they
+        agree, it is the middle of the interval. Shape (n - 1,).
         """
         once, _ = self._differences
         worst = _GRID[once.argmax(axis=1)]
@@ -147,11 +150,11 @@ class LoadPath:
 
     @property
     def events(self) -> Array:
-        """Torques at which the compliance of the curve jumps (m,) [N·m]."""
+        """Torques at which the compliance of the curve jumps markedly (m,) [N·m]."""
         one, (known, _, _, both) = self._explained[0], self._predicted
         strong = one.feasible & (np.abs(one.jump[:, 0]) > 0.5 * np.abs(self._jump))
         jumps = (self.torque[:-1] + one.place[:, 0] * self.length)[strong & ~known]
-        # only steps that matter; a cubic has none
+        # only steps that matter
         size = np.abs(both.jump) > STRONG * self.compliance.max()
         places = self.torque[:-1, None] + both.place * self.length[:, None]
         return np.sort(np.concatenate([jumps, places[known[:, None] & size]]))
@@ -168,7 +171,7 @@ class LoadPath:
 
     @cached_property
     def _known(self) -> tuple[Array, Array, Array, Array]:
-        """The four figures of C that the equilibria give for each interval.
+        """The four values that the equilibria give for C in each interval.
 
         The interval is scaled to length 1.
 
@@ -197,8 +200,8 @@ class LoadPath:
         """Curves from the contact changes that the ends of an interval predict.
 
         Returns:
-            Whether both ends predict them (n - 1,); curves by the first end, by the
-            last end and by both.
+            Whether both ends predict changes (n - 1,), and the curves according to the
+            first end, to the last end and to both.
         """
         n = self.torque.size - 1
         empty = np.zeros(0)
@@ -224,7 +227,7 @@ class LoadPath:
 
     @cached_property
     def _curves(self) -> Curves:
-        """Curves by the predictions of both ends, else by the candidate curves."""
+        """Curves from the merged predictions, or from the candidates without them."""
         known, _, _, predicted = self._predicted
         return Curves.where(known, predicted, self._by_jumps)
 
@@ -232,7 +235,8 @@ class LoadPath:
     def _by_jumps(self) -> Curves:
         """Mean of the feasible candidates with jumps, or the cubic without any."""
         one, two, cubic = self._explained
-        # one jump without a slope is exact; two jumps there are so up to a square root
+        # a single jump without slope is exact, whereas two jumps approach it only to the
+        # square root of the round-off
         sharp = one.feasible & (np.abs(one.power[:, 1]) <= 1e-6 * np.abs(self._jump))
         weight = np.stack([one.feasible, two.feasible & ~sharp], axis=1).astype(float)
         total = weight.sum(axis=1, keepdims=True)
@@ -250,7 +254,7 @@ class LoadPath:
 
     @cached_property
     def _differences(self) -> tuple[Array, Array]:
-        """Differences of the candidates, integrated once and twice (n - 1, grid)."""
+        """Differences between candidates, integrated once and twice (n - 1, n_grid)."""
         one, two, cubic = self._explained
         grid = np.broadcast_to(_GRID, (self.length.size, _GRID.size))
         values = [curves.integrals_on(grid) for curves in (one, two, cubic)]

@@ -20,20 +20,21 @@ from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
 
 EVERY = 4
-"""Stride of the input positions that are solved again in the second pitch."""
+"""Every position with a multiple of this number is solved again in the second pitch."""
 ANGLE_GOAL = 0.02
-"""Goal for the error at unseen angles with the first number of angles, as a fraction of
-the peak-to-peak value [-]. It grows with the square root of the number of angles,
-because each doubling leaves fewer solves for the torques."""
+"""Goal for the error at the validation angles with the initial number of angles, as a
+fraction of the peak-to-peak value [-]. It grows with the square root of the number of
+angles, because each doubling leaves fewer solves for the torques."""
 GOAL = 0.04
-"""Goal for the error at unseen angles and torques, as a fraction of the peak-to-peak
-value [-]."""
+"""Goal for the error at the validation angles and torques, as a fraction of the
+peak-to-peak value [-]."""
 STALLED = 0.7
-"""Fraction of the error that may remain after doubling the angles if they are to be
-doubled again [-]: more angles do not remove errors of the mesh."""
+"""Largest ratio of the errors after and before a doubling of the angles with which they
+are doubled again [-]. A larger ratio indicates mesh errors, which more angles do not
+remove."""
 TORQUE_GOAL = 0.04
-"""Goal for the estimated error between torques, as a fraction of the peak-to-peak value
-[-]."""
+"""Goal for the estimated error between the torques, as a fraction of the peak-to-peak
+value [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,11 +48,11 @@ class Effort:
     solves: int
     """Largest number of equilibria for sampling and validation together."""
     unseen: tuple[int, int]
-    """Validation torques of one sign, and validation angles."""
+    """Number of validation torques of one sign, and number of validation angles."""
     torques: int
     """Largest number of torques of one sign in the table."""
     beyond: bool = False
-    """Whether to solve one torque of each sign beyond the largest one at the end."""
+    """Whether to solve, at the end, one torque of each sign beyond the largest one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,22 +67,22 @@ class Pattern(Generic[AnyState]):
     """Output error [rad], energy [J], tangent compliance [rad/(N·m)] and input torque
     [N·m] (4, n_torques, n_angles)."""
     solved: NDArray[np.bool_]
-    """Whether each torque was solved at every angle (n_torques,). The other rows are
-    interpolated along the load paths, their input torque linearly."""
+    """Whether each torque was solved at every angle (n_torques,). All other rows are
+    interpolated along the load paths; their input torque is interpolated linearly."""
     unseen: FullSolves
     """Validation equilibria at other angles and torques."""
     shortfall: str
-    """Goals that the budget of solves did not reach; empty if it reached all."""
+    """Text about the goals that were missed; empty if all were reached."""
     free: bool
-    """Whether clearance leaves the output free without torque. If so, the torques next
-    to zero are added, see :func:`across_clearance`."""
+    """Whether clearance leaves the unloaded output free at any angle. If so, the table
+    has additional torques next to zero, see :func:`across_clearance`."""
     truncated: bool
-    """Whether torques are missing because a solve failed at them or at a smaller one.
-    """
+    """Whether initial torques are missing because a solve failed at them or at a
+    smaller torque."""
     states: dict[float, list[AnyState]]
-    """Equilibria by torque that was solved everywhere, including zero."""
+    """Equilibria at all angles by torque [N·m]: zero and the solved initial torques."""
     info: dict[str, Any]
-    """Results of the checks of periodicity and mirror symmetry, and of the sampling."""
+    """Record of the sampling, and of the checks of periodicity and mirror symmetry."""
 
 
 def solve_mesh_cycle(
@@ -96,24 +97,27 @@ def solve_mesh_cycle(
     tick: Callable[[], None],
     keep: Unfinished | None = None,
 ) -> Pattern[AnyState]:
-    """Solve as many angles and torques as the drive needs, within a budget.
+    """Pattern of a drive, sampled at as many angles and torques as it needs.
 
-    The initial torques are solved at every angle. Angles are doubled until they predict
-    other angles at these torques, and torques are added where the estimated error of
-    the load paths is largest, see :class:`swgjoint.fe.common.load_path.LoadPath`. Then
-    angles are doubled while the validation torques are predicted too poorly. Finally a
-    torque beyond the largest one is solved, see :meth:`ColumnGrid.go_beyond`.
-    Periodicity and mirror symmetry, on which the map relies, are checked at one torque.
+    The initial torques are solved at every angle. The number of angles is doubled until
+    they predict the validation angles at these torques, and torques are added where the
+    estimated error of the load paths is largest, see
+    :class:`swgjoint.fe.common.load_path.LoadPath`. Then the number of angles is doubled
+    while the errors at the validation torques are too large. Finally, a torque beyond
+    the largest one may be solved, see :meth:`ColumnGrid.go_beyond`. All this stays
+    within a budget of solves. Periodicity and mirror symmetry, on which the map relies,
+    are checked at one torque.
 
     Args:
-        follow: The drive.
+        follow: Solver that follows the equilibria of the drive.
         period: Period of the pattern in the input angle [rad].
-        torques: Initial torques without zero, positive ones only if ``symmetric``
+        torques: Initial torques without zero; only positive ones if ``symmetric``
             [N·m].
         effort: Budget of angles, torques and solves.
-        small: Torque that takes up a clearance [N·m].
-        rated: Rated torque; the checks are made at the closest torque [N·m].
-        symmetric: Whether the negative torques are the mirror image.
+        small: Torque that takes up the clearance of the teeth [N·m].
+        rated: Rated torque; the checks are made at the level closest to it [N·m].
+        symmetric: Whether the drive under negative torques is the mirror image of the
+            drive under positive ones.
         tick: Called after every solve.
         keep: Store of equilibria, from which an interrupted run resumes; None stores
             none.
@@ -136,11 +140,11 @@ def solve_mesh_cycle(
     grid.solve_columns(effort.angles)
     if not grid.levels:
         raise ComputationError(
-            "no torque can be solved; the smallest is"
-            f" {min(torques, key=abs):g} N·m of {max(torques, key=abs):g} N·m"
+            f"no equilibrium under the smallest torque, {min(torques, key=abs):g} N·m"
+            f" (largest: {max(torques, key=abs):g} N·m)"
         )
     info = _checks(grid, effort.angles, rated, symmetric=symmetric)
-    # angles that are not sampled, for the validation
+    # validation angles, which are not sampled
     places = unseen_places(effort.unseen[1], effort.most_angles)
     others = [grid.unseen_column(place) for place in places]
     reached = _refine_at_levels(grid, effort, others)
@@ -179,7 +183,7 @@ class _Reached:
 def _checks(
     grid: ColumnGrid[AnyState], count: int, rated: float, *, symmetric: bool
 ) -> dict[str, Any]:
-    """Check periodicity and mirror symmetry at the angles that every map has."""
+    """Checks of periodicity and mirror symmetry at the initial angles."""
     torque = min(grid.levels, key=lambda t: abs(t - rated))
     info: dict[str, Any] = {"second_pitch": _second_pitch(grid, torque, count)}
     if symmetric:
@@ -190,18 +194,21 @@ def _checks(
 def _refine_at_levels(
     grid: ColumnGrid[AnyState], effort: Effort, others: list[AngleColumn[AnyState]]
 ) -> _Reached:
-    """Double the angles and add torques, judged at the initial torques of all columns.
+    """Refine angles and torques until the initial torques are predicted well.
 
     Args:
         grid: Columns at the initial angles.
-        effort: Budget; the solves of the validation are reserved.
+        effort: Budget, from which the validation solves are reserved.
         others: Columns at the validation angles.
+
+    Returns:
+        Number of angles and accuracy reached.
     """
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
     count, levels = effort.angles, [0.0, *grid.levels]
     missed = grid.largest_miss(count, others, levels)
     while True:
-        # torques need not be resolved better than angles
+        # the torques need not be resolved better than the angles
         most = _budget(grid, effort, count, reserved)
         grid.divide(count, most, max(TORQUE_GOAL, missed))
         goal = float(ANGLE_GOAL * np.sqrt(count / effort.angles))
@@ -224,7 +231,7 @@ def _refine_at_unseen(
     unseen: FullSolves,
     reached: _Reached,
 ) -> _Reached:
-    """Double the angles further while the validation torques are predicted too poorly.
+    """Refine the angles while the validation torques are predicted too poorly.
 
     Contact changes between the angles may occur at torques other than the initial ones.
 
@@ -234,6 +241,9 @@ def _refine_at_unseen(
         others: Columns at the validation angles.
         unseen: Equilibria at these angles and the validation torques.
         reached: Number of angles and accuracy so far.
+
+    Returns:
+        Number of angles and accuracy reached.
     """
     torques = np.unique(unseen.torque)
     count, doubt = reached.count, reached.doubt
@@ -251,7 +261,7 @@ def _refine_at_unseen(
 def _budget(
     grid: ColumnGrid[AnyState], effort: Effort, count: int, reserved: int
 ) -> int:
-    """Solves for samples, without those reserved or beyond the largest torque."""
+    """Number of solves available for samples up to the largest torque."""
     last = count * len(grid.signs) if effort.beyond else 0
     return effort.solves - reserved - last
 
@@ -259,30 +269,32 @@ def _budget(
 def _can_double(
     grid: ColumnGrid[AnyState], effort: Effort, count: int, reserved: int
 ) -> bool:
-    """Whether twice as many angles, with one more torque, are within the budget."""
+    """Whether the budget allows twice the angles, the new ones with one more torque."""
     solves = grid.solves + grid.cost(count) + count
     fits = solves <= _budget(grid, effort, count, reserved)
     return 2 * count <= effort.most_angles and fits
 
 
 def _shortfall(reached: _Reached) -> str:
-    """Goals that the refinement has not reached; empty if it has reached all."""
+    """Text about the goals that the refinement missed; empty if it reached all."""
     parts = []
     if reached.missed > GOAL:
         parts.append(
-            f"other torques and angles are off by up to {100.0 * reached.missed:.2g} %"
+            "error at the validation angles and torques:"
+            f" {100.0 * reached.missed:.2g} % of the peak-to-peak value"
         )
     if reached.doubt > TORQUE_GOAL:
         parts.append(
-            f"torques between the samples by an estimated {100.0 * reached.doubt:.2g} %"
+            "estimated error between the sampled torques:"
+            f" {100.0 * reached.doubt:.2g} % of the peak-to-peak value"
         )
-    return ", ".join(parts)
+    return "; ".join(parts)
 
 
 def _table(
     grid: ColumnGrid[AnyState], count: int, effort: Effort, *, symmetric: bool
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Torques, table and marks of the solved torques, as in :class:`Pattern`."""
+    """Torques, table and mask of the solved torques, as in :class:`Pattern`."""
     tables, solved = grid.tables(count, effort.torques)
     if symmetric:
         tables = with_mirrored_torques(tables)
@@ -293,7 +305,7 @@ def _table(
 
 
 def _record(grid: ColumnGrid[AnyState], reached: _Reached) -> dict[str, Any]:
-    """Numbers of angles and solves, and the remaining errors, for the record."""
+    """Record of the numbers of angles and solves and of the remaining errors."""
     columns = [column for _, column in grid.chosen(reached.count)]
     return {
         "angles": reached.count,
@@ -307,7 +319,7 @@ def _record(grid: ColumnGrid[AnyState], reached: _Reached) -> dict[str, Any]:
 def _second_pitch(
     grid: ColumnGrid[AnyState], torque: float, count: int
 ) -> dict[str, float]:
-    """Difference of the output error at some angles between this and the next pitch."""
+    """Largest difference of the output error between the first and the second pitch."""
     follow, theta = grid.follow, grid.angles(count)
     columns = [column for _, column in grid.chosen(count)]
     state, again = columns[-1].states[torque], []
@@ -329,7 +341,8 @@ def _second_pitch(
 def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, Any]:
     """Difference of the output error between the drive and its mirror image.
 
-    It is evaluated at the second angle.
+    It is evaluated at the second angle; it is None if the solve under the opposite
+    torque fails.
     """
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]
@@ -343,11 +356,11 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
 
 
 def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
-    """Add the mirror images of the tables of positive torques.
+    """Tables of positive torques together with their mirror images.
 
     Without load the drive equals its mirror image except for round-off, which exceeds
-    the energy of the smallest torques. The tables of both signs are therefore shifted
-    to the mean of the unloaded table and its mirror image.
+    the strain energy at the smallest torques. The tables of both signs are therefore
+    shifted to the mean of the unloaded table and its mirror image.
     """
     rest = tables[0.0]
     middle = 0.5 * (rest + _mirrored(rest))
@@ -360,8 +373,8 @@ def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
 def _mirrored(values: Array) -> Array:
     """Table of the mirrored drive, under the opposite torque.
 
-    At -T and -theta output error and input torque are opposite, energy and compliance
-    equal.
+    At -T and -theta the output error and the input torque have the opposite sign, while
+    energy and compliance are equal.
     """
     back = np.roll(values[:, ::-1], 1, axis=1)
     return np.asarray(back * np.array([-1.0, 1.0, 1.0, -1.0])[:, None])
