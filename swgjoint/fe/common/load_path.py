@@ -235,8 +235,8 @@ class LoadPath:
     def _by_jumps(self) -> Curves:
         """Mean of the feasible candidates with jumps, or the cubic without any."""
         one, two, cubic = self._explained
-        # a single jump without slope is exact, whereas two jumps approach it only to the
-        # square root of the round-off
+        # a single jump without slope is exact; two jumps approach it only to the square
+        # root of the round-off
         sharp = one.feasible & (np.abs(one.power[:, 1]) <= 1e-6 * np.abs(self._jump))
         weight = np.stack([one.feasible, two.feasible & ~sharp], axis=1).astype(float)
         total = weight.sum(axis=1, keepdims=True)

@@ -11,25 +11,26 @@ import numpy as np
 from swgjoint.typing import Array, Index, Mask
 
 TOLERANCE = 1e-9
-"""Values below this fraction of the largest offset of a problem count as zero [-]."""
+"""Magnitude that counts as zero, as a fraction of a problem's largest offset [-]."""
 TRIES = 20
-"""Block exchanges without progress before single exchanges start; with 3 of them a
-quarter more systems must be solved."""
+"""Number of block exchanges without progress after which single exchanges start. With 3
+instead of 20, a quarter more systems have to be solved."""
 SINGLES = 60
-"""Single exchanges without progress before a problem is solved on its own."""
+"""Number of single exchanges without progress after which a problem is solved by
+Lemke's method."""
 PIVOTS = 10
-"""Most pivots of such a problem divided by its size; contact problems take a fifth of
-their size."""
+"""Largest number of pivots of Lemke's method divided by the size of the problem [-].
+Contact problems need about a fifth of their size."""
 TIE = 1e-12
 """Tolerance of ties in the ratio test of Lemke's method, as a fraction of the largest
 offset [-]."""
 BATCH = 32
-"""Number of problems with active sets of similar size that are solved at once."""
+"""Number of problems, with active sets of similar size, that are solved at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pivoted:
-    """Solutions of :func:`solve_many`; rows are problems."""
+    """Solutions of :func:`solve_many`, one problem per row."""
 
     value: Array
     """Unknowns v, zero where not active (n_problems, n)."""
@@ -38,21 +39,25 @@ class Pivoted:
     active: Mask
     """Active sets (n_problems, n)."""
     solved: Mask
-    """Whether each problem was solved (n_problems,). The others, including those whose
-    active set gives a singular system, are NaN."""
+    """Whether each problem was solved (n_problems,). If not, for example because the
+    system of its active set is singular, its active unknowns and other slacks are NaN.
+    """
 
 
 def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivoted:
     r"""Solve :math:`0 \le v \perp w = q + M v \ge 0` for every row q of the offset.
 
-    Most unknowns are zero in every solution. The problems are therefore solved in the
-    unknowns whose slack is negative at first, and again with those whose slack becomes
-    negative.
+    Most unknowns are zero in every solution. The problems are therefore first solved in
+    those unknowns only whose slack is negative at v = 0. Unknowns whose slack becomes
+    negative are then added, and the problems are solved again.
 
     Args:
         matrix: Matrix M (n, n), positive definite; symmetry is not required.
         offset: Offsets q (n_problems, n).
-        start: Guess of the active sets (n_problems, n); by default empty.
+        start: Guess of the active sets (n_problems, n); None for empty sets.
+
+    Returns:
+        Solutions of all problems.
     """
     scale = np.sqrt(np.diag(matrix))
     q = offset / scale
@@ -87,18 +92,22 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
 def _all_unknowns(
     scaled: Array, q: Array, tolerance: Array, active: Mask
 ) -> tuple[Array, Mask]:
-    """Solve in all given unknowns; returns v where active, else w, and active sets.
+    """Solutions of the problems in all given unknowns.
 
     The method is block principal pivoting: all infeasible unknowns switch between
-    active and inactive. If that makes no progress, only the last one does (Murty),
-    which may take many steps. If that makes no progress either, the problem is solved
-    on its own, see :func:`lemke`.
+    active and inactive. If this makes no progress, only the last infeasible unknown
+    switches (Murty's rule), which may take many steps. If this makes no progress
+    either, the problem is solved by :func:`lemke`.
 
     Args:
         scaled: Matrix M scaled to a unit diagonal (n, n).
         q: Scaled offsets (n_problems, n).
         tolerance: Magnitude that counts as zero (n_problems,).
         active: Guess of the active sets (n_problems, n).
+
+    Returns:
+        v where active, w elsewhere, and NaN if unsolved (n_problems, n); active sets
+        (n_problems, n).
 
     Source:
         Júdice and Pires (1994), "A block principal pivoting algorithm for large-scale
@@ -154,11 +163,11 @@ def _all_unknowns(
 
 
 def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
-    """Active set of one problem by Lemke's method.
+    """Active set of one complementarity problem, found by Lemke's method.
 
-    An artificial unknown that makes all others positive is driven out of the basis: in
-    each pivot the complement of the unknown that has just left enters. For a positive
-    definite matrix this ends at the unique solution.
+    An artificial unknown, large enough that no basic unknown is negative, is driven out
+    of the basis: in each pivot the complement of the unknown that has just left enters.
+    For a positive definite matrix this ends at the unique solution.
 
     Args:
         matrix: Matrix M scaled to a unit diagonal (n, n).
@@ -219,14 +228,17 @@ def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
 
 
 def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
-    """Exchange unknowns and results of a linear map y = A z + q.
+    """Linear map y = A z + q after some unknowns and results have been exchanged.
 
     Args:
         system: Matrix A (k, k).
-        inside: Rows whose result becomes the unknown.
+        inside: Numbers i for which y_i becomes an unknown and z_i a result.
 
     Returns:
         Matrix of the exchanged map (k, k), and the matrix that multiplies q (k, k).
+
+    Raises:
+        numpy.linalg.LinAlgError: If the block of A at these numbers is singular.
     """
     k = len(system)
     outside = np.setdiff1d(np.arange(k), inside)
@@ -246,7 +258,7 @@ def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
 
 
 def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
-    """Solve :math:`M v + r = 0` within every active set, with v zero elsewhere.
+    """Solve :math:`M v + r = 0` in the rows of every active set, with v zero elsewhere.
 
     Args:
         matrix: Matrix M (n, n).
@@ -271,7 +283,7 @@ def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
 
 
 def _at_active(matrix: Array, q: Array, active: Mask) -> Array:
-    """Values v where active and w elsewhere, for given active sets."""
+    """Unknowns v where active and slacks w elsewhere (n_problems, n)."""
     size = int(active.sum(axis=1).max(initial=0))
     if size == 0:
         return q
@@ -290,7 +302,7 @@ def _at_active(matrix: Array, q: Array, active: Mask) -> Array:
 
 
 def _solved(systems: Array, right: Array) -> Array:
-    """Solutions (n_problems, n); NaN where a system is singular."""
+    """Solutions of linear systems (n_problems, n); NaN if a system is singular."""
     try:
         return np.asarray(np.linalg.solve(systems, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:

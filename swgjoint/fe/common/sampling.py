@@ -1,4 +1,4 @@
-"""Sampling of the equilibria of a design over torque and input angle, for its map."""
+"""Sampling of a design's equilibria over torque and input angle, for its map."""
 
 from __future__ import annotations
 
@@ -38,40 +38,42 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 ANGLES = 24
-"""Initial number of input positions over one pitch in a 2D map. It is doubled up to
-:data:`MOST_ANGLES` as needed: contact events leave corners in the error, with some wave
-generators at a few torques only and with others at every angle."""
+"""Initial number of input positions over one pitch in a 2D map. It is doubled as
+needed, up to :data:`MOST_ANGLES`: contact events cause corners in the output error,
+with some wave generators at a few torques only and with others at every angle."""
 MOST_ANGLES = 96
 """Largest number of input positions over one pitch in a 2D map."""
 SOLVES = 1050
-"""Largest number of equilibria of a 2D map; an elliptical wave generator takes half."""
+"""Largest number of equilibria of a 2D map, doubled if both signs of torque are
+sampled. An elliptical wave generator needs about half of it."""
 UNSEEN = (16, 7)
-"""Validation torques of one sign, and validation angles, of a 2D map."""
+"""Numbers of validation torques of one sign and of validation angles of a 2D map."""
 SOLID_ANGLES = 16
-"""Initial number of input positions in a 3D map. An equilibrium of the 3D model takes
-fifty times as long as one of the 2D model."""
+"""Initial number of input positions over one pitch in a 3D map. An equilibrium of the
+3D model takes fifty times as long as one of the 2D model."""
 SOLID_MOST_ANGLES = 16
 """Largest number of input positions over one pitch in a 3D map."""
 SOLID_SOLVES = 220
-"""Largest number of equilibria of a 3D map."""
+"""Largest number of equilibria of a 3D map, doubled for both signs of torque."""
 SOLID_UNSEEN = (2, 2)
-"""Validation torques of one sign, and validation angles, of a 3D map."""
+"""Numbers of validation torques of one sign and of validation angles of a 3D map."""
 TORQUES = 100
 """Largest number of torques of one sign in the table of a map."""
 TOLERANCED_TORQUES = 24
-"""Largest number of torques of one sign in a map with tooth errors, which has ten times
-as many harmonics."""
+"""Largest number of torques of one sign in the table of a map with tooth errors, which
+has ten times as many harmonics."""
 FIXED_SOLVES = 14
-"""Equilibria per angle if the number of angles is prescribed."""
+"""Largest mean number of equilibria per angle if the number of angles is prescribed,
+doubled for both signs of torque."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
-"""Initial torques of both signs at every angle, as fractions of the repeated peak
-torque; more are added at all angles."""
+"""Initial torques, of both signs and at every angle, as fractions of the repeated peak
+torque [-]. More torques are added at all angles."""
 SOLVER = NewtonSolver(step_tolerance=1e-9, thorough_below=1e-6)
-"""Solver of 2D maps. Its tolerances change the output error by 1e-9 rad and the input
-torque by 2e-6 N·m compared with the defaults, and save almost half of the iterations.
-"""
+"""Solver of 2D maps. Compared with the default tolerances, its tolerances change the
+output error by 1e-9 rad and the input torque by 2e-6 N·m and save almost half of the
+iterations."""
 SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
-"""Wave generators that are their own mirror image, as the teeth always are."""
+"""Kinds of wave generator with mirror symmetry, which the teeth always have."""
 
 
 def sample_map(
@@ -82,36 +84,39 @@ def sample_map(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> MapSamples:
-    """Sample equilibria over one pitch and both signs of torque.
+    """Equilibria of a design over one pitch and both signs of torque, for its map.
 
-    Angles and torques of the nonlinear model are added until they predict others,
-    within a budget of equilibria, see
+    Angles and torques of the nonlinear model are added, within a budget of equilibria,
+    until the samples predict equilibria between them, see
     :func:`swgjoint.fe.common.mesh_cycle.solve_mesh_cycle`. A few equilibria at other
     angles and torques are reserved for the validation of the map. With perfect teeth
-    one pitch suffices, and with a symmetric wave generator the negative torques are
-    the mirror image of the positive ones; both properties are checked at rated torque
-    and recorded. Torques at which a solve fails, and larger ones, are omitted, and the
-    samples are marked as truncated. Manufacturing errors are superposed, see
-    :mod:`swgjoint.fe.tolerances.sampling`; a map with them has a rigid wave generator.
+    one pitch suffices, and with a symmetric wave generator the results under negative
+    torques are the mirror image of those under positive ones. Both properties are
+    checked at rated torque and recorded. If a solve fails, its torque and all larger
+    ones are omitted, and the samples are marked as truncated. Manufacturing errors are
+    superposed, see :mod:`swgjoint.fe.tolerances.sampling`; the wave generator is then
+    rigid.
 
-    In the 2D model the balls of a bearing are held on the cam, the first one on the
-    major axis. Balls pass at another rate than teeth, and only the drive without their
-    passage repeats after a pitch and is its own mirror image.
+    In the 2D model the balls of a bearing are held at fixed positions on the cam, the
+    first one on the major axis. Balls and teeth pass at different rates, so the drive
+    repeats after a pitch and has mirror symmetry only if the balls do not pass.
 
     Args:
         design: The drive.
         model: Fidelity, ``2d`` or ``3d``.
-        angles: Input positions over one pitch of the fixed member, with
-            :data:`FIXED_SOLVES` equilibria each. By default as many as the drive needs,
-            starting from :data:`ANGLES` (2D) or :data:`SOLID_ANGLES` (3D).
-        progress: Called with the stage, the solves done and their number.
-        keep: Store of all equilibria, from which an interrupted run resumes with the
-            same samples bit for bit. None stores none.
+        angles: Number of input positions over one pitch of the fixed member, with up to
+            :data:`FIXED_SOLVES` equilibria each on average. None chooses as many as the
+            drive needs, starting from :data:`ANGLES` (2D) or :data:`SOLID_ANGLES` (3D).
+        progress: Called with the stage, the number of finished solves and their largest
+            number.
+        keep: Store of all equilibria, from which an interrupted run resumes with
+            bit-identical samples. None stores none.
 
     Returns:
         Samples of the map.
 
     Raises:
+        DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If the unloaded drive or small torques cannot be solved.
     """
     begin = time.perf_counter()
@@ -131,7 +136,7 @@ def sample_map(
 
     pattern, shown, surface = _solved(design, model, effort, tick, keep)
     _check_torques(design, pattern)
-    # fewer solves may have been needed than progress announced
+    # fewer solves than announced may have been needed
     progress(stage, total, total)
     # springs in series: the cup that the 2D model lacks, boss and housing
     series = series_compliance(design, cup=model == "2d")
@@ -186,11 +191,11 @@ def _solved(
     tick: Callable[[], None],
     keep: Unfinished | None,
 ) -> tuple[Pattern[Any], Callable[[Any], SectorFields], ShapeSurface]:
-    """Equilibria of a drive by one of the two models.
+    """Pattern of equilibria of a drive in the 2D or 3D model.
 
     Returns:
-        The pattern, the function that returns the fields of one of its equilibria, and
-        the displayed surface.
+        The pattern, a function that returns the fields of one of its equilibria, and
+        the surface on which the fields are displayed.
 
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
@@ -221,7 +226,7 @@ def _solved(
 
 
 def _initial_torques(design: Design) -> list[float]:
-    """Torques of every angle at the start [N·m]; positive ones only if symmetric."""
+    """Initial torques of every angle [N·m]; only positive ones if symmetric."""
     peak = ratings_of(design).repeated_peak
     parts = [part * peak for part in LEVELS]
     if design.wave_generator.kind in SYMMETRIC:
@@ -235,13 +240,13 @@ def _check_torques(design: Design, pattern: Pattern[Any]) -> None:
     if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
         peak = ratings_of(design).repeated_peak
         raise ComputationError(
-            f"{design.drive.name}: too few torques can be solved; the smallest is "
-            f"{LEVELS[0] * peak:g} N·m of {LEVELS[-1] * peak:g} N·m repeated peak"
+            f"{design.drive.name}: too few torques for a map can be solved; tried"
+            f" {LEVELS[0] * peak:g} N·m to {LEVELS[-1] * peak:g} N·m (repeated peak)"
         )
 
 
 def _in_series(pattern: Pattern[Any], series: float) -> dict[str, Array]:
-    """Tables of a pattern with a compliance in series [rad/(N·m)], by their names."""
+    """Tables of a pattern by name, with a compliance [rad/(N·m)] added in series."""
     torque = pattern.torque
     error, energy, compliance, input_torque = pattern.table
     return {
@@ -253,10 +258,10 @@ def _in_series(pattern: Pattern[Any], series: float) -> dict[str, Array]:
 
 
 def _order(design: Design) -> tuple[int, int]:
-    """Numbers p and q, for a pattern that is a function of p alpha + q beta.
+    """Numbers p and q of a pattern that is a function of p alpha + q beta.
 
-    The pattern follows the gear angle that depends on the input only, with the sign
-    that makes its phase grow with the input angle theta.
+    Of the gear angles alpha and beta, the one that depends on the input only determines
+    the pattern. Its sign is such that the phase grows with the input angle theta.
     """
     alpha, beta = angle_coefficients(design.drive.layout)
     cycles = design.periodicity
@@ -264,7 +269,7 @@ def _order(design: Design) -> tuple[int, int]:
 
 
 def _label(design: Design, model: str) -> dict[str, Any]:
-    """Validity label: what the samples of a model represent and neglect."""
+    """Validity label: what the samples of a model represent and what they neglect."""
     plane = model == "2d"
     return {
         "model": model,
@@ -293,9 +298,10 @@ def effort_of(
 
     Args:
         model: Fidelity, ``2d`` or ``3d``.
-        angles: Input positions over one pitch; None for as many as the drive needs.
+        angles: Number of input positions over one pitch; None for as many as the drive
+            needs.
         both_signs: Whether negative torques are sampled as well.
-        errors: Whether tooth errors are superposed.
+        errors: Whether manufacturing errors are superposed.
     """
     solid = model == "3d"
     unseen = SOLID_UNSEEN if solid else UNSEEN
@@ -323,7 +329,7 @@ def effort_of(
 
 
 def follower_in_plane(design: Design) -> Continuation:
-    """The 2D drive with perfect, frictionless teeth, as it is sampled for maps."""
+    """Solver of the 2D drive that maps sample, without errors and friction."""
     perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
         model=sector_model(
@@ -340,7 +346,7 @@ def follower_in_plane(design: Design) -> Continuation:
 
 
 def _follower_3d(design: Design) -> SolidContinuation:
-    """The 3D drive with perfect teeth, as it is sampled for maps."""
+    """Solver of the 3D drive that maps sample, without manufacturing errors."""
     perfect = without_errors(design)
     return SolidContinuation(
         model=solid_sector_model(perfect, half="auto"),
@@ -352,8 +358,8 @@ def _follower_3d(design: Design) -> SolidContinuation:
 def maps_bearing(design: Design) -> bool:
     """Whether a 2D map includes the bearing of the wave generator.
 
-    A map with manufacturing errors does not: they are superposed on a drive with a
-    rigid wave generator.
+    A map with manufacturing errors does not include it, because they are superposed on
+    a drive with a rigid wave generator.
     """
     return carries_bearing(design) and not has_errors(design)
 

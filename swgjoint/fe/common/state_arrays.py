@@ -1,4 +1,4 @@
-"""Equilibria as named arrays, for files from which a run resumes bit for bit."""
+"""Equilibria as named arrays, for files from which a run resumes bit-identically."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 def pack(value: Any, name: str) -> dict[str, Any]:
-    """Flatten a state or a part of it into named arrays, with the names of its types.
+    """Named arrays that represent a state or a part of it, including type names.
 
     Args:
         value: A state, an array, a number, an outcome, a tuple of these, or None.
@@ -54,7 +54,7 @@ def pack(value: Any, name: str) -> dict[str, Any]:
 
 
 def unpack(arrays: Mapping[str, Any], name: str) -> Any:
-    """Rebuild the value that :func:`pack` flattened.
+    """Value from the named arrays that :func:`pack` returned.
 
     Args:
         arrays: Arrays by name.
@@ -64,9 +64,9 @@ def unpack(arrays: Mapping[str, Any], name: str) -> Any:
         The value; None if there is no array of that name.
 
     Raises:
-        KeyError: If the arrays are not those of a state.
-        TypeError: As for ``KeyError``.
-        ValueError: As for ``KeyError``.
+        KeyError: If the name of a type or of an outcome is unknown.
+        TypeError: If an entry of a state is missing or has the wrong type.
+        ValueError: If an entry of a state has an invalid value.
     """
     kind = arrays.get(f"{name}.{_KIND}")
     if kind is None:
@@ -91,10 +91,10 @@ def unpack(arrays: Mapping[str, Any], name: str) -> Any:
 
 
 def copy_contiguous(value: T) -> T:
-    """Copy a value with the memory layout of arrays that were read from a file.
+    """Value whose arrays have the memory layout of arrays that were read from a file.
 
-    The last digit of a sum may depend on the memory layout; a run that resumes from a
-    file must not differ from one that was never interrupted.
+    The last digit of a sum may depend on the memory layout, and the results of a
+    resumed run must not differ from those of an uninterrupted run.
     """
     changed: Any = value
     if isinstance(value, np.ndarray):

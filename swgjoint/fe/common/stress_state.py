@@ -1,4 +1,4 @@
-"""Stress state of the 2D models: plane stress, plane strain or in between."""
+"""Stress state of the 2D models: plane stress, plane strain or a state in between."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from swgjoint.gear.wide_ring import RimAcross, edge_confinement, rim_confinement
 from swgjoint.units import mm
 
 COARSE = 0.5
-"""Mesh refinement of the sector that determines the rim stiffness [-]. It is the same
-for every mesh of a drive, so that refining the mesh changes nothing else. Its stiffness
-is within 1 % of the converged one."""
+"""Mesh refinement of the sector that determines the rim stiffness [-]. It does not
+depend on the mesh of the drive, so that the stress state stays the same when that mesh
+is refined. The rim stiffness is within 1 % of the converged value."""
 
 
 def confinement(design: Design, member: MemberName, profile: ToothProfile) -> float:
@@ -26,11 +26,11 @@ def confinement(design: Design, member: MemberName, profile: ToothProfile) -> fl
 
     Args:
         design: The drive; its ``mesh.stress_state`` selects the state. With ``auto`` a
-            rim that can bend follows :func:`swgjoint.gear.wide_ring.rim_confinement`; a
-            circular spline whose outside is fixed cannot bend, and only its edges are
-            free.
+            rim that can bend follows :func:`swgjoint.gear.wide_ring.rim_confinement`. A
+            circular spline with a fixed outside cannot bend; it follows
+            :func:`swgjoint.gear.wide_ring.edge_confinement`.
         member: Flexspline or circular spline.
-        profile: Its tooth profile.
+        profile: Tooth profile of this member.
     """
     chosen = design.mesh.stress_state
     if chosen != "auto":
@@ -48,7 +48,7 @@ def rim_across(design: Design, member: MemberName, profile: ToothProfile) -> Rim
     Args:
         design: The drive.
         member: Flexspline or circular spline.
-        profile: Its tooth profile.
+        profile: Tooth profile of this member.
     """
     material = design.material_of(member)
     mesh = sector_mesh(profile, getattr(design, member).rim_mm * mm, COARSE)
@@ -73,7 +73,8 @@ def rim_across(design: Design, member: MemberName, profile: ToothProfile) -> Rim
 def second_moment(mesh: SectorMesh) -> float:
     """Second moment of area of a sector about the tangent through its centroid [m^4].
 
-    It governs the bending of one pitch of the toothed rim across the width.
+    It determines the bending stiffness of one pitch of the toothed rim across the
+    width.
     """
     # two triangles per quadrilateral, exact for the polygon of the mesh
     corners = np.concatenate([mesh.mesh.t[[0, 1, 2]], mesh.mesh.t[[0, 2, 3]]], axis=1)

@@ -1,4 +1,4 @@
-"""Choice of the torques and angles that a map samples and at which it is validated."""
+"""Choice of the torques of a map, and of the torques and angles of its validation."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.typing import Array
 
 FEWEST_TORQUES = 40
-"""Smallest number of torques of one sign in a table."""
+"""Smallest number of torques of one sign that a table gets, if permitted."""
 
 
 def common_torques(
     paths: list[LoadPath], own: set[float], least: float, most: int
 ) -> Array:
-    """Torques of the table, denser where the load paths have their events.
+    """Torques of a table, denser where the compliance of the load paths jumps.
 
     Args:
         paths: Load paths of all angles.
-        own: Torques that were solved at all angles [N·m].
+        own: Positive torques that were solved at all angles [N·m].
         least: Lower bound of the added torques [N·m].
         most: Largest number of added torques.
 
@@ -34,7 +34,7 @@ def common_torques(
     fine = np.linspace(least, top, 4001)
     rank = np.searchsorted(pool, fine, side="right") / pool.size
     share = (fine - least) / (top - least)
-    # half follows the events; half is spread out, slightly denser at small torques
+    # half of the torques follow the jumps; the others are slightly denser near zero
     measure = 0.5 * rank + 0.25 * share + 0.25 * np.sqrt(share)
     spread = np.interp((np.arange(count) + 0.5) / count, measure, fine)
     levels = np.array(sorted(own))
@@ -52,7 +52,8 @@ def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
         parts: Positions as fractions of the period (m,) [-].
 
     Returns:
-        Values and derivatives by the fraction of the period, each (m, ...).
+        Values, and derivatives with respect to the fraction of the period, each
+        (m, ...).
     """
     n = len(values)
     modes = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
@@ -63,21 +64,21 @@ def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
 
 
 def unseen_places(count: int, finest: int) -> list[float]:
-    """Angles between those of all grids, spread over the pitch.
+    """Validation angles, spread over the pitch and between the angles of all grids.
 
     Args:
-        count: Number of angles.
-        finest: Number of steps of the finest grid.
+        count: Number of validation angles.
+        finest: Number of angles of the finest grid.
 
     Returns:
-        Places in steps of the finest grid.
+        Angles as multiples of the step of the finest grid, not integers [-].
     """
-    # offset by the golden section of a step, so that no grid comes near all of them
+    # offset by the golden section of their spacing, so that no grid is near all of them
     return [finest * (k + 0.381966) / count for k in range(count)]
 
 
 def unseen_parts(count: int) -> Array:
-    """Validation torques as fractions of the largest one, half of them small.
+    """Validation torques as fractions of the largest torque [-], half of them small.
 
     None of them is close to the initial torques of a map.
     """

@@ -1,4 +1,4 @@
-"""Adaptive choice of the torques and angles of a map, from columns of equilibria."""
+"""Refinement of columns of equilibria in torque and angle, and the table of a map."""
 
 from __future__ import annotations
 
@@ -18,32 +18,35 @@ from swgjoint.maps.samples import FullSolves
 from swgjoint.typing import Array
 
 POTENTIAL_WAVES = 1.0
-"""Assumed waves per pitch of the error of the complementary potential [-]; the
-derivative of this error by the angle is an error of the input torque."""
+"""Assumed number of waves per pitch of the error of the complementary potential [-].
+The derivative of this error with respect to the angle is an error of the input torque.
+"""
 LEAST_PEAK = 0.05
-"""Lower bound of the peak-to-peak values that errors are divided by, as a fraction of
-the largest one over the torques [-]."""
+"""Lower bound of the peak-to-peak values to which errors are related, as a fraction of
+the largest peak-to-peak value over the torques [-]."""
 WORST = 0.5
-"""Intervals with more than this fraction of the largest estimated error are divided
-next [-]."""
+"""Fraction of the largest estimated error above which intervals are divided together
+with the worst one [-]."""
 REACH = 1.1
-"""Safety factor on the linear estimate of the additional torque at which the stiffest
-angle turns as far as the softest one does at the largest torque [-]."""
+"""Safety factor on the linear estimate of the torque beyond the largest one under which
+the output turns as far at the stiffest angle as it does at the softest angle under the
+largest torque [-]."""
 BEYOND = (0.02, 0.15)
-"""Bounds of this additional torque, as fractions of the largest torque [-]."""
+"""Bounds of the difference between this torque and the largest one, as fractions of the
+largest one [-]."""
 AHEAD = 0.4
-"""Range of a prediction of contact changes, as a fraction of the largest torque [-]. It
-exceeds the distance between any two common torques."""
+"""Range of a prediction of contact changes in either direction, as a fraction of the
+largest torque [-]. It exceeds the distance between neighbouring common torques."""
 
 
 @dataclass(kw_only=True, eq=False)
 class ColumnGrid(SolvedColumns[AnyState]):
-    """Columns of equilibria that are refined until they suffice."""
+    """Columns of equilibria that are refined until they predict a map well enough."""
 
     def path(
         self, column: AngleColumn[AnyState], sign: float
     ) -> tuple[LoadPath, tuple[Array, Array]]:
-        """Load curve of one sign of the torque.
+        """Load curve of a column for one sign of the torque.
 
         For negative torques it is the curve of the mirrored drive.
 
@@ -52,8 +55,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
             sign: Sign of the torques, 1.0 or -1.0.
 
         Returns:
-            The curve, and the solved torques and input torques [N·m] of the (mirrored)
-            drive.
+            The curve; the solved torques and the input torques [N·m] of the drive, or
+            of the mirrored drive.
         """
         common = [*self.levels, *self.beyond]
         outward: list[float] = sorted(
@@ -83,7 +86,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def _changes(
         self, column: AngleColumn[AnyState], state: AnyState, sign: float, top: float
     ) -> ContactChanges | None:
-        """Contact changes that a state of a column predicts, see :meth:`path`."""
+        """Contact changes that a state of a column predicts, for :meth:`path`."""
         key = (state.torque, sign)
         if key not in column.changes:
             low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
@@ -96,13 +99,14 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def largest_miss(
         self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
     ) -> float:
-        """Largest error at other angles, as a fraction of the peak-to-peak value.
+        """Largest error at other angles, as a fraction of the peak-to-peak value [-].
 
-        Both the output error and the input torque count; the latter is predicted as the
-        derivative of the complementary potential by the angle.
+        It is the larger one of the errors of output error and input torque. The latter
+        is predicted as the derivative of the complementary potential with respect to
+        the angle.
 
         Args:
-            count: Number of columns from which the others are predicted.
+            count: Number of equally spaced columns that predict the others.
             others: Columns at other angles.
             torques: Torques at which to compare [N·m].
         """
@@ -132,7 +136,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def _curves_at(
         self, columns: list[AngleColumn[AnyState]], torque: float
     ) -> tuple[Array, Array]:
-        """Output error and energy of columns at any torque, by their curves (n,)."""
+        """Output error [rad] and energy [J] of columns on their curves, each (n,)."""
         if torque == 0.0:
             error, energy, _, _ = self._row(columns, 0.0)
             return error, energy
@@ -147,7 +151,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
         return np.arange(count) / count
 
     def _row(self, columns: list[AngleColumn[AnyState]], torque: float) -> Array:
-        """Figures of columns at a torque that all of them have (4, n)."""
+        """Values of columns at a torque that all of them have (4, n)."""
         return np.array(
             [
                 self.figures(c.states[torque] if torque else c.rest.state, c.theta)
@@ -156,15 +160,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
         ).T
 
     def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
-        """Peak-to-peak values over the angle of output error and input torque.
+        """Peak-to-peak values of output error and input torque over the angle.
 
         Args:
             count: Number of columns.
             sign: Sign of the torques, 1.0 or -1.0.
 
         Returns:
-            Magnitudes of the torques [N·m], peak to peak of the output error [rad] and
-            of the input torque [N·m] at them, each (n,).
+            Magnitudes of the torques [N·m], and the peak-to-peak values of the output
+            error [rad] and of the input torque [N·m] at these torques, each (n,).
         """
         curves = [self.path(column, sign)[0] for _, column in self.chosen(count)]
         first = max(curve.torque[0] for curve in curves)
@@ -179,24 +183,24 @@ class ColumnGrid(SolvedColumns[AnyState]):
         for table in (errors, moments):
             height = np.ptp(table, axis=0)
             height = np.maximum(height, LEAST_PEAK * height.max())
-            # with two angles the derivative vanishes: no reference for its error
+            # with two angles the derivative vanishes and gives no reference for errors
             heights.append(np.where(height > 0.0, height, np.inf))
         return torque, heights[0], heights[1]
 
     def cost(self, count: int) -> int:
-        """Number of solves for ``count`` columns at the common torques."""
+        """Number of solves of ``count`` columns at all levels and at zero torque."""
         return count * (1 + len(self.levels))
 
     def divide(self, count: int, most: int, goal: float) -> float:
         """Add common torques until the estimated errors between them meet a goal.
 
-        All angles get the same torques. The error of the curves between them then
-        changes slowly from angle to angle and hardly affects the input torque, a
-        derivative by the angle.
+        All angles get the same torques. The error of the curves between the torques
+        then changes slowly from angle to angle and has almost no effect on the input
+        torque, which is a derivative with respect to the angle.
 
         Args:
             count: Number of columns.
-            most: Largest number of solves in total.
+            most: Largest total number of solves.
             goal: Goal for the largest estimated error, as a fraction of the
                 peak-to-peak value [-].
 
@@ -215,11 +219,13 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 self._add_torque(count, torque)
 
     def _doubts(self, count: int) -> list[tuple[float, float]]:
-        """Estimate the error of every interval between common torques.
+        """Estimated errors of the intervals between common torques.
+
+        Intervals in which a solve has failed are omitted.
 
         Returns:
             For each interval the estimated error, as a fraction of the peak-to-peak
-            value, and the torque at which to divide it [N·m].
+            value [-], and the torque at which to divide the interval [N·m].
         """
         wanted: list[tuple[float, float]] = []
         for sign in self.signs:
@@ -250,10 +256,10 @@ class ColumnGrid(SolvedColumns[AnyState]):
         return wanted
 
     def _add_torque(self, count: int, torque: float) -> None:
-        """Solve one more torque in every column, unless it fails in one."""
+        """Solve one more torque in every column; it is dropped if a column fails."""
         columns = [column for _, column in self.chosen(count)]
         for k, column in enumerate(columns):
-            # start from the previous angle; none is a whole pitch away
+            # start from the previous angle if there is one within the pitch
             self._more(column, [torque], columns[max(0, k - 1) : k])
             if torque in column.failed:
                 self.failed.append(torque)
@@ -263,10 +269,10 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def go_beyond(self, count: int) -> None:
         """Solve one torque of each sign beyond the largest one in every column.
 
-        A map ends at the torsion that the stiffest angle reaches. With the additional
-        torque the stiffest angle turns as far as the softest angle does at the largest
-        torque, so that no angle leaves the map below the largest torque. If one of the
-        solves fails, the map ends at the largest torque.
+        A map ends at the torsion that the output reaches at the stiffest angle. Under
+        the additional torque this torsion equals that at the softest angle under the
+        largest torque, so that the map covers all torques up to the largest one at
+        every angle. If one of the solves fails, the map ends at the largest torque.
         """
         columns = [column for _, column in self.chosen(count)]
         for sign in self.signs:
@@ -284,11 +290,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 self.beyond.append(torque)
 
     def unseen(self, others: list[AngleColumn[AnyState]], count: int) -> FullSolves:
-        """Validation equilibria at other angles, without torque and at other torques.
+        """Validation equilibria at other angles, at zero torque and at other torques.
 
         Args:
             others: Columns at these angles.
-            count: Number of torques of one sign.
+            count: Number of validation torques of one sign.
         """
         rows = []
         for column in others:
@@ -315,14 +321,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def tables(self, count: int, most: int) -> tuple[dict[float, Array], set[float]]:
         """Tables of the map by torque.
 
-        Clearance adds rows, see :func:`across_clearance`.
+        If clearance leaves the output free, rows are added at its ends, see
+        :func:`across_clearance`.
 
         Args:
             count: Number of columns.
             most: Largest number of torques of one sign in addition to the solved ones.
 
         Returns:
-            Figures (4, count) by torque [N·m], and the torques that all columns solved.
+            Values (4, count) by torque [N·m], and the torques solved in all columns.
         """
         columns = [column for _, column in self.chosen(count)]
         rest = np.array([self.figures(c.rest.state, c.theta) for c in columns]).T
