@@ -15,7 +15,8 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
             (n_offsets,).
         blocks: Displacements of the responding tooth per force on the loaded one, in
             the frames of the teeth (n_offsets, n_rows, n_b) [m/N].
-        force: Forces at the n_b flank freedoms of each of the N teeth (N, n_b) [N].
+        force: Forces at the n_b degrees of freedom of the flanks of every tooth
+            (N, n_b) [N].
 
     Returns:
         Displacements (N, n_rows) [m].

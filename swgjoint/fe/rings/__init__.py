@@ -1,1 +1,1 @@
-"""A fast 2D model of thin rings with the ball bearing of the wave generator."""
+"""Fast 2D model of a drive as thin rings, with the wave generator's ball bearing."""

@@ -16,15 +16,15 @@ from swgjoint.typing import Array
 def transmission_error(
     design: Design, input_angles: ArrayLike, *, torque: float | None = None
 ) -> Array:
-    """Output minus ideal output, psi - theta/i, under torque of one sign (n,) [rad].
+    """Output minus ideal output, psi - theta/i, under a constant torque (n,) [rad].
 
-    Every angle is solved independently, so that their order does not matter.
+    Every angle is solved independently, so the order of the angles does not matter.
 
     Args:
         design: The drive, with its manufacturing errors.
         input_angles: Input angles theta, any number of turns (n,) [rad].
-        torque: Output torque T [N·m]; None selects 1 % of the rated torque, which takes
-            up the clearance.
+        torque: Output torque T, not zero [N·m]; None selects 1 % of the rated torque,
+            which takes up the clearance.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.
@@ -45,9 +45,9 @@ def transmission_error(
 
 
 def output_turn_angles(design: Design, count: int, seed: int = 0) -> Array:
-    """Random input angles, one in each of equal parts of an output turn (n,) [rad].
+    """Random input angles, one in each of n equal parts of an output turn (n,) [rad].
 
-    The random placement avoids aliasing with the orders of teeth, balls and turns.
+    The random positions avoid aliasing with the orders of teeth, balls and turns.
 
     Args:
         design: The drive.

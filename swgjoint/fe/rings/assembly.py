@@ -1,4 +1,4 @@
-"""Sum of the energies of many small parts and its banded tangent."""
+"""Sum of the potentials of many small parts, with its banded tangent."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from swgjoint.typing import Array, Index
 
 
 class BandedAssembly:
-    """Energy, gradient and Hessian of many small parts."""
+    """Energy [J], gradient [N] and Hessian of the potential of many small parts."""
 
     def __init__(self, size: int) -> None:
         self.energy = 0.0
@@ -24,8 +24,9 @@ class BandedAssembly:
         Args:
             name: Name under which :meth:`shares` sums the parts.
             dofs: Degrees of freedom of the parts (n, m).
-            gradient: Gradients (n, m); None if they are already included.
-            hessian: Hessians (n, m, m).
+            gradient: Gradients (n, m) [N]; None if ``self.gradient`` already contains
+                them.
+            hessian: Hessians (n, m, m) [N/m].
         """
         if gradient is not None:
             self.gradient += np.bincount(
@@ -34,7 +35,11 @@ class BandedAssembly:
         self._parts.append((name, dofs, hessian))
 
     def shares(self, way: Array) -> dict[str, float]:
-        """Twice the tangent energy of a displacement, by name of the part."""
+        """Twice the tangent strain energy of a displacement, by name of the part [J].
+
+        Args:
+            way: Displacement of all degrees of freedom (size,) [m].
+        """
         energies: dict[str, float] = {}
         for name, dofs, hessian in self._parts:
             moved = way[dofs]
@@ -43,16 +48,16 @@ class BandedAssembly:
         return energies
 
     def solve(self, order: Index, held: int, right: Array, anchor: float) -> Array:
-        """Solve with one coordinate fixed and an addition to the diagonal.
+        """Solutions with one coordinate fixed and an addition to the diagonal.
 
         Args:
             order: Position of every coordinate in an order of narrow bandwidth (size,).
-            held: Number of the coordinate that is fixed.
-            right: Right-hand sides (size, n).
+            held: Number of the fixed coordinate.
+            right: Right-hand sides (size, n) [N].
             anchor: Addition to the diagonal, relative to its largest entry [-].
 
         Returns:
-            Solutions (size, n).
+            Solutions (size, n) [m].
         """
         size = len(order)
         rows, columns, values = [], [], []

@@ -25,12 +25,13 @@ def linearise(
 
     Args:
         model: The rings.
-        state: Positions of the rings and previous feet of the contacts.
+        state: Positions of the rings, and earlier feet of the contacts as initial
+            guess.
         teeth: Whether the teeth can touch.
 
     Returns:
-        The state with its forces, the assembled potential, and the number of the race's
-        coordinate that is fixed.
+        The state with its forces, the assembled potential, and the number of the
+        coordinate that is fixed to prevent rotation of the race.
     """
     total = BandedAssembly(model.size)
     first = model.rim.size
@@ -55,12 +56,12 @@ def linearise(
 
 
 def race_on_balls(model: ThinRing, state: ThinRingState, race: Array) -> PressedBalls:
-    """Contact of a state's balls with a race.
+    """Contact of the balls of a state with a race.
 
     Args:
         model: The rings.
-        state: Wave-generator angle, ball phase and feet of the balls.
-        race: Coordinates of the race (size,) [m].
+        state: State with the wave-generator angle, ball phase and feet of the balls.
+        race: Coordinates of the race (race.size,) [m].
     """
     return model.press_balls(race, state.alpha, state.phase, state.ball_feet)
 
@@ -68,6 +69,7 @@ def race_on_balls(model: ThinRing, state: ThinRingState, race: Array) -> Pressed
 def _balls(
     model: ThinRing, state: ThinRingState, race: Array, total: BandedAssembly
 ) -> ThinRingState:
+    """Contact of the race with the balls."""
     pressed = race_on_balls(model, state, race)
     on = np.flatnonzero(pressed.overlap > 0.0)
     near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
@@ -151,9 +153,9 @@ def _press(
     Args:
         total: Assembly to which the contacts are added.
         name: Name of the part, one of :data:`PARTS`.
-        seen: Distances of the points.
-        rows: Derivatives of u_n, u_t, beta and, with m = 4, of the section's rotation
-            by the coordinates (n, m, n_dofs).
+        seen: Distances of the points from the ring.
+        rows: Derivatives of u_n, u_t, beta and, if m = 4, of the rotation of the
+            section with respect to the coordinates (n, m, n_dofs).
         dofs: Numbers of these coordinates (n, n_dofs).
         force: Contact forces F (n,) [N].
         stiffness: Contact stiffnesses k (n,) [N/m].

@@ -7,10 +7,10 @@ r"""Equilibrium of the thin rings: Newton's method on the potential.
 with sums over balls j, contact points p between bore and race, and tooth contacts t; g
 is a gap and :math:`\langle -g\rangle = \max(-g, 0)` the overlap. Every contact is
 compliant, so the potential contains the conditions :math:`0 \le F \perp g + F/k \ge 0`,
-and Newton's method with the tangent of the overlapping contacts is their primal-dual
-active set. psi is the best-fit rotation of the rim. Without friction the race is free
-to rotate; one coordinate of one of its nodes is fixed to prevent this, and the reaction
-there is zero.
+and Newton's method with the tangent of the overlapping contacts is a primal-dual
+active-set method for them. T is the torque on the output, and psi is the best-fit
+rotation of the rim. Without friction the race is free to rotate; one coordinate of one
+of its nodes is fixed to prevent this, and the reaction there is zero.
 """
 
 from __future__ import annotations
@@ -29,19 +29,23 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True)
 class ThinRingSolver:
-    """Settings of the iteration."""
+    """Settings of Newton's method for the thin rings."""
 
     max_iterations: int = 80
+    """Largest number of iterations."""
     shortest: float = 1e-3
-    """Shortest part of a Newton step; steps are halved while the potential rises [-].
-    """
+    """Smallest fraction of a Newton step; steps are halved while the potential rises
+    [-]."""
     step_tolerance: float = 3e-12
-    """Displacement increment at which the iteration ends, in radii of the rim [-]."""
+    """Displacement increment at which the iteration ends, as a fraction of the radius
+    of the rim [-]."""
     stride: float = 0.1
-    """Largest displacement increment of an iteration, in lobe heights [-]."""
+    """Largest displacement increment of an iteration, as a fraction of the lobe height
+    [-]."""
     anchor: float = 1e-11
-    """Stiffness added to every step, relative to the largest one, so that an output
-    held by no tooth has a tangent; it does not shift an equilibrium [-]."""
+    """Addition to the diagonal of the tangent, relative to its largest entry [-]. It
+    keeps the tangent regular if no tooth holds the output, and it does not shift an
+    equilibrium."""
 
     def __call__(
         self,
@@ -109,7 +113,7 @@ class ThinRingSolver:
 
 
 def _moved(step: Array) -> float:
-    """Largest displacement of a node [m]."""
+    """Largest displacement component of a node in a step [m]."""
     return float(np.abs(step.reshape(-1, 2, 2)[:, 0]).max())
 
 
@@ -119,8 +123,8 @@ def rim_rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
     Args:
         model: The rings.
         q: Coordinates of rim and race (size,) [m].
-        near: Rotation to which the whole turns are matched [rad]; the result has no
-            jump within half a turn of it.
+        near: Rotation that selects the number of whole turns [rad]; the result differs
+            from it by at most half a turn.
     """
     x0 = model.rim.reference[:, 0]
     x = q[: model.rim.size].reshape(-1, 2, 2)[:, 0]
@@ -140,7 +144,7 @@ def _finished(
     *,
     teeth: bool,
 ) -> ThinRingState:
-    """The state with forces and energy at its final positions."""
+    """State with the forces and the energy at its final positions."""
     state, _, _ = linearise(model, state, teeth=teeth)
     psi, _ = rim_rotation(model, state.q, state.rotation)
     return replace(state, rotation=psi, outcome=outcome, history=tuple(history))

@@ -1,13 +1,15 @@
 r"""Points that face the mean line of a ring: balls from inside, a bore from outside.
 
-The foot of the perpendicular from a point p moves with the point and with the ring.
-With the normal n from the line towards the point, tangent :math:`\tau`, curvature
-:math:`\kappa = n\cdot r''/|r'|^2` and distance :math:`g = n\cdot(p - r)`,
+The foot r of the perpendicular from a point p moves with the point and with the ring.
+With the normal n from the line towards the point, the tangent :math:`\tau`, the
+curvature :math:`\kappa = n\cdot r''/|r'|^2` and the distance
+:math:`g = n\cdot(p - r)`,
 
 .. math:: dg = u_n, \quad
     d^2g = -\frac{\kappa u_t^2 + 2u_t\beta + g\beta^2}{1 - g\kappa} + n\cdot d^2p,
 
-where :math:`u = dp - dr` at the foot and :math:`\beta = n\cdot dr'/|r'|`.
+where :math:`u = dp - dr` at the foot has the components :math:`u_n` and :math:`u_t`
+along n and :math:`\tau`, and :math:`\beta = n\cdot dr'/|r'|`.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Facing:
-    """Distances of n points from a ring, and their derivatives."""
+    """Distances of n points from the mean line of a ring, and their derivatives."""
 
     place: Array
     """Feet on the ring, element number plus parameter (n,)."""
@@ -35,14 +37,14 @@ class Facing:
     dofs: Index
     """Degrees of freedom of the ring at the feet (n, 8)."""
     by_ring: Array
-    """Derivatives of u_n, u_t and beta by these degrees of freedom (n, 3, 8)."""
+    """Derivatives of u_n, u_t and beta with respect to ``dofs`` (n, 3, 8)."""
     curvature: Array
     """Curvature kappa (n,) [1/m]."""
 
     def bends(self) -> Array:
-        """Second derivatives of the distance by u_n, u_t, beta (n, 3, 3).
+        """Second derivatives of the distance with respect to u_n, u_t, beta (n, 3, 3).
 
-        The term of the point, n . d2p, is not included.
+        The term n . d2p, which depends on the motion of the point, is not included.
         """
         form = np.zeros((len(self.distance), 3, 3))
         form[:, 1, 1] = self.curvature
@@ -75,8 +77,11 @@ def distances_to_ring(
         points: The points (n, 2) [m].
         start: Initial guess of the feet, element number plus parameter (n,).
         inside: Whether the points are inside the ring.
-        own: Elements on whose cubics the feet are sought, beyond their ends if
-            necessary (n,); None for the elements at the feet.
+        own: Elements on whose cubics the feet are sought, beyond the ends of the
+            elements if necessary (n,); None for the elements that contain the feet.
+
+    Returns:
+        Feet, distances and derivatives.
     """
     place = ring.nearest(q, points, start, own)
     element, xi = ring.split(place, own)
@@ -110,19 +115,20 @@ def distances_to_ring(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FacingSurface:
-    """Points at fixed places and a constant offset from a ring's mean line.
+    """Points at fixed positions along a ring and a constant offset from its mean line.
 
     They move with the sections of the ring.
     """
 
     ring: HermiteRing
+    """Ring that carries the points."""
     place: Array
-    """Element number plus parameter (n,)."""
+    """Positions along the ring, element number plus parameter (n,)."""
     offset: float
     """Offset outwards from the mean line [m]."""
 
     def points(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Points (n, 2) [m], unit tangents, outward normals, and |r'| [m] (n,)."""
+        """Points [m], unit tangents, outward normals, each (n, 2); |r'| (n,) [m]."""
         r, v, _ = self.ring.evaluate_at(q, self.place)
         length = np.hypot(v[:, 0], v[:, 1])
         tangent = v / length[:, None]
@@ -130,16 +136,16 @@ class FacingSurface:
         return r + self.offset * outward, tangent, outward, length
 
     def rows(self, q: Array, seen: Facing) -> tuple[Index, Array, Array]:
-        """How the points move with the degrees of freedom of their ring.
+        """Derivatives of the motion of the points with respect to their own ring.
 
         Args:
-            q: Coordinates of the ring (size,) [m].
+            q: Coordinates of the ring that carries the points (size,) [m].
             seen: Distances of all points from the other ring.
 
         Returns:
             Degrees of freedom (n, 8); derivatives of u_n, u_t and of the rotation of
-            the section by these (n, 3, 8); factor of the squared rotation in
-            n . d2p (n,) [m].
+            the section with respect to them (n, 3, 8); factor of the squared rotation
+            in n . d2p (n,) [m].
         """
         element, xi = self.ring.split(self.place)
         value, slope, _ = hermite(xi)

@@ -1,7 +1,7 @@
-"""A plain ring pulled apart by two rollers in its bore, with large displacements.
+"""Plain ring pulled apart by two rollers in its bore, with large displacements.
 
-This model is independent of the toothed ring. It is a total Lagrangian formulation with
-quadratic elements on a curved mesh of a quarter of the ring.
+This model is independent of the models of toothed rings. It uses a total Lagrangian
+formulation with quadratic elements on a curved mesh of a quarter of the ring.
 """
 
 from __future__ import annotations
@@ -29,18 +29,23 @@ from swgjoint.errors import ComputationError, Outcome
 from swgjoint.typing import Array
 
 RADIAL, AROUND = 2, 32
-"""Elements of the coarsest mesh through the thickness and along a quarter."""
+"""Numbers of elements through the thickness and along a quarter, coarsest mesh."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeRing:
-    """A ring of rectangular cross-section in plane stress."""
+    """Ring of rectangular cross-section in plane stress."""
 
     outer_radius: float
+    """Outer radius [m]."""
     thickness: float
+    """Radial thickness [m]."""
     width: float
+    """Axial width [m]."""
     youngs_modulus: float
+    """Young's modulus [Pa]."""
     poisson_ratio: float
+    """Poisson's ratio [-]."""
 
     @property
     def mean_radius(self) -> float:
@@ -49,22 +54,22 @@ class FreeRing:
 
     @property
     def bending_stiffness(self) -> float:
-        """Bending stiffness E I [N m^2]."""
+        """Bending stiffness E I [N·m^2]."""
         return self.youngs_modulus * self.width * self.thickness**3 / 12.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PulledRing:
-    """Equilibria of a ring whose rollers move apart, one row per position."""
+    """Equilibria of a ring whose rollers move apart, one row per roller position."""
 
     angle: Array
-    """Directions in which the outside is measured, from the rollers' axis (m,) [rad].
-    """
+    """Directions in which the outside is measured, as angles from the axis through the
+    rollers (m,) [rad]."""
     deflection: Array
-    """Outward displacement of the outside in these directions (n, m) [m]; the
-    directions are fixed in space, like those of a dial indicator."""
+    """Outward displacement of the outside in these directions (n, m) [m]. The
+    directions are fixed in space, like that of a dial indicator."""
     force: Array
-    """Force of each roller (n,) [N]."""
+    """Force that each of the two rollers exerts on the ring (n,) [N]."""
     outline: Array
     """Deformed outside of a quarter, starting at the roller (n, k, 2) [m]."""
 
@@ -72,10 +77,10 @@ class PulledRing:
 def pull_ring(
     ring: FreeRing, roller_travel: Array, angle: Array, *, refinement: int = 1
 ) -> PulledRing:
-    r"""Pull a ring apart by two opposite rollers without friction.
+    r"""Equilibria of a ring pulled apart by two opposite rollers without friction.
 
-    The contact stays at the crown because any roller that fits is more curved than the
-    bore.
+    The contact stays at the crown because any roller that fits into the bore is more
+    curved than the bore.
 
     .. math:: \int S : F^T \nabla v = 0, \quad S = 2\mu E + \lambda^* \mathrm{tr}E\,I,
         \quad E = \tfrac12 (F^T F - I), \quad F = I + \nabla u
@@ -84,11 +89,12 @@ def pull_ring(
         ring: The ring.
         roller_travel: Outward travel of each roller (n,) [m], in the order in which
             the equilibria are followed.
-        angle: Directions of measurement, from the rollers' axis (m,) [rad].
+        angle: Directions of measurement, as angles from the axis through the rollers
+            (m,) [rad].
         refinement: Factor on the number of elements in each direction.
 
     Raises:
-        ComputationError: If Newton's method fails.
+        ComputationError: If Newton's method fails or the outside folds.
     """
     basis = _quarter(ring, refinement)
     x, y = basis.doflocs
@@ -118,7 +124,7 @@ def pull_ring(
                 break
         px, py = (x + u)[u_x[outside]], (y + u)[u_y[outside]]
         around = np.arctan2(px, py)
-        # without convergence, or folded up on the way
+        # no convergence, or a solution whose outside is folded
         if np.abs(step).max() >= 1e-9 * abs(travel) or (np.diff(around) <= 0.0).any():
             raise ComputationError(
                 f"plain ring, roller travel = {travel:g} m:"
@@ -138,7 +144,7 @@ def pull_ring(
 
 
 def _quarter(ring: FreeRing, refinement: int) -> Basis:
-    """Quadratic elements on the quarter x, y >= 0, finer towards the roller."""
+    """Basis of quadratic elements in the quarter x, y >= 0, finer near the roller."""
     through = np.linspace(-1.0, 0.0, RADIAL * refinement + 1) * ring.thickness
     share = np.linspace(0.0, 1.0, AROUND * refinement + 1)
     mesh = MeshQuad2.from_mesh(MeshQuad.init_tensor(through, 0.5 * pi * share))
@@ -150,7 +156,7 @@ def _quarter(ring: FreeRing, refinement: int) -> Basis:
 
 
 def _forms(ring: FreeRing) -> tuple[LinearForm, BilinearForm]:
-    """Internal forces and their derivative at ``state``."""
+    """Forms of the internal forces and of their derivative at ``state``."""
     nu = ring.poisson_ratio
     lame = ring.youngs_modulus * nu / (1.0 - nu**2)
     shear = ring.youngs_modulus / (2.0 * (1.0 + nu))

@@ -1,18 +1,18 @@
 r"""Friction losses of a thin-ring drive under torque with a locked wave generator.
 
-The flexspline slides in the tooth spaces and on the race; the balls roll. Along the
-loading path without friction, contacts of normal force N that slide by :math:`d\sigma`
-dissipate the work
+The flexspline slides in the tooth spaces and on the race, while the balls roll. If the
+drive is loaded along its frictionless path, contacts with the normal force N that slide
+by :math:`d\sigma` dissipate the work
 
 .. math:: dW = \mu \sum N\,|d\sigma| = R\,dx,
 
 so that a torque :math:`R = dW/dx` resists any change of the torsion x. The loop is the
-curve T(x) without friction, shifted by R upwards while x grows and by R downwards while
-x falls. This is a first-order result in mu. It treats every contact as sliding, so it
-is wrong near the reversals of a loop, and sticking makes the real loop narrower.
+frictionless curve T(x), shifted upwards by R while x grows and downwards by R while x
+falls. This is a first-order result in mu. It assumes that every contact slides, so it
+does not apply near the reversals of a loop; sticking makes the real loop narrower.
 
-The race is free to creep in the bore: it rotates so that the work is least. The
-coefficient of friction mu of the teeth is assumed for the rim on the race as well.
+The race is free to creep in the bore: it rotates such that the work is least. The
+coefficient of friction mu of the teeth is also assumed between rim and race.
 """
 
 from __future__ import annotations
@@ -34,58 +34,59 @@ from swgjoint.gear.mounting import series_compliance
 from swgjoint.typing import Array
 
 POSITIONS = 2
-"""Wave-generator angles of a mean; the torsion differs by 0.2 % between them."""
+"""Number of wave-generator angles in a mean; the torsion differs by 0.2 % between
+them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RubbedPath:
-    """Torsion without friction and work of friction per mu along a loading path.
+    """Frictionless torsion, and friction work per mu, along a loading path.
 
     All values are means over the wave-generator angles. The torsion is zero in the
     middle of the clearance.
     """
 
     torque: Array
-    """Torques T, positive and increasing; the first takes up the clearance (n,) [N·m].
-    """
+    """Torques T, positive and increasing (n,) [N·m]. The first one takes up the
+    clearance."""
     torsion: Array
-    """Torsion x including that of the springs in series (n,) [rad]."""
+    """Torsion x, including the torsion of the springs in series (n,) [rad]."""
     series: float
     """Compliance of the springs in series, mostly the cup [rad/(N·m)]."""
     teeth_work: Array
-    """Sum of N |d sigma| of the teeth between neighbouring torques (n - 1,) [J]."""
+    """Sum of N abs(d sigma) of the teeth between neighbouring torques (n - 1,) [J]."""
     race_work: Array
-    """Sum of N |d sigma| of rim and race between neighbouring torques (n - 1,) [J]."""
+    """Sum of N abs(d sigma) between rim and race, as for the teeth (n - 1,) [J]."""
     compliance: Array
     """Tangent compliance including the springs in series (n,) [rad/(N·m)]."""
     shares: Mapping[str, Array]
     """Shares of ``rim``, ``race``, ``balls``, ``bore`` (contact of rim and race) and
-    ``teeth`` in the compliance, each (n,) [-]; the rest is in series."""
+    ``teeth`` in the compliance, each (n,) [-]. The springs in series have the rest."""
     balls: Array
-    """Number of loaded balls (n,)."""
+    """Mean number of loaded balls (n,)."""
     tooth_pairs: Array
-    """Number of loaded tooth contacts (n,)."""
+    """Mean number of loaded tooth contacts (n,)."""
     outcome: Outcome
-    """Outcome of the first solve that failed; the path ends before it."""
+    """``CONVERGED``, or the outcome of a failed solve, before which the path ends."""
 
     @property
     def torque_per_mu(self) -> Array:
-        """Friction torque per mu, R/mu, between neighbouring torques (n - 1,) [N·m]."""
+        """Friction torque R/mu between neighbouring torques (n - 1,) [N·m]."""
         return np.asarray((self.teeth_work + self.race_work) / np.diff(self.torsion))
 
     def torsion_at(self, torque: float) -> float:
-        """Torsion at a torque [rad], extrapolated linearly below the first one.
+        """Torsion at a torque [rad], extrapolated linearly below the first torque.
 
         Args:
-            torque: Torque T from zero to the last one of the path [N·m].
+            torque: Torque T, from zero to the last torque of the path [N·m].
 
         Raises:
             InputError: If the path does not reach this torque.
         """
         last = float(self.torque[-1])
-        if not 0.0 <= torque <= last * (1.0 + 1e-9):  # accept rounding of the last one
+        if not 0.0 <= torque <= last * (1.0 + 1e-9):  # the last torque may be rounded
             raise InputError(
-                f"torque = {torque:.6g} N·m: outside the path; accepted: 0 to"
+                f"torque = {torque:.6g} N·m: outside the loading path; accepted: 0 to"
                 f" {last:.6g} N·m"
             )
         if torque <= self.torque[1]:
@@ -96,8 +97,11 @@ class RubbedPath:
     def hysteresis_loss(self, mu: float) -> float:
         """Width of the loop at zero load, including the clearance [rad].
 
-        The falling branch crosses zero load where T(x) = R, the rising one where
-        T(x) = -R.
+        The falling branch crosses zero load where T(x) = R, and the rising branch does
+        so where T(x) = -R.
+
+        Args:
+            mu: Coefficient of friction [-].
 
         Raises:
             InputError: If the path does not reach R.
@@ -121,13 +125,13 @@ def friction_path(
     *,
     angles: ArrayLike | None = None,
 ) -> RubbedPath:
-    """Load a drive with a locked wave generator and sum the sliding of its contacts.
+    """Torsion and sliding of a drive that is loaded with its wave generator locked.
 
     Args:
-        design: The drive, whose wave generator has a ball bearing; its coefficient of
-            friction must be zero.
-        torques: Positive torques T [N·m]; 1 % of the rated torque is added as the
-            first, and smaller ones are dropped.
+        design: The drive. Its wave generator must have a ball bearing, and its
+            coefficient of friction must be zero.
+        torques: Positive torques T [N·m]. A torque of 1 % of the rated torque is added
+            as the first one, and smaller ones are dropped.
         angles: Wave-generator angles [rad]; None chooses :data:`POSITIONS` angles.
 
     Raises:
@@ -167,15 +171,16 @@ def friction_path(
 def _along(
     model: ThinRing, alpha: float, torques: Array
 ) -> tuple[list[list[float]], Outcome]:
-    """Torsion, works, balls, tooth contacts, compliance and its parts, by torque.
+    """Rows of a loading path at one angle, and the outcome of the last solve.
 
-    The works count from the previous torque [J]; the compliance excludes the springs in
-    series.
+    A row contains the torsion [rad], the friction work per mu of teeth and race since
+    the previous torque [J], the numbers of loaded balls and tooth contacts, and the
+    compliance [rad/(N·m)], in total and by part. The springs in series are excluded.
     """
     rest = solve_unloaded(model, alpha)
     if not rest.outcome.ok:
         return [], rest.outcome
-    # torsion counts from midway between the smallest torque and its opposite
+    # the torsion counts from the middle between the smallest torque and its opposite
     down = solve_loaded(model, rest, -float(torques[0]))
     if not down.outcome.ok:
         return [], down.outcome

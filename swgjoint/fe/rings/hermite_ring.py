@@ -1,15 +1,17 @@
-r"""A closed elastic ring of Hermite cubics with large rotations and small strains.
+r"""Closed elastic ring of Hermite cubics with large rotations and small strains.
 
-The coordinates of a node are its position and the derivative of the position by the
-element parameter, so that the mean line is smooth and a force may act anywhere on it:
+The coordinates of a node are its position and the derivative of the position with
+respect to the element parameter. The mean line is therefore smooth, and a force may act
+anywhere on it. The strain energy is
 
 .. math:: U = \int \tfrac12 EA\,\varepsilon^2
     + \tfrac12 EI\,(\vartheta' - \vartheta_0')^2\,ds, \quad
     \varepsilon = |r'| - |r_0'|, \quad \vartheta' = \frac{r' \times r''}{|r'|^2},
 
-where primes denote derivatives by the arc length of the undeformed ring and theta is
-the angle of the tangent. Rotations are exact; the strain of a section is linear in the
-distance from the mean line.
+where primes denote derivatives with respect to the arc length s of the undeformed ring,
+the index 0 denotes the undeformed ring, and :math:`\vartheta` is the angle of the
+tangent. Rotations are exact; the strain of a section is linear in the distance from the
+mean line.
 """
 
 from __future__ import annotations
@@ -25,14 +27,14 @@ from swgjoint.typing import Array, Index
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
-"""Gauss points and weights on an element, where bending is linear and stretch nearly
-constant [-]."""
+"""Gauss points and weights on an element [-]. They suffice because the bending of an
+element is linear and its stretch nearly constant."""
 _EYE = np.eye(2)
 _CROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # v x w = v . (_CROSS w)
 
 
 def hermite(xi: Array) -> tuple[Array, Array, Array]:
-    """Shape functions and their first two derivatives (n, 4) at parameters (n,)."""
+    """Shape functions and first two derivatives at parameters (n,), each (n, 4)."""
     x, one = xi, np.ones_like(xi)
     value = [
         1 - 3 * x**2 + 2 * x**3,
@@ -52,19 +54,21 @@ def hermite(xi: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HermiteRing:
-    """A ring about the origin; node 0 is on +y, the others follow counter-clockwise.
+    """Elastic ring about the origin.
 
-    Coordinates form an array (elements, 2, 2) of node, position or derivative, and x or
-    y; arguments ``q`` hold them flattened (size,).
+    Node 0 is on the positive y axis, and the others follow counter-clockwise. The
+    coordinates form an array (elements, 2, 2) whose axes are the node, position or
+    derivative, and x or y. Arguments ``q`` contain them flattened (size,).
     """
 
     radius: float
     """Radius of the undeformed mean line [m]."""
     elements: int
+    """Number of elements, equal to the number of nodes."""
     stretching: float
     """Axial stiffness E A [N]."""
     bending: float
-    """Bending stiffness E I [N m^2]."""
+    """Bending stiffness E I [N·m^2]."""
 
     @property
     def step(self) -> float:
@@ -78,17 +82,17 @@ class HermiteRing:
 
     @cached_property
     def reference(self) -> Array:
-        """Coordinates of the undeformed ring [m]."""
+        """Coordinates of the undeformed ring (elements, 2, 2) [m]."""
         phi = 2.0 * pi / self.elements * np.arange(self.elements)
         outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
         along = np.stack([-np.cos(phi), -np.sin(phi)], -1)
         return np.stack([self.radius * outward, self.step * along], axis=1)
 
     def two_lobes(self, height: float, angle: ArrayLike, major: float) -> Array:
-        """Coordinates of nodes deflected by two lobes without stretch (n, 2, 2) [m].
+        """Coordinates of nodes on a ring that two lobes deflect (n, 2, 2) [m].
 
-        At the angle phi from the major axis, the displacement is w0 cos 2 phi outwards
-        and -w0/2 sin 2 phi counter-clockwise.
+        To first order the ring is not stretched: at the angle phi from the major axis
+        the displacement is w0 cos 2 phi outwards and -w0/2 sin 2 phi counter-clockwise.
 
         Args:
             height: Deflection w0 at the major axis [m].
@@ -113,14 +117,14 @@ class HermiteRing:
         return np.concatenate([first, np.roll(first, -1, axis=0)], axis=1)
 
     def nodal(self, q: Array) -> Array:
-        """Coordinates of both nodes of every element (elements, 4, 2) [m]."""
+        """Coordinates of the two nodes of every element (elements, 4, 2) [m]."""
         x = q.reshape(self.elements, 2, 2)
         return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
 
     def evaluate_at(
         self, q: Array, place: Array, own: Index | None = None
     ) -> tuple[Array, Array, Array]:
-        """Position and its first two derivatives by the element parameter, (n, 2) each.
+        """Position and its first two derivatives by element parameter, each (n, 2) [m].
 
         Args:
             q: Coordinates of the ring (size,) [m].
@@ -133,12 +137,12 @@ class HermiteRing:
         return value, first, second
 
     def split(self, place: Array, own: Index | None = None) -> tuple[Index, Array]:
-        """Element numbers and parameters of places on the ring.
+        """Element numbers and parameters of positions along the ring, each (n,).
 
         Args:
             place: Element number plus parameter, any number of turns (n,).
-            own: Elements whose cubics are extended to places beyond their ends (n,);
-                None for the elements that contain the places.
+            own: Elements whose cubics are extended to positions beyond their ends (n,);
+                None for the elements that contain the positions.
         """
         if own is not None:
             return own, place - own
@@ -151,7 +155,7 @@ class HermiteRing:
         return first, second
 
     def _strains(self, q: Array) -> tuple[Array, ...]:
-        """Derivatives, length, stretch and curvature at all Gauss points."""
+        """Both derivatives, length, stretch and curvature at all Gauss points."""
         first, second = self._shape
         local = self.nodal(q)
         v = np.einsum("ga,eai->egi", first, local)
@@ -184,12 +188,12 @@ class HermiteRing:
 
         unit = v / length[..., None]
         square = length**2
-        turn_w = w @ _CROSS.T  # derivative of v x w by v
-        turn_v = -v @ _CROSS.T  # and by w
+        turn_w = w @ _CROSS.T  # derivative of v x w with respect to v
+        turn_v = -v @ _CROSS.T  # derivative with respect to w
         cross = turning * square * h
         d_v = (turn_w - (2.0 * cross / square)[..., None] * v) / square[..., None] / h
         d_w = turn_v / square[..., None] / h
-        # gradients of stretch and turning by (v, w)
+        # gradients of stretch and curvature with respect to (v, w)
         s = np.concatenate([unit / h, np.zeros_like(unit)], axis=-1)
         k = np.concatenate([d_v, d_w], axis=-1)
         grad = hoop[..., None] * s + moment[..., None] * k

@@ -1,4 +1,4 @@
-"""Equilibria of the thin rings under torque, wave generator locked, no friction."""
+"""Frictionless equilibria of the thin rings under torque, wave generator locked."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from swgjoint.fe.rings.state import ThinRingState, initial_state
 from swgjoint.typing import Array
 
 SMALL = 0.01
-"""Part of the rated torque that takes up the clearance of the teeth [-]."""
+"""Fraction of the rated torque that takes up the clearance of the teeth [-]."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-"""Golden section, which spreads angles over the tooth pitch [-]."""
+"""Golden section, whose multiples spread angles over the tooth pitch [-]."""
 HALVINGS = 5
-"""Number of times that failing torque steps are halved."""
+"""Largest number of times that failing torque steps are halved."""
 
 
 def positions(model: ThinRing, count: int) -> Array:
-    """Wave-generator angles spread over ball passage and tooth pitch (count,) [rad].
+    """Wave-generator angles spread over ball passage and tooth pitch [rad].
 
     Args:
         model: The rings.
         count: Number of angles.
+
+    Returns:
+        Angles (count,) [rad].
     """
     k = np.arange(count)
     passage = 2.0 * pi / model.bearing.balls / model.bearing.cage_share
@@ -33,7 +36,7 @@ def positions(model: ThinRing, count: int) -> Array:
 
 
 def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRingState:
-    """The drive with its output held at the ideal ratio.
+    """Equilibrium with the output held at its ideal angle alpha/i.
 
     Args:
         model: The rings.
@@ -47,7 +50,9 @@ def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRin
 
 
 def without_torque(model: ThinRing, alpha: float) -> ThinRingState:
-    """The unloaded drive; an output that clearance leaves free is at the ideal ratio.
+    """Equilibrium without torque.
+
+    If clearance leaves the output free, the output is at its ideal angle alpha/i.
 
     Args:
         model: The rings.
@@ -65,7 +70,7 @@ def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRi
     Args:
         model: The rings.
         state: State from which the search starts. If no tooth carries load in it, its
-            torque counts as zero; a small ``torque`` then converges fastest.
+            torque counts as zero, and the search converges best for a small ``torque``.
         torque: Torque T, not zero [N·m].
 
     Returns:

@@ -1,9 +1,9 @@
-"""The thin-ring model of a design: rim, outer race, balls on a rigid cam, teeth.
+"""Thin-ring model of a design: rim, outer race, balls on a rigid cam, teeth.
 
 The model is 2D, in the frame of the circular spline; alpha is the wave-generator angle.
 The rim is a line with the stiffness of its toothed sector, and the race is a second
-line inside it. The two are in unilateral contact, whose compliance is that of half of
-each thickness.
+line inside the rim. Rim and race are in unilateral contact. The compliance of this
+contact is that of half the thickness of the rim plus half the thickness of the race.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ from swgjoint.typing import Index
 from swgjoint.units import mm
 
 ELEMENTS = 190
-"""Least number of elements of a ring: eight between neighbouring balls of 23."""
+"""Smallest number of elements of a ring: eight between neighbouring balls if there are
+23 of them."""
 PER_ELEMENT = GAUSS[0][[0, 2]]
-"""Contact points of bore and race on an element, two of equal weight [-]."""
+"""Element parameters of both contact points of bore and race, equally weighted [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,8 +41,11 @@ class ThinRing(RaceOnBalls):
     """Rim, race, balls, cam and teeth of a drive, in SI units."""
 
     rim: HermiteRing
+    """Toothed rim of the flexspline."""
     nodes_per_tooth: int
+    """Number of nodes of the rim per tooth."""
     teeth: ThinRingTeeth
+    """Teeth of both members."""
     press: float
     """Contact stiffness of bore and race per length of the rim's line [N/m^2]."""
 
@@ -59,15 +63,16 @@ class ThinRing(RaceOnBalls):
 
     @property
     def size(self) -> int:
-        """Degrees of freedom of both rings."""
+        """Number of degrees of freedom of both rings."""
         return self.rim.size + self.race.size
 
     @cached_property
     def order(self) -> Index:
         """Positions of the coordinates in an order of narrow bandwidth (size,).
 
-        Both rings are numbered together, from node 0 in both directions alternately,
-        so that the band of the closed ring is only twice that of an open one.
+        Both rings are numbered together, starting at node 0 and proceeding alternately
+        in both directions. The bandwidth of the closed rings is thus only twice that of
+        open ones.
         """
         count = self.rim.elements
         place = np.arange(count)
@@ -114,7 +119,7 @@ def check_modelled(design: Design) -> None:
 
 
 def thin_ring(design: Design) -> ThinRing:
-    """Ring model of a design.
+    """Thin-ring model of a design.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.

@@ -1,4 +1,4 @@
-"""The outer race on balls and a rigid cam: Hertz contact with clearance."""
+"""Outer race on balls and a rigid cam: Hertz contact with clearance."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ class PressedBalls:
     seen: Facing
     """Distances of the ball centres from the race."""
     overlap: Array
-    """Overlap of the balls with race and cam (balls,) [m]."""
+    """Overlap of each ball with race and cam together (balls,) [m]."""
     force: Array
     """Ball forces Q (balls,) [N]."""
     push: Array
     """Force vectors on the race (balls, 2) [N]."""
     input_torque: float
-    """Power of the ball forces per speed of the wave generator [N·m]."""
+    """Power of the ball forces divided by the speed of the wave generator [N·m]."""
     cage_torque: float
-    """Power of the ball forces per speed of the cage relative to the cam [N·m]."""
+    """Power of the ball forces divided by the speed of the cage relative to the cam
+    [N·m]."""
 
     @property
     def energy(self) -> float:
@@ -46,11 +47,13 @@ class RaceOnBalls:
     """Race, balls and cam, in SI units."""
 
     race: HermiteRing
+    """Outer race."""
     bearing: BallBearing
+    """Dimensions and material of the bearing."""
     ball_constant: float
     """Hertz constant K of one ball, F = K overlap^1.5 [N/m^1.5]."""
     cam: NeutralLine
-    """Line of the ball centres when the balls sit on the cam."""
+    """Line on which the ball centres move when the balls sit on the cam."""
     cam_offset: Array
     """Centre of the cam in the frame of the wave generator (2,) [m]."""
     lobe_height: float
@@ -58,8 +61,8 @@ class RaceOnBalls:
     ratio: float
     """Signed ratio i of input to output speed [-]."""
     cage_held: bool = False
-    """Whether the cage is fixed to the cam instead of rolling. Every tooth pitch then
-    has the balls in the same places, and only the passage of balls is lost."""
+    """Whether the cage is fixed to the cam instead of rolling. The balls then have the
+    same positions in every tooth pitch, and only their passage is neglected."""
 
     @classmethod
     def from_design(cls, design: Design, elements: int) -> RaceOnBalls:
@@ -98,17 +101,18 @@ class RaceOnBalls:
         )
 
     def balls(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
-        """Ball centres on the cam and their derivatives by alpha and by phase (n, 2).
+        """Ball centres on the cam and their derivatives with respect to both angles.
 
-        The cage lags behind the wave generator as in rolling without slip. The race
-        turns with the flexspline at the ideal ratio.
+        The cage lags behind the wave generator as in rolling without slip, unless it is
+        held. The race turns with the flexspline at the ideal ratio.
 
         Args:
             alpha: Wave-generator angle [rad].
             phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
 
         Returns:
-            Centres [m] and both derivatives [m/rad], each (n, 2).
+            Centres [m] and their derivatives with respect to ``alpha`` and ``phase``
+            [m/rad], each (balls, 2).
         """
         lag = -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
         if self.cage_held:
@@ -153,15 +157,19 @@ def pressed_form(
     stiffness: Array,
     bend: Array | None = None,
 ) -> Array:
-    r"""Second derivative :math:`k\,dg\,dg - F\,d^2g` by u_n, u_t, beta (n, m, m).
+    r"""Second derivative :math:`k\,dg\,dg - F\,d^2g` of the energy of n contacts.
 
     Args:
-        seen: Distances of the points.
+        seen: Distances of the points from the ring.
         count: Number m of quantities: 3, or 4 with the rotation of the section.
         force: Contact forces F (n,) [N].
         stiffness: Contact stiffnesses k (n,) [N/m].
         bend: Factor of the squared rotation in n . d2p (n,) [m]; None for points that
             do not rotate.
+
+    Returns:
+        Derivatives with respect to u_n, u_t, beta (see
+        :mod:`swgjoint.fe.rings.facing`) and the rotation of the section (n, m, m).
     """
     form = np.zeros((len(force), count, count))
     form[:, :3, :3] = -force[:, None, None] * seen.bends()

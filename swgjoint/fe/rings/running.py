@@ -1,9 +1,9 @@
 r"""Input torque that friction of teeth and race requires of a turning thin-ring drive.
 
-The wave generator turns slowly by :math:`d\theta` under a torque T that the output
-exerts; contacts of normal force N slide by :math:`d\sigma` against each other. Without
-friction the input torque derives from the potential, and its mean over the passage of
-balls and teeth is T/i. With friction, to first order in mu,
+The wave generator turns slowly by :math:`d\theta` while the output exerts the torque T.
+Surfaces in contact under the normal force N slide by :math:`d\sigma` on each other.
+Without friction the input torque derives from the potential, and its mean over the
+passage of balls and teeth is T/i. With friction, to first order in mu,
 
 .. math:: \tau(\theta) = \partial_\theta \Pi + \mu \sum N \Bigl|
     \frac{d\sigma}{d\theta}\Bigr|, \qquad \bar\tau = \frac Ti + \frac{W}{2\pi},
@@ -11,13 +11,13 @@ balls and teeth is T/i. With friction, to first order in mu,
 where W is the work of friction in one turn of the input. The first equation applies at
 every angle, not only to the mean, because the friction forces shift the rings until the
 input supplies this power. The friction torque opposes the motion in both directions. N
-and the sliding are those without friction, and every contact is assumed to slide. Where
-clearance leaves the output free, friction drags it to the next flank; the friction at
-that flank is of second order.
+and the sliding are those of the frictionless drive, and every contact is assumed to
+slide. Where clearance leaves the output free, friction drags the output to the next
+flank; the friction at that flank is of second order.
 
-Rim and race and pairs of flanks have friction with the same mu, as in
+The coefficient mu is the same between tooth flanks and between rim and race, as in
 :mod:`swgjoint.fe.rings.friction`. Only friction holds the race, which therefore creeps
-in the bore. Balls roll without loss, and seals and grease are not included, so that the
+in the bore. Balls roll without loss, and seals and grease are not included, so the
 result is a lower bound.
 """
 
@@ -38,28 +38,29 @@ from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array
 
 POSITIONS = 8
-"""Wave-generator angles of a mean."""
+"""Number of wave-generator angles in a mean."""
 STEP = 1e-3
-"""Input angle of the central difference that gives the sliding [rad]."""
+"""Step of the input angle over which the sliding is evaluated [rad]."""
 COEFFICIENT = "friction.tooth_coefficient"
+"""Key of the coefficient of friction in the design file."""
 LEFT_OUT = "churning of grease, seals, balls and their cage, bending loss of the rim"
 """Losses of a real drive that the model omits."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunningFriction:
-    """Input torque without friction, and friction torque per mu."""
+    """Frictionless input torque, and friction torque at the input per mu."""
 
     input_angle: Array
     """Input angles theta (n,) [rad]."""
     elastic: Array
     """Input torque without friction (n,) [N·m]."""
     teeth: Array
-    """Friction torque of the teeth per mu (n,) [N·m]."""
+    """Friction torque at the input due to the teeth, per mu (n,) [N·m]."""
     race: Array
-    """Friction torque of the rim on the race per mu (n,) [N·m]."""
+    """Friction torque at the input due to the rim on the race, per mu (n,) [N·m]."""
     tooth_pairs: Array
-    """Number of loaded tooth contacts (n,)."""
+    """Number of loaded tooth contacts, mean over the step (n,)."""
 
     @property
     def per_mu(self) -> Array:
@@ -68,23 +69,34 @@ class RunningFriction:
 
     @property
     def teeth_share(self) -> float:
-        """Share of the teeth in the work of friction; zero without friction [-]."""
+        """Share of the teeth in the friction work [-]; zero if there is none."""
         total = float(self.per_mu.sum())
         return float(self.teeth.sum()) / total if total > 0.0 else 0.0
 
     def running_torque(self, mu: float) -> float:
-        """Mean friction torque on the input [N·m]."""
+        """Mean friction torque at the input [N·m].
+
+        Args:
+            mu: Coefficient of friction [-].
+        """
         return mu * float(self.per_mu.mean())
 
     def starting_torque(self, mu: float) -> float:
         """Smallest input torque that keeps the drive turning at all angles [N·m].
 
-        It is the torque at the worst angle and includes the elastic part.
+        It is the torque at the worst angle and includes the frictionless torque.
+
+        Args:
+            mu: Coefficient of friction [-].
         """
         return float((self.elastic + mu * self.per_mu).max())
 
     def as_dict(self, mu: float) -> dict[str, Any]:
-        """Both torques, their parts and the omitted losses, as plain values."""
+        """Running and starting torque, their parts and the omitted losses, for JSON.
+
+        Args:
+            mu: Coefficient of friction [-].
+        """
         return {
             "coefficient": mu,
             "running_torque_Nm": self.running_torque(mu),
@@ -101,11 +113,11 @@ class RunningFriction:
 def running_friction(
     design: Design, *, torque: float = 0.0, angles: ArrayLike | None = None
 ) -> RunningFriction:
-    """Turn the input of a drive slowly and sum the sliding of its contacts.
+    """Input torque and friction of a drive whose input turns slowly.
 
     Args:
-        design: The drive, whose wave generator has a ball bearing; its coefficient of
-            friction is ignored.
+        design: The drive. Its wave generator must have a ball bearing; its coefficient
+            of friction is ignored.
         torque: Torque T at the output [N·m].
         angles: Input angles [rad]; None chooses :data:`POSITIONS` angles, spread over
             the passage of balls and teeth.
@@ -145,7 +157,7 @@ def running_friction(
 def _standing(
     design: Design, model: ThinRing, theta: float, torque: float
 ) -> ThinRingState:
-    """Equilibrium under a torque at an input angle."""
+    """Frictionless equilibrium under a torque [N·m] at an input angle [rad]."""
     state = without_torque(model, theta)
     if state.outcome.ok and torque:
         state = solve_loaded(model, state, torque)

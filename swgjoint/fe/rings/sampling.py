@@ -1,8 +1,9 @@
-"""Equilibria of the thin rings over torque and ball passage, for a map.
+"""Sampling of thin-ring equilibria over torque and ball passage, for a map.
 
-The pattern of the map is that of the balls passing the lobes. Since the balls roll,
-their order per input turn is not an integer; the map uses the nearest integer. The
-passage of teeth is not included; its kinematic error under load is a tenth as large.
+The pattern of the map is due to the balls that pass the lobes. Since the balls roll,
+the number of passages per input turn is not an integer; the map uses the nearest one.
+The passage of teeth is not included; its kinematic error under load is a tenth as
+large.
 """
 
 from __future__ import annotations
@@ -36,29 +37,30 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 PHASES = 12
-"""Positions of the balls over one passage."""
+"""Number of positions of the balls over one passage."""
 LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.01)
-"""Sampled torques, of both signs, as parts of the repeated peak torque [-]. They are
-closer together where balls join the loaded arc, and the last one exceeds the peak so
-that every position reaches it."""
+"""Sampled torques, of both signs, as fractions of the repeated peak torque [-]. They
+are closer together where additional balls become loaded. The last one exceeds the peak
+so that every position reaches the peak."""
 
 UNSEEN = (0.04, 0.12, 0.26, 0.5, 0.9)
-"""Torques that validate the map, between the sampled ones, as parts of the repeated
-peak torque [-]."""
+"""Validation torques between the sampled ones, as fractions of the repeated peak torque
+[-]."""
 UNSEEN_PHASES = 3
-"""Positions of the balls for every such torque, between the sampled ones."""
+"""Number of validation positions of the balls, between the sampled positions."""
 
 _Rows = dict[float, list[float]]
-"""Rotation, strain energy, compliance and input torque of a position, by torque."""
+"""Rotation [rad], strain energy [J], compliance [rad/(N·m)] and input torque [N·m] at
+one position of the balls, by torque [N·m]."""
 _BallPosition = tuple[_Rows, bool]
-"""Rows of a position of the balls, and whether its output is free."""
+"""Rows of a position of the balls, and whether the unloaded output is free there."""
 
 
 def check_modelled(design: Design) -> None:
     """Reject features that a map of the thin rings lacks.
 
     Raises:
-        DesignError: If the design has any.
+        DesignError: If the design has any of them.
     """
     thin.check_modelled(design)
     if design.wave_generator.kind == "table":
@@ -75,15 +77,16 @@ def check_modelled(design: Design) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class BallPassage:
-    """Periods of the positions of the balls relative to the lobes."""
+    """Periodicity of the positions of the balls relative to the lobes."""
 
     per_cage_turn: int
-    """Periods per turn of the cage relative to the cam: the number of balls, or twice
-    an odd number, because the two lobes then alternate."""
+    """Number of periods per turn of the cage relative to the cam. It is the number of
+    balls, or twice that number if it is odd, because balls then reach the two lobes
+    alternately."""
     per_input_turn: float
-    """Periods per input turn of balls that roll without slip."""
+    """Number of periods per input turn if the balls roll without slip."""
     carried_as: int
-    """Order per input turn that the map uses."""
+    """Number of periods per input turn that the map uses."""
 
 
 def ball_passage(design: Design, model: ThinRing) -> BallPassage:
@@ -91,7 +94,7 @@ def ball_passage(design: Design, model: ThinRing) -> BallPassage:
 
     Args:
         design: The drive.
-        model: Its ring model.
+        model: Thin-ring model of the drive.
     """
     balls = model.bearing.balls
     count = balls * (2 if balls % 2 and can_halve(design, bearing=False) else 1)
@@ -108,18 +111,21 @@ def sample_thin_rings(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> MapSamples:
-    """Sample equilibria over the passage of a ball and both signs of torque.
+    """Samples of a map over the passage of a ball and both signs of torque.
 
-    A torque at which a solve fails and all larger ones are omitted, and the record
-    (``truncated``) says so.
+    If a solve fails, its torque and all larger ones are omitted, and ``truncated`` in
+    the record of the samples is true.
 
     Args:
         design: The drive.
-        angles: Positions over one passage; None chooses :data:`PHASES`.
+        angles: Number of positions over one passage; None chooses :data:`PHASES`.
         progress: Called with the stage, the number of finished positions and their
             total.
-        keep: Store of the positions of the balls, from which an interrupted run resumes
-            with bit-identical samples; None keeps none.
+        keep: Store of the results by position, from which an interrupted run resumes
+            with bit-identical samples; None stores none.
+
+    Returns:
+        Samples of the map.
 
     Raises:
         DesignError: If the design has features that the model lacks.
@@ -158,7 +164,7 @@ class _Sampler:
     model: ThinRing
     passage: BallPassage
     count: int
-    """Sampled positions over one passage."""
+    """Number of sampled positions over one passage."""
     small: float
     """Torque that takes up the clearance [N·m]."""
     series: float
@@ -168,16 +174,16 @@ class _Sampler:
 
     @property
     def period(self) -> float:
-        """Input angle of one passage in the map [rad]."""
+        """Change of the input angle over one passage, as the map uses it [rad]."""
         return 2.0 * pi / self.passage.carried_as
 
     def cage_phase(self, place: float) -> float:
-        """Angle of ball 0 [rad] at a place from zero to ``count`` in the passage."""
+        """Angle of ball 0 from the major axis [rad] at a place from 0 to ``count``."""
         # the cage lags behind the wave generator
         return -2.0 * pi / self.passage.per_cage_turn * place / self.count
 
     def position(self, name: str, phase: float, torques: list[float]) -> _BallPosition:
-        """Rows of a position from the store, or solved and stored."""
+        """Rows of a position, read from the store or solved and stored."""
         if self.keep is None:
             return _position(self.model, phase, self.passage, torques, self.small)
         stored = self.keep.read(name, partial(_taken, phase))
@@ -188,10 +194,10 @@ class _Sampler:
         return solved
 
     def sampled_positions(self, torques: list[float]) -> tuple[list[_Rows], bool]:
-        """Rows of all sampled positions; whether the output is free at any of them.
+        """Rows of all sampled positions, and whether the output is free at any of them.
 
         Raises:
-            ComputationError: If a position has no row.
+            ComputationError: If a position has no rows.
         """
         name, positions, any_free = self.design.drive.name, list[_Rows](), False
         for k in range(self.count):
@@ -199,8 +205,9 @@ class _Sampler:
             rows, free = self.position(f"position-{k:04d}", phase, torques)
             if not rows:
                 raise ComputationError(
-                    f"{name}: no equilibrium of the rings under {self.small:g} N·m with"
-                    f" the balls at {phase:g} rad"
+                    f"{name}: no equilibrium of the thin rings under"
+                    f" +-{self.small:g} N·m with ball 0 at {phase:g} rad from the major"
+                    " axis"
                 )
             positions.append(rows)
             any_free |= free
@@ -208,11 +215,11 @@ class _Sampler:
         return positions, any_free
 
     def unseen_positions(self, torques: list[float]) -> FullSolves | None:
-        """Results between the sampled positions and torques; None if all fail."""
+        """Results between sampled positions and torques; None if all solves fail."""
         name = self.design.drive.name
         solves: list[tuple[float, float, float, float]] = []
         for j in range(UNSEEN_PHASES):
-            # between the sampled positions, but not in the middle between two of them
+            # not at a sampled position and not midway between two of them
             place = self.count * (j + 0.381966) / UNSEEN_PHASES
             phase = self.cage_phase(place)
             rows, _ = self.position(f"unseen-{j:04d}", phase, torques)
@@ -234,14 +241,14 @@ class _Sampler:
         )
 
     def record(self, torques: list[float], *, truncated: bool) -> dict[str, Any]:
-        """Record of the sampling for the map."""
+        """Record of the sampling, for the map."""
         design, passage = self.design, self.passage
         return {
             "design_hash": design.content_hash(),
             "label": {
                 "model": "ring",
                 "level": "nonlinear",
-                "circular_spline": "rigid but for its teeth",
+                "circular_spline": "rigid except for its teeth",
                 "cup": None if design.cup is None else "closed-form torsion in series",
                 "stress_state": stress_state_label(design),
                 "springs_Nm_rad": springs_of(design),
@@ -267,7 +274,7 @@ class _Sampler:
         unseen: FullSolves | None,
         info: dict[str, Any],
     ) -> MapSamples:
-        """Samples of the map from tables by torque, with the springs in series."""
+        """Samples of the map from tables by torque, plus the springs in series."""
         design, series = self.design, self.series
         torque = np.array(sorted(tables))
         error, energy, compliance, input_torque = np.array(
@@ -295,11 +302,11 @@ class _Sampler:
 
 
 def _both_signs(tables: dict[float, Array]) -> dict[float, Array]:
-    """Add tables of negative torques: the mirror image of those of positive torques.
+    """Tables for both signs of torque; those of negative torques are mirror images.
 
     Args:
-        tables: Rotation, strain energy, compliance and input torque by torque, each
-            (4, count).
+        tables: Rotation, strain energy, compliance and input torque (4, count), by
+            torque that is not negative.
     """
     sign = np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
     return tables | {
@@ -308,11 +315,11 @@ def _both_signs(tables: dict[float, Array]) -> dict[float, Array]:
 
 
 def _add_onsets(tables: dict[float, Array], small: float) -> None:
-    """Add the torques at which the teeth take up the clearance, in place."""
+    """Add the torques at which the teeth begin to hold the output, in place."""
     for side in (small, -small):
         start, onset = across_clearance(tables[0.0], tables[side], side)
         tables[start] = onset
-    tables[0.0][2] = onset[2]  # compliance at the last onset
+    tables[0.0][2] = onset[2]  # compliance at the ends of the clearance
 
 
 def _position(
@@ -322,16 +329,16 @@ def _position(
     torques: list[float],
     small: float,
 ) -> _BallPosition:
-    """Table rows by torque at one position of the balls; whether the output is free.
+    """Rows at one position of the balls, and whether the unloaded output is free there.
 
-    The rows are empty if the unloaded drive cannot be solved, and end at the first
-    torque at which a solve fails.
+    There are no rows if the drive cannot be solved without torque or under the torques
+    +-``small``. The rows end before the first torque at which a solve fails.
     """
 
     def row(state: ThinRingState, torque: float) -> list[float]:
         race = state.q[model.rim.size :]
         rolled = race_on_balls(model, state, race).cage_torque
-        # torque per input speed at the order of the map
+        # power per input speed, with the number of passages that the map uses
         ripple = -rolled * passage.carried_as / passage.per_cage_turn
         return [
             state.rotation,
@@ -379,11 +386,11 @@ def _taken(phase: float, arrays: Mapping[str, Any]) -> _BallPosition:
     """Results of :func:`_position` from an interrupted run.
 
     Raises:
-        ValueError: If they belong to another position.
+        ValueError: If they belong to another position or are not finite.
     """
     torque, rows = np.asarray(arrays["torque"]), np.asarray(arrays["rows"])
     if float(arrays["phase"]) != phase or not np.isfinite(rows).all():
-        raise ValueError("the stored rows belong to another position of the balls")
+        raise ValueError("stored rows belong to another position or are not finite")
     rows = rows.reshape(torque.size, 4)
     by_torque = dict(zip(torque.tolist(), rows.tolist(), strict=True))
     return by_torque, bool(arrays["free"])

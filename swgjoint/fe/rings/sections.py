@@ -1,7 +1,7 @@
-r"""The toothed rim as a line: stiffness and neutral radius from its 2D sector.
+r"""Line model of the toothed rim: stiffness and neutral radius from its 2D sector.
 
-The teeth stiffen the rim. The condensed sector of the 2D finite elements gives the
-effective stiffness: its faces remain plane under a uniform stretch and bending and are
+The teeth stiffen the rim. The condensed sector of the 2D finite-element model gives the
+effective stiffness: under uniform stretch and bending its faces remain plane but are
 free to deform within their planes, and the mean radial displacement of its bore is
 zero.
 """
@@ -19,12 +19,12 @@ from swgjoint.fe.plane.superelement import Superelement
 
 @dataclass(frozen=True, kw_only=True)
 class RimSection:
-    """Section of the rim with its teeth, averaged over the pitch."""
+    """Stiffness of the rim with its teeth, averaged over the pitch."""
 
     stretching: float
     """Axial stiffness E A [N]."""
     bending: float
-    """Bending stiffness E I about the neutral line [N m^2]."""
+    """Bending stiffness E I about the neutral line [N·m^2]."""
     neutral_radius: float
     """Radius at which bending causes no stretch [m]."""
 
@@ -32,9 +32,9 @@ class RimSection:
 def rim_section(element: Superelement) -> RimSection:
     r"""Axial and bending stiffness of a sector between its faces.
 
-    Each of the two faces, which enclose the angle p, rotates by :math:`\omega` and
-    moves outwards by a along its normal: :math:`u_n = a + \omega(r - r_b)`. The strain
-    energy
+    The two faces enclose the angle p. Each of them moves along its outward normal by a
+    at the bore radius :math:`r_b` and rotates by :math:`\omega`, so that
+    :math:`u_n = a + \omega(r - r_b)`. The strain energy
     :math:`\tfrac12 S_{aa}a^2 + S_{a\omega}a\omega + \tfrac12 S_{\omega\omega}\omega^2`
     of this deformation yields
 
@@ -91,9 +91,9 @@ def tooth_pair_stiffness(
 ) -> float:
     """Stiffness of a pair of teeth along the normal, half-way up the flanks [N/m].
 
-    The compliances of both teeth add. The skeleton of the flexspline's sector and the
-    outside of the circular spline are fixed. Forces are averaged over the patch of a
-    contact.
+    It is the reciprocal of the sum of the compliances of both teeth. The skeleton of
+    the flexspline's sector and the outside of the circular spline are fixed. The force
+    is spread over the patch of a contact.
 
     Args:
         flexspline: Condensed sector of the flexspline.

@@ -1,4 +1,4 @@
-"""Normal force times sliding distance of teeth and race between two equilibria."""
+"""Normal force times sliding distance of teeth and of rim and race."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from swgjoint.typing import Array
 def sliding_sums(
     model: ThinRing, first: ThinRingState, last: ThinRingState
 ) -> tuple[float, float]:
-    r"""Sums of N |sigma| of the teeth and of the race between two equilibria [J].
+    r"""Sums of N abs(sigma) of the teeth and of the race between two equilibria [J].
 
-    N is the mean force of both equilibria, so that a tooth loaded in only one of them
-    counts half.
+    N is the mean normal force of both equilibria, so that a tooth loaded in only one of
+    them counts half; sigma is the sliding distance.
 
     Args:
         model: The rings.
@@ -31,7 +31,7 @@ def sliding_sums(
 
 
 def _teeth(model: ThinRing, state: ThinRingState, other: ThinRingState) -> float:
-    """Sum of N |sigma| of one state's contacts as their teeth move to another state."""
+    """Sum of N abs(sigma) over a state's contacts for the motion to another state."""
     contacts, force = state.contacts, state.tooth_force
     if contacts is None or force is None or not len(force):
         return 0.0
@@ -52,7 +52,7 @@ def _tooth_frames(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
 
 
 def _race(model: ThinRing, first: ThinRingState, last: ThinRingState) -> float:
-    """Sum of N |sigma| of the bore on the race, which creeps so that it is least."""
+    """Sum of N abs(sigma) of bore and race, minimised by the creep of the race."""
     forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
     count = model.race.elements
     slid = np.mod(places[1] - places[0] + 0.5 * count, count) - 0.5 * count
@@ -64,7 +64,7 @@ def _race(model: ThinRing, first: ThinRingState, last: ThinRingState) -> float:
 
 
 def _pressed(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
-    """Forces of the bore's contact points on the race [N], and their feet on it."""
+    """Forces at the contact points of the bore [N], and their feet on the race."""
     rim, race = np.split(state.q, [model.rim.size])
     points = model.bore.points(rim)[0]
     seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
@@ -73,11 +73,14 @@ def _pressed(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
 
 
 def weighted_median(values: Array, weight: Array) -> float:
-    """Value with the least weighted sum of distances; zero if all weights are zero.
+    """Value with the smallest weighted sum of distances from all values.
 
     Args:
         values: The values (n,).
         weight: Their weights, not negative (n,).
+
+    Returns:
+        One of the values; zero if all weights are zero.
     """
     order = np.argsort(values)
     total = np.cumsum(weight[order])

@@ -22,8 +22,8 @@ class ThinRingState:
     ball_feet: Array
     """Feet of the balls on the race, element number plus parameter (balls,)."""
     bore_feet: Array
-    """Feet of the bore's contact points on the race, in the same measure (n_points,).
-    """
+    """Feet of the bore's contact points on the race, element number plus parameter
+    (n_points,)."""
     alpha: float
     """Wave-generator angle [rad]."""
     phase: float = 0.0
@@ -37,12 +37,13 @@ class ThinRingState:
     tooth_force: Array | None = None
     """Normal force of every tooth contact (n,) [N]."""
     contacts: Contacts | None = None
+    """Tooth contacts that carry load; None if the teeth cannot touch."""
     tooth_moment: float = 0.0
     """Moment of the tooth forces on the flexspline [N·m]; together with the moment of
     the ball forces it must balance T."""
     wave_generator_torque: float = 0.0
-    """External torque on the wave generator, including that which drives the cage
-    [N·m]; without friction its mean over the ball passage must be T/i."""
+    """External torque on the wave generator, including the torque that drives the cage
+    [N·m]. Without friction its mean over the ball passage must be T/i."""
     energy: float = 0.0
     """Strain energy including that of the contacts [J]."""
     compliance: float = 0.0
@@ -51,22 +52,23 @@ class ThinRingState:
     """Shares of rim, race, balls, bore (contact of rim and race) and teeth in the
     compliance [-].
 
-    They are the shares in the strain energy of a small twist. That of a contact may be
-    negative because its force adds a geometric stiffness."""
+    They are the shares in the strain energy of a small twist. The share of a contact
+    may be negative because its force adds a geometric stiffness."""
     outcome: Outcome = Outcome.CONVERGED
+    """Outcome of the solve."""
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
 
     @property
     def loaded_teeth(self) -> int:
-        """Tooth contacts that carry load."""
+        """Number of tooth contacts that carry load."""
         return 0 if self.tooth_force is None else len(self.tooth_force)
 
 
 def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRingState:
-    """Start of a search: both rings deflected by two lobes without stretch.
+    """Initial state of a search: both rings deflected by two lobes without stretch.
 
-    Both rings have rotated with the flexspline at the ideal ratio, any number of turns.
+    Both rings have rotated by the ideal output angle alpha/i, any number of turns.
 
     Args:
         model: The rings.

@@ -1,7 +1,7 @@
 """Rigid teeth on the rim and their gaps to the teeth of the circular spline.
 
-The flanks are exact and the contact search is that of the 2D finite elements: all nodes
-of a rigid tooth's flank have the same displacement.
+The flanks are exact. The contact search is that of the 2D finite-element model; all
+nodes on the flank of a rigid tooth have the same displacement.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array
 
 NODES = 10
-"""Nodes of a flank; the search for minima of the gap starts at twice as many points."""
+"""Number of nodes on a flank; the search for gap minima starts at twice as many
+points."""
 
 
 def _flank_spline(profile: ToothProfile) -> CubicSpline:
-    """Weights of the nodes of a flank along its stations."""
+    """Spline of the weights of a flank's nodes over the arc length."""
     return CubicSpline(np.linspace(*profile.contact_range, NODES), np.eye(NODES))
 
 
@@ -33,34 +34,38 @@ class RigidFlanks:
     """The flexspline's flanks as input to :mod:`swgjoint.fe.plane.tooth_contact`."""
 
     profile: ToothProfile
+    """Tooth profile of the flexspline."""
     flank_size: int = NODES
+    """Number of nodes on a flank."""
 
     @cached_property
     def spline(self) -> CubicSpline:
-        """Weights of the flank's nodes along its stations."""
+        """Spline of the weights of the flank's nodes over the arc length."""
         return _flank_spline(self.profile)
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Stations of both ends of a flank, between the lands [m]."""
+        """Arc lengths of both ends of a flank, between the lands [m]."""
         return self.profile.contact_range
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThinRingTeeth:
-    """Teeth of both members; the flexspline's are fixed to the mean line of the rim."""
+    """Teeth of both members, those of the flexspline fixed to the rim's mean line."""
 
     flexspline: ToothProfile
+    """Tooth profile of the flexspline."""
     circular_spline: ToothProfile
+    """Tooth profile of the circular spline."""
     foot_radius: float
     """Radius of the mean line that carries the flexspline's teeth [m]."""
     stiffness: float
     """Stiffness of a tooth pair along the common normal [N/m]."""
     shift: Array
-    """Errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    """Shifts of the flexspline's teeth due to errors, in their frames (N, 2) [m]."""
     circular_spline_shift: Array | None = None
-    """Errors of the circular spline's teeth in their frames (N_c, 2) [m]; None without
-    errors."""
+    """Shifts of the circular spline's teeth due to errors, in their frames (N_c, 2)
+    [m]; None without errors."""
 
     @cached_property
     def _flanks(self) -> RigidFlanks:
@@ -74,7 +79,7 @@ class ThinRingTeeth:
         return CircularSpline(profile=profile, weights=_flank_spline(profile))
 
     def find_contacts(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
-        """Contacts of the teeth on a deformed rim.
+        """Overlapping flanks of the teeth on a deformed rim.
 
         Args:
             foot: Positions of the teeth on the rim's mean line (N, 2) [m].
@@ -97,20 +102,21 @@ class ThinRingTeeth:
             angle=angle,
             bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
         )
-        # only overlapping flanks carry force, so open gaps need not be followed
+        # only overlapping flanks carry force, so open gaps are not needed
         nodal = np.tile(offset, 2 * NODES)
         return search.search(nodal, 0.0, None, thorough=False), angle
 
     def rows(
         self, contacts: Contacts, foot: Array, slope: Array, angle: Array
     ) -> tuple[Array, Array]:
-        r"""Derivatives of the gaps by the coordinates of the nodes below the teeth.
+        r"""Derivatives of the gaps with respect to the nodes below the teeth.
 
-        n is the normal out of the circular spline and t its tangent. The contact point
-        p moves by :math:`dp = dr + J(p - r)\,d\varphi`,
-        :math:`d\varphi = r' \times dr'/|r'|^2`; flanks of curvatures :math:`\kappa`
-        (flexspline) and :math:`\kappa_c` (circular spline) roll and slide on each
-        other:
+        n is the normal out of the circular spline, t is its tangent and J rotates by a
+        right angle. The contact point p on a flexspline tooth moves by
+        :math:`dp = dr + J(p - r)\,d\varphi`, where
+        :math:`d\varphi = r' \times dr'/|r'|^2` is the rotation of the tooth. Flanks
+        with the curvatures :math:`\kappa` (flexspline) and :math:`\kappa_c` (circular
+        spline) roll and slide on each other:
 
         .. math:: dg = n\cdot dp, \quad d^2g = \frac{\kappa\kappa_c\,(t\cdot dp)^2
             - 2\kappa_c\,(t\cdot dp)\,d\varphi - d\varphi^2}{\kappa + \kappa_c}
@@ -123,7 +129,7 @@ class ThinRingTeeth:
             angle: Angles of the flexspline's teeth (N,) [rad].
 
         Returns:
-            First (n, 4) and second (n, 4, 4) derivatives by (r, r').
+            First (n, 4) and second (n, 4, 4) derivatives with respect to (r, r').
         """
         j = contacts.sector
         normal = rotate(contacts.normal, angle[j])
