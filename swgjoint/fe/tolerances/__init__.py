@@ -1,1 +1,1 @@
-"""Drives with manufacturing errors, superposed on linearised equilibria."""
+"""Drives with manufacturing errors, which are superposed on linearised equilibria."""

@@ -1,4 +1,4 @@
-"""Errors of both members' teeth and of the axis, pitch by pitch over their cycle."""
+"""Errors of the teeth and of the axis, pitch by pitch over the cycle of the drive."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt, tooth_errors
 from swgjoint.typing import Array, Index
 
 MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
+"""Members with teeth."""
 
 
 def pitches_of(design: Design) -> int:
-    """Pitches after which errors of teeth and axis repeat; one without such errors."""
+    """Number of pitches after which errors of teeth and axis repeat; 1 without any."""
     shifts = [tooth_errors(design, member).shift for member in MEMBERS]
     counts = [len(shift) for shift in shifts if shift.any()]
     if axis_tilt(design).any() and design.drive.layout != "wave_generator_fixed":
@@ -24,39 +25,39 @@ def pitches_of(design: Design) -> int:
 
 
 def pitch_of(design: Design) -> float:
-    """Input angle after which the teeth are in an equivalent position [rad]."""
+    """Input rotation after which the teeth are in an equivalent position [rad]."""
     return 2.0 * pi / design.periodicity
 
 
 def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
-    """Shifts of the teeth that have moved to the places of the first pitch.
+    """Shifts of the teeth that replace those of the first pitch after whole pitches.
 
     Args:
-        errors: Errors of one member's teeth.
-        pitches: Whole pitches by which the input has turned (n,).
+        errors: Errors of the teeth of one member.
+        pitches: Numbers of pitches by which the input has turned (n,).
         layout: Layout of the drive, which names the fixed member.
 
     Returns:
         Shifts in the frames of the teeth (n, n_teeth, 2) [m].
     """
     count = len(errors.shift)
-    # the lobes advance to the next teeth; past a fixed wave generator the teeth move,
-    # so that the preceding ones arrive
+    # a turning wave generator advances to the next teeth; at a fixed one the preceding
+    # teeth arrive
     onwards = -pitches if layout == "wave_generator_fixed" else pitches
     return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
 
 
 def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
-    """Shifts of both members' teeth and slope of the axis after whole pitches.
+    """Shifts of the teeth of both members and slope of the axis after whole pitches.
 
     Args:
         design: The drive.
-        pitches: Whole pitches by which the input has turned (n,).
+        pitches: Numbers of pitches by which the input has turned (n,).
 
     Returns:
         Shifts of the flexspline's teeth (n, N, 2) [m] and of the circular spline's
-        teeth (n, N_c, 2) [m], and slope of the axis (n, 2) [rad], all as they act in
-        the first pitch.
+        teeth (n, N_c, 2) [m], and slope of the circular spline's axis (n, 2) [rad], all
+        of them referred to the first pitch.
     """
     flexspline, circular_spline = (
         shift_errors(tooth_errors(design, member), pitches, design.drive.layout)
@@ -66,11 +67,13 @@ def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
 
 
 def axis_slope(design: Design, pitches: Index) -> Array:
-    """Slope of the axis, rotated back with the wave generator to the first pitch.
+    """Slope of the circular spline's axis relative to the turned wave generator.
+
+    With a fixed wave generator it is constant.
 
     Args:
         design: The drive.
-        pitches: Whole pitches by which the input has turned (n,).
+        pitches: Numbers of pitches by which the input has turned (n,).
 
     Returns:
         Slope (n, 2) [rad].

@@ -1,4 +1,4 @@
-"""Influence of the gap of every tooth on the output of the 2D drive."""
+"""Influence of every tooth gap on the output of the 2D drive."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from swgjoint.fe.plane.state import State
 from swgjoint.typing import Mask
 
 STATIONS = 30
-"""Possible contact points along a flank, in addition to those of the perfect drive,
-because contacts move along conforming flanks."""
+"""Number of possible contact points along a flank, in addition to those of the perfect
+drive, because contacts move along conforming flanks."""
 SUPPORTS = 3
-"""Intervals of a sector's bore that may touch the wave generator, in addition to those
-that do. With two of them the kinematic error of lots deviates from full solves by
-1.04 % of its peak-to-peak value."""
+"""Number of intervals of a sector's bore that may touch the wave generator, in addition
+to those that do. With two instead of three, the kinematic error of lots deviates from
+full solves by 1.04 % of its peak-to-peak value."""
 
 
 def influence(
     model: SectorModel, state: State, *, circular_spline_is_output: bool
 ) -> Influence:
-    """Condense a drive with perfect teeth at an equilibrium.
+    """Influence of every tooth gap on the output, linearised at an equilibrium.
 
     Args:
-        model: Ring model of all sectors with an elastic circular spline and a rigid
-            wave generator, without errors of the teeth and without friction.
+        model: 2D model of the whole drive with an elastic circular spline and a rigid
+            wave generator, without tooth errors and friction.
         state: The equilibrium.
         circular_spline_is_output: Whether the circular spline is the output.
 
@@ -43,7 +43,8 @@ def influence(
     flawed = any(shift is not None and shift.any() for shift in shifts)
     if model.half or model.friction is not None or flawed:
         raise ValueError(
-            "the influence needs all sectors, no friction and teeth without errors"
+            "the influence needs a model of the whole drive, without friction and"
+            " without tooth errors"
         )
     if model.race is not None:
         raise ValueError("the influence needs a rigid wave generator")
@@ -69,7 +70,7 @@ def influence(
 def _tooth_contacts(
     model: SectorModel, linear: Linearised, state: State
 ) -> tuple[Contacts, Mask]:
-    """Possible contact points, and a mask of those that carry force at the state."""
+    """Possible contact points, and a mask of those that carry force in the state."""
     loaded = state.contacts
     if loaded is None or not len(loaded):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
@@ -90,7 +91,7 @@ def _tooth_contacts(
 
 
 def _near_supports(model: SectorModel, linear: Linearised, state: State) -> Mask:
-    """Mask of the bore intervals that touch, and of some that may (N, intervals)."""
+    """Mask of bore intervals that touch the wave generator or may do so (N, n)."""
     shape = (model.sectors, -1, model.stations.per_interval)
     gap = linear.gap.reshape(shape)
     used = np.asarray(state.touching.reshape(shape).any(axis=2))

@@ -1,8 +1,8 @@
-"""Output errors of many 2D drives of one design, each with its own errors.
+"""Output errors of many 2D drives of one design with different manufacturing errors.
 
-One perfect drive is linearised at a few positions within a pitch. The errors of every
-drive's teeth and wave generator are superposed at these positions, which takes a
-fraction of a millisecond per equilibrium.
+The perfect drive is linearised at a few positions within a pitch. The errors of the
+teeth and the wave generator of every drive are superposed at these positions, which
+takes a fraction of a millisecond per equilibrium.
 """
 
 from __future__ import annotations
@@ -31,25 +31,26 @@ from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.typing import Array, Index
 
 PHASES = 4
-"""Positions within a pitch."""
+"""Number of positions within a pitch."""
 POSITIONS = 320
-"""Input positions over one output turn. For six specimens of reference-2d-tolerances
-their transmission accuracy (see ``study``) is 0.98 of that of all 29,280 positions,
-with a standard deviation of 0.012."""
+"""Number of input positions over one output turn. For six specimens of the drive
+reference-2d-tolerances, the transmission accuracy (see ``study``) from these positions
+is 0.98 times that from all 29,280 positions, with a standard deviation of 0.012."""
 CHECKS = 6
-"""Positions of one drive solved without linearisation, which validate the others."""
+"""Number of positions of one drive that are solved without linearisation to validate
+the superposition."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lot:
-    """n drives at P input angles; NaN where there is no equilibrium."""
+    """Output errors of n drives at P input angles; NaN where a solve failed."""
 
     input_angle: Array
     """Random input angles theta over one output turn (P,) [rad]."""
     unloaded: Array
-    """Kinematic error, psi - theta/i without torque (n, P) [rad]."""
+    """Kinematic error psi - theta/i without torque (n, P) [rad]."""
     loaded: Array
-    """Transmission error at rated torque (n, P) [rad]."""
+    """Transmission error psi - theta/i at rated torque (n, P) [rad]."""
     compliance: Array
     """Compliance -d(psi)/dT at rated torque (n, P) [rad/(N·m)]."""
     whole: NDArray[np.bool_]
@@ -57,11 +58,11 @@ class Lot:
 
 
 def perfect_positions(design: Design, phases: int = PHASES) -> list[Rest]:
-    """The drive without errors at positions in a pitch, for :func:`sample_lot`.
+    """Linearised positions of the drive without errors, for :func:`sample_lot`.
 
     Args:
         design: The drive; its errors are ignored.
-        phases: Positions, equally spaced within a pitch.
+        phases: Number of positions, equally spaced over a pitch.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.
@@ -76,23 +77,28 @@ def sample_lot(
 ) -> Lot:
     """Output errors of many drives of one design.
 
-    Where clearance leaves the unloaded output free, its error is the mean of those at
-    +-1 % of rated torque. The torsion of a cup is added in closed form.
+    Where clearance leaves the unloaded output free, its error is the mean of the errors
+    at +-1 % of the rated torque. The compliance of the springs in series, including the
+    cup in closed form, is added.
 
     Args:
         drives: Drives that differ only in their ``tolerances``.
         rests: Unloaded positions of the perfect drive, see :func:`perfect_positions`.
-        positions: Number of input angles, one placed at random in each of as many
-            equal parts of one output turn.
+        positions: Number of input angles. One output turn is divided into as many equal
+            parts, and one angle is placed in each of them, at random but with a fixed
+            seed. If there are no more positions than this in a turn, all are used.
+
+    Returns:
+        Output errors of all drives.
     """
     design, phases = drives[0], len(rests)
     rated = ratings_of(design).rated_torque
     series = series_compliance(design, cup=True)
-    # a whole output turn even if the errors repeat sooner: only their beat separates
-    # the orders of the two members
+    # a whole output turn even if the errors repeat sooner: the orders of the two
+    # members can be separated only by their beat
     turn = round(2.0 * np.pi * abs(design.ratio) / pitch_of(design))
     pitch, phase = np.divmod(_stratified(turn * phases, positions), phases)
-    # psi - theta/i: every pitch is the first pitch with different errors
+    # theta/i within the first pitch, to which the errors of every pitch are referred
     ideal = pitch_of(design) * phase / phases / design.ratio
     shape = (len(drives), pitch.size)
     unloaded, loaded, compliance = (np.empty(shape) for _ in range(3))
@@ -115,6 +121,7 @@ def sample_lot(
 
 
 def _is_whole(drive: Design, pitch: Index, phase: Index, phases: int) -> bool:
+    """Whether the positions include all positions of the cycle of a drive."""
     cycle = pitches_of(drive)
     return np.unique(pitch % cycle * phases + phase).size == cycle * phases
 
@@ -122,7 +129,9 @@ def _is_whole(drive: Design, pitch: Index, phase: Index, phases: int) -> bool:
 def superposition_error(
     drive: Design, perfect: Sequence[Rest], *, positions: int = CHECKS
 ) -> float | None:
-    """Largest deviation of the kinematic error from full solves, over its peak to peak.
+    """Largest deviation of the superposed kinematic error from full solves.
+
+    It is related to the peak-to-peak value of the superposed kinematic error.
 
     Args:
         drive: One drive of a lot.
@@ -147,7 +156,7 @@ def superposition_error(
 
 
 def outline_change(at: Influence, drive: Design) -> Array:
-    """Change of the gaps to the wave generator caused by its errors (k,) [m].
+    """Changes of the gaps at the wave generator due to its errors (k,) [m].
 
     Args:
         at: Influence of the 2D drive without errors.
@@ -184,7 +193,10 @@ def _gap_changes(
     drives: Sequence[Design],
     errors: Sequence[tuple[Array, Array, Array]],
 ) -> Array:
-    """Changes of tooth and wave-generator gaps by drive (n_sets, n + k) [m]."""
+    """Gap changes of n teeth and k supports on the wave generator (n_sets, n + k) [m].
+
+    The sets of errors are ordered by drive and then by position.
+    """
     rows = []
     for drive, shifts in zip(drives, errors, strict=True):
         teeth = at.gap_change(*shifts)
@@ -194,7 +206,10 @@ def _gap_changes(
 
 
 def _stratified(count: int, wanted: int) -> Index:
-    """Random positions, one in each of equal parts of a count, to avoid aliasing."""
+    """Random numbers from 0 to count - 1, one in each of ``wanted`` equal parts.
+
+    The random choice avoids aliasing. All numbers are used if no more are available.
+    """
     if wanted >= count:
         return np.arange(count)
     inside = np.random.default_rng(0).uniform(size=wanted)

@@ -1,4 +1,4 @@
-"""The drive with perfect teeth, unloaded and linearised at positions in a pitch."""
+"""Drive with perfect teeth, unloaded and linearised at positions within a pitch."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import with_perfect_teeth
 
 PHASES = 4
-"""Positions within a pitch; the effect of the errors varies slowly within one."""
+"""Number of positions within a pitch; the effect of errors varies slowly over it."""
 SMALL = 0.01
-"""Part of the rated torque that takes up the clearance; without torque, an output with
-clearance is midway between its positions under both signs of it [-]."""
+"""Fraction of the rated torque that takes up the clearance [-]. An unloaded output with
+clearance is midway between its positions under this torque and its opposite."""
 
 
 def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
-    """Model of the whole drive without friction, with perfect teeth and axis.
+    """Solver of the whole drive with perfect teeth and axis and without friction.
 
     Args:
         design: The drive; errors of its wave generator are kept.
@@ -42,21 +42,23 @@ def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rest:
-    """The drive with perfect teeth at one position, linearised without load.
+    """Unloaded drive with perfect teeth at one position, and its linearisation.
 
-    If clearance leaves the output free, it is linearised at both ends of the clearance.
+    If clearance leaves the output free, the drive is linearised at both ends of the
+    clearance.
     """
 
     state: Any
     """Equilibrium without load, or under the small torque that takes up the clearance.
     """
     at: Influence
+    """Influence of the tooth gaps, linearised at this equilibrium."""
     opposite: tuple[Any, Influence] | None = None
-    """State and influence under the opposite torque, if the output is free."""
+    """State and influence under the opposite torque; None if the output is not free."""
 
     @property
     def sides(self) -> tuple[tuple[Any, Influence], tuple[Any, Influence]]:
-        """State and influence for torques of either sign, positive ones first."""
+        """State and influence for positive torques, then those for negative torques."""
         first = (self.state, self.at)
         return first, self.opposite or first
 
@@ -68,18 +70,18 @@ def influences(
     model: str = "2d",
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Follower[Any], list[Rest]]:
-    """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
+    """Unloaded drive with perfect teeth, linearised at positions within a pitch.
 
     Errors of the wave generator turn with it, so that all pitches are equivalent.
 
     Args:
         design: The drive; errors of its wave generator are kept.
-        phases: Number of equally spaced positions.
+        phases: Number of positions, equally spaced over a pitch.
         model: Fidelity, ``2d`` or ``3d``.
         tick: Called after every position.
 
     Returns:
-        The model that follows the drive, and its positions.
+        Solver that follows the equilibria of the drive, and its linearised positions.
 
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
@@ -96,8 +98,8 @@ def influences(
             rest = follow.unload(state, small)
         if not rest.state.outcome.ok:
             raise ComputationError(
-                f"{design.drive.name}: no equilibrium without torque and tooth errors:"
-                f" {rest.state.outcome.value}"
+                f"{design.drive.name}: no equilibrium without torque and with perfect"
+                f" teeth: {rest.state.outcome.value}"
             )
         up, down = rest.sides or (rest.state, None)
         opposite = None if down is None else (down, follow.influence(down))

@@ -1,10 +1,11 @@
 """Equilibria of a drive with manufacturing errors over the whole cycle of its teeth.
 
-Errors of the circular spline repeat with alpha, those of the flexspline with beta. Both
-together repeat after a number of pitches equal to the least common multiple of the
-tooth counts, which is one output turn or a part of it. Full solves would take hours.
-Instead, the drive is linearised at a few positions within one pitch, and the errors of
-all pitches are superposed there.
+Errors of the circular spline repeat with alpha, the rotation of the wave generator
+relative to the circular spline; errors of the flexspline repeat with beta, the rotation
+relative to the flexspline. Both together repeat after a number of pitches equal to the
+least common multiple of the tooth counts, which is one output turn or a part of it.
+Full solves would take hours. Instead, the drive is linearised at a few positions within
+one pitch, and the errors of all pitches are superposed there.
 """
 
 from __future__ import annotations
@@ -32,25 +33,25 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array, Index
 
 PHASES = {"2d": 6, "3d": 4}
-"""Positions within a pitch; the effect of the errors varies slowly within one."""
+"""Number of positions within a pitch; the effect of errors varies slowly over it."""
 ALONE = 24
-"""Positions within the only pitch of a cycle without errors of teeth and axis."""
+"""Number of positions if the cycle is a single pitch: no errors of teeth and axis."""
 POSITIONS = 40_000
-"""Most positions of the cycle, about two minutes of computation, as long as every pitch
-has at least two."""
+"""Largest number of positions of the cycle, about two minutes of computation. It may be
+exceeded because every pitch has at least two positions."""
 LEVELS = (0.15, 0.45, 1.0)
-"""Sampled torques, of both signs, as parts of the repeated peak torque [-]."""
+"""Sampled torques, of both signs, as fractions of the repeated peak torque [-]."""
 CHECKS = {"2d": 12, "3d": 3}
-"""Positions that are also solved without linearisation to validate the map; each takes
-half a minute in 3D."""
+"""Number of positions that are also solved without linearisation to validate the map.
+Each of them takes half a minute in 3D."""
 STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
-"""Stages of the sampling of a drive with errors, as the progress counts them."""
+"""Stages of the sampling of a drive with errors, as reported by the progress."""
 FREE = 100.0
-"""Multiple of the median compliance of all positions from which the output counts as
+"""Multiple of the median compliance of all positions above which the output counts as
 free [-]."""
 CHUNK = 128
-"""Sets of errors superposed between two calls of the progress, because one torque takes
-minutes for drives with many teeth."""
+"""Number of sets of errors that are superposed between two progress reports. A single
+torque takes minutes for drives with many teeth."""
 _PHASE, _CHECK = "superposition-{:04d}", "full-solves-{:04d}"
 
 
@@ -64,17 +65,21 @@ def sample_tolerances(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> ToleranceSamples:
-    """Superpose errors on equilibria over the cycle of the teeth.
+    """Equilibria with superposed errors over the cycle of the teeth.
 
     Args:
-        design: A drive with errors of its teeth.
-        repeated_peak: Repeated peak torque, the largest one sampled [N·m].
-        rated_torque: Rated torque [N·m].
-        phases: Positions within a pitch; None chooses :data:`PHASES`, or fewer for a
-            cycle of many pitches.
+        design: A drive with manufacturing errors.
+        repeated_peak: Largest torque to sample, normally the repeated peak torque
+            [N·m].
+        rated_torque: Rated torque, at which the superposition is validated [N·m].
+        phases: Number of positions within a pitch. None chooses :data:`PHASES`, fewer
+            for a cycle of many pitches, or up to :data:`ALONE` for a single pitch.
         model: Fidelity, ``2d`` or ``3d``.
         progress: Called with the stage, the number of finished parts and their total.
-        keep: Store of finished positions, which a resumed run reads; None keeps none.
+        keep: Store of finished positions, which a resumed run reads; None stores none.
+
+    Returns:
+        Samples with errors and, for reference, those of the drive without errors.
 
     Raises:
         ComputationError: If no equilibrium is found without load, or with errors at
@@ -101,7 +106,7 @@ def sample_tolerances(
         levels = np.append(small, levels)
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
-    steps = loads * -(-pitches.size // CHUNK)  # rounded up
+    steps = loads * -(-pitches.size // CHUNK)  # number of chunks, rounded up
     tick = _stage(progress, design, 2, phases * steps)
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
@@ -132,7 +137,7 @@ def sample_tolerances(
         free += count
     # (3, n_torques, n_pitches, n_phases)
     table = np.stack(tables, axis=-1)
-    # spread over the cycle and the phases of a pitch
+    # spread the checks over the cycle and over the phases of a pitch
     count = pitches.size * phases
     checks = CHECKS[model]
     chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
@@ -164,16 +169,17 @@ def full_solves(
     """Equilibria with errors at some positions of the cycle, without linearisation.
 
     Args:
-        design: A drive with errors of its teeth.
-        follow: Model of the drive without these errors.
-        rests: Unloaded positions of that model in a pitch.
-        positions: Numbers of positions in the cycle, ``len(rests)`` per pitch (n,).
+        design: A drive with manufacturing errors.
+        follow: Solver of the drive with perfect teeth and axis.
+        rests: Unloaded positions of that drive within a pitch.
+        positions: Numbers of the positions in the cycle, which has ``len(rests)``
+            positions per pitch (n,).
         torques: Torques T at each position [N·m].
         tick: Called after every position.
-        keep: Store of solved positions, which a resumed run reads; None keeps none.
+        keep: Store of solved positions, which a resumed run reads; None stores none.
 
     Returns:
-        Results of the positions and torques that were solved.
+        Results at all positions and torques whose solve succeeded.
     """
     tables = []
     step = pitch_of(design) / len(rests)
@@ -225,13 +231,13 @@ def _over_torque(
     small: float,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Array, int]:
-    """Output angle, strain energy and compliance at all torques.
+    """Output angle, strain energy and compliance at all torques of both signs.
 
     ``tick`` is called after every :data:`CHUNK` sets of errors at a torque.
 
     Returns:
-        Table (3, n_torques, n_sets), and the number of sets whose unloaded output is
-        free.
+        Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
+        (3, n_torques, n_sets), and the number of sets whose unloaded output is free.
     """
     gaps = [at.gap_change(*errors) for _, at in rest.sides]
 
@@ -246,7 +252,7 @@ def _over_torque(
             part = slice(k, k + CHUNK)
             begin = None if start is None else start[part]
             response = at.respond(change[part], torque, begin)
-            # the influence counts from the equilibrium at which it is linearised
+            # the potential of a response is relative to the linearised equilibrium
             potential = response.potential + state.energy + at.torque * at.angle
             energy = potential - torque * response.output_angle
             tables.append(
@@ -285,7 +291,7 @@ def _over_torque(
 def _stage(
     progress: Progress, design: Design, number: int, total: int
 ) -> Callable[..., None]:
-    """Counter of the finished parts of one stage of the sampling."""
+    """Function that counts and reports the finished parts of one sampling stage."""
     done = 0
     name = f"{design.drive.name}: {STAGES[number]}, part {number + 1} of {len(STAGES)}"
     progress(name, 0, total)
@@ -301,7 +307,7 @@ def _stage(
 def _kept(
     keep: Unfinished | None, phase: int, shape: tuple[int, ...]
 ) -> tuple[Array, int] | None:
-    """Table and number of free sets of a phase of an interrupted run."""
+    """Table and number of free sets that an interrupted run stored for a phase."""
 
     def taken(arrays: Mapping[str, Any]) -> tuple[Array, int]:
         table = np.asarray(arrays["table"], float)
@@ -313,19 +319,23 @@ def _kept(
 
 
 def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
-    """Rows of a position of an interrupted run, see :func:`full_solves`."""
+    """Rows that an interrupted run stored for a position, see :func:`full_solves`."""
     table = np.asarray(arrays["table"], float)
     if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
-        raise ValueError("the stored rows belong to another position of the cycle")
+        raise ValueError("stored rows belong to another position of the cycle")
     return table
 
 
 def _with_onsets(table: Array, small: float) -> Array:
-    """Add the rows at which the teeth take up the clearance, on both sides of zero.
+    """Table with rows added at both ends of the clearance.
 
     Args:
-        table: Output angle, strain energy, compliance (3, n_torques, n_sets).
-        small: Torque of the rows next to zero torque [N·m].
+        table: Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
+            (3, n_torques, n_sets); its compliance at zero torque is replaced.
+        small: Torque that takes up the clearance, in the rows next to zero [N·m].
+
+    Returns:
+        Table (3, n_torques + 2, n_sets).
     """
     zero = table.shape[1] // 2
     # the fourth quantity of a pattern, the input torque, is unused here
