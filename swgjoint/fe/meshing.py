@@ -135,8 +135,8 @@ def simulate_meshing(
         elif torque == 0.0:
             tried = follow.turn_unloaded(unloaded, angle)
             current = tried.state
-            # a failed attempt may hold a state under the small torque: go on from the
-            # last solved position
+            # a failed attempt may hold a state under the small torque: continue from
+            # the last solved position
             unloaded = tried if current.outcome.ok else unloaded
         else:
             current = follow.to_angle(state, angle)

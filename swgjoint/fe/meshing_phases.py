@@ -31,7 +31,7 @@ LOOSE = 1.5
 OVERLOAD = 10.0
 """Multiple of the rated torque at which strain wave gears have already ratcheted, so
 that a larger torque is probably a mistake [-]."""
-_ROUND_OFF = 1e-6  # pitches
+_ROUND_OFF = 1e-6  # tolerance of a phase [pitches]
 
 
 def phases_of(design: Design, steps: int, turn: float) -> Array:

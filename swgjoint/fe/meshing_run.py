@@ -183,6 +183,7 @@ class MeshingRun(Positions):
     """Wall-clock time of the run [s]."""
 
     def _members(self) -> list[tuple[Superelement, int]]:
+        """Sector and number of sectors of every deformable member."""
         compliance = self.model.circular_spline.compliance
         flexspline = (self.model.element, self.model.sectors)
         if compliance is None:

@@ -159,6 +159,6 @@ def test_flawed_or_half_models_are_refused(reference):
     for change in ({"tooth_shift": shifts}, {"half": True}):
         model = replace(follow.model, **change)
         with pytest.raises(
-            ValueError, match=naming("all sectors", "friction", "errors")
+            ValueError, match=naming("whole drive", "friction", "errors")
         ):
             influence(model, state, circular_spline_is_output=False)

@@ -107,7 +107,7 @@ class Pairs:
 
 
 def _since(history: SlipHistory | None, pairs: Pairs) -> tuple[Array, Array, Index]:
-    """Slip of each pair since a history, its friction there and its index in it."""
+    """Slip of each pair since the history, and its friction and its index there."""
     slip, force = np.zeros(len(pairs.key)), np.zeros(len(pairs.key))
     if history is None:
         return slip, force, np.full(len(pairs.key), -1, dtype=np.int64)

@@ -39,7 +39,7 @@ from swgjoint.typing import Array, Index
 CENTRE_OVER_PATCH = 2.0 * log(2.0) + 0.5 - 1727.0 / 840.0
 """Constant c for patch weights (1 - x^2)^3 [-]."""
 NARROWEST = 0.01
-"""Half width b_0 of the strip at zero force, relative to that of the patch [-]."""
+"""Half width b_0 of the strip at zero force, in half lengths of the patch [-]."""
 ABOUT_PITCH_POINT = 0.5
 """Length of flank on either side of the pitch point over which curvatures are averaged,
 in modules [-]. The teeth make contact there."""

@@ -178,7 +178,7 @@ def steps_on_cubic(
 def fit_cubic(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
     """Curves C0 + Delta x + x (1 - x) (a + b x) with given mean and moment.
 
-    Their second integral is the quintic Hermite curve of the complementary potential.
+    They correspond to quintic Hermite interpolation of the complementary potential.
 
     Args:
         c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].

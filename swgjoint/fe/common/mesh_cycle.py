@@ -20,7 +20,7 @@ from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
 
 EVERY = 4
-"""Every position with a multiple of this number is solved again in the second pitch."""
+"""Stride of the input positions that are solved again one pitch later."""
 ANGLE_GOAL = 0.02
 """Goal for the error at the validation angles with the initial number of angles, as a
 fraction of the peak-to-peak value [-]. It grows with the square root of the number of
@@ -319,7 +319,7 @@ def _record(grid: ColumnGrid[AnyState], reached: _Reached) -> dict[str, Any]:
 def _second_pitch(
     grid: ColumnGrid[AnyState], torque: float, count: int
 ) -> dict[str, float]:
-    """Largest difference of the output error between the first and the second pitch."""
+    """Record of the difference of the output error between the first two pitches."""
     follow, theta = grid.follow, grid.angles(count)
     columns = [column for _, column in grid.chosen(count)]
     state, again = columns[-1].states[torque], []
@@ -339,10 +339,10 @@ def _second_pitch(
 
 
 def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, Any]:
-    """Difference of the output error between the drive and its mirror image.
+    """Record of the difference of the output error between drive and mirror image.
 
-    It is evaluated at the second angle; it is None if the solve under the opposite
-    torque fails.
+    The difference is evaluated at the second angle. It is None if the solve under the
+    opposite torque fails.
     """
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]

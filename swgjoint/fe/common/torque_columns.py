@@ -22,7 +22,7 @@ POTENTIAL_WAVES = 1.0
 The derivative of this error with respect to the angle is an error of the input torque.
 """
 LEAST_PEAK = 0.05
-"""Lower bound of the peak-to-peak values to which errors are related, as a fraction of
+"""Lower bound of the peak-to-peak values by which errors are divided, as a fraction of
 the largest peak-to-peak value over the torques [-]."""
 WORST = 0.5
 """Fraction of the largest estimated error above which intervals are divided together

@@ -151,6 +151,7 @@ class HermiteRing:
 
     @cached_property
     def _shape(self) -> tuple[Array, Array]:
+        """Both derivatives of the shape functions at the Gauss points, each (3, 4)."""
         _, first, second = hermite(GAUSS[0])
         return first, second
 
@@ -166,6 +167,7 @@ class HermiteRing:
 
     @cached_property
     def _unstrained(self) -> tuple[Array, Array]:
+        """Stretch [-] and curvature [1/m] of the undeformed ring (elements, 3)."""
         *_, stretch, turning = self._strains(self.reference)
         return stretch, turning
 

@@ -69,10 +69,12 @@ class ThinRingTeeth:
 
     @cached_property
     def _flanks(self) -> RigidFlanks:
+        """Flanks of the flexspline."""
         return RigidFlanks(profile=self.flexspline)
 
     @cached_property
     def _facing(self) -> CircularSpline:
+        """Circular spline, whose flanks may shift only if it has errors."""
         profile = self.circular_spline
         if self.circular_spline_shift is None:
             return CircularSpline(profile=profile)

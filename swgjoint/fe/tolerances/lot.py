@@ -131,7 +131,7 @@ def superposition_error(
 ) -> float | None:
     """Largest deviation of the superposed kinematic error from full solves.
 
-    It is related to the peak-to-peak value of the superposed kinematic error.
+    It is divided by the peak-to-peak value of the superposed kinematic error.
 
     Args:
         drive: One drive of a lot.
