@@ -63,7 +63,7 @@ def test_map_of_a_design(samples):
     assert not set(record["torques_Nm"]) & set(samples.torque)
     # so few angles alias the corners of the ripple, and the record says so
     assert 0.0 < record["output_error"]["rms"] < record["output_error"]["largest"]
-    assert names(record["reason"], "angles", "off")
+    assert names(record["reason"], "angles", "error")
 
 
 def test_mirrored_torques_count_from_the_same_rest():

@@ -61,8 +61,8 @@ class RubbedPath:
     """Tangent compliance including the springs in series (n,) [rad/(N·m)]."""
     shares: Mapping[str, Array]
     """Shares of ``rim``, ``race``, ``balls``, ``bore`` (contact of rim and race) and
-    ``teeth`` in the compliance, each (n,) [-]. The springs in series have
-    the rest."""
+    ``teeth`` in the compliance, each (n,) [-]. The springs in series account
+    for the rest."""
     balls: Array
     """Mean number of loaded balls (n,)."""
     tooth_pairs: Array

@@ -169,7 +169,8 @@ def pressed_form(
 
     Returns:
         Derivatives with respect to u_n, u_t, beta (see
-        :mod:`swgjoint.fe.rings.facing`) and the rotation of the section (n, m, m).
+        :mod:`swgjoint.fe.rings.facing`) and, if m = 4, to the rotation of the section
+        (n, m, m).
     """
     form = np.zeros((len(force), count, count))
     form[:, :3, :3] = -force[:, None, None] * seen.bends()
