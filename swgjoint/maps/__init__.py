@@ -1,1 +1,1 @@
-"""The reduced drive: samples, potential map, file format."""
+"""Maps of drives: the reduced torque and error model, its fit, file and spec sheet."""

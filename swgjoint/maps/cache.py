@@ -26,18 +26,18 @@ Found = TypeVar("Found")
 _log = logging.getLogger(__name__)
 
 _CODE = ("arrays.py", "units.py", "gear", "fe", "maps")
-"""Parts of the package whose code determines the content of a map."""
+"""Parts of this package whose code determines the content of a map."""
 _PACKAGES = ("numpy", "scipy", "scikit-fem")
-"""Packages whose versions determine it as well."""
+"""Dependencies whose versions also determine the content of a map."""
 
 
 @lru_cache
 def code_version() -> str:
-    """Hash of the code that determines the content of a map, and of its file schema.
+    """Hash of everything except the inputs that determines the content of a map.
 
-    It keeps the cache from returning a map that other code computed, for example after
-    an edit of the package or an update of numpy, scipy or scikit-fem. Comments and
-    docstrings do not count.
+    It covers the code, the file schema, the versions of numpy, scipy and scikit-fem and
+    the catalogue tables, so that the cache never returns a map computed from others.
+    Comments and docstrings do not count.
     """
     used = [f"{name} {version(name)}" for name in _PACKAGES]
     digest = hashlib.sha256(f"{__version__} {SCHEMA_VERSION} {used}".encode())
@@ -49,7 +49,7 @@ def code_version() -> str:
 
 
 def key_of(parts: Mapping[str, Any]) -> str:
-    """Hash of the given parts and of the code, 64 hexadecimal digits."""
+    """Hash of the given parts and of :func:`code_version`, 64 hexadecimal digits."""
     content = {"code": code_version(), "parts": plain(parts)}
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -61,18 +61,20 @@ def cache_map(
     *,
     name: str | None = None,
 ) -> DriveMap:
-    """The map of the given parts, from the cache or built and then kept.
+    """The map for the given parts, read from the cache or built and stored there.
 
     Concurrent writers are safe: an entry is written atomically, under a name that
-    depends only on its content. A damaged entry, or one of another design, is built
-    again. If the cache cannot be written, the log says so and the cache is not used.
+    depends only on ``parts`` and the code. A damaged entry, or an entry of another
+    design, is rebuilt. If the cache cannot be written, a warning is logged and the map
+    is returned without being stored.
 
     Args:
-        parts: Everything that determines the result: content hash of the ``design``,
-            level, options. JSON values.
-        build: Called if there is no valid entry; its map has the hash of the design as
-            ``info["design_hash"]``.
-        name: Name of the returned map; it does not enter the hash.
+        parts: Everything that determines the result, such as level and options, as JSON
+            values. ``parts["design"]`` is the content hash of the design.
+        build: Called if there is no valid entry. It returns a map that has the content
+            hash of the design as ``info["design_hash"]``.
+        name: Name of the returned map; it does not enter the hash. None keeps the name
+            that the map has.
     """
     folder = cache_folder()
     if folder is None:
@@ -90,16 +92,17 @@ def recall(
     kind: type[Found],
     compute: Callable[[], Found],
 ) -> Found:
-    """The result for the given parts, from the cache or computed and then kept.
+    """The result for the given parts, read from the cache or computed and stored there.
 
-    An entry is written atomically, under a name that depends only on its content, so
-    that interrupted work resumes where it stopped. A damaged entry is computed again.
+    An entry is written atomically, under a name that depends only on ``parts`` and the
+    code, so that an interrupted series of computations resumes where it stopped. A
+    damaged entry is computed again.
 
     Args:
         store: Folder in the cache.
-        parts: Everything that determines the result, including code outside of gear,
-            fe and maps. JSON values.
-        kind: Type of the result, with fields of JSON values.
+        parts: Everything that determines the result, as JSON values. If it depends on
+            code outside of gear, fe and maps, the parts include a hash of that code.
+        kind: Type of the result; its fields are JSON values.
         compute: Called if there is no valid entry.
     """
     path = entry_of(store, parts)
@@ -112,18 +115,18 @@ def recall(
 
 
 def entry_of(store: str, parts: Mapping[str, Any]) -> Path | None:
-    """File of a result in the cache, see :func:`recall`; None if the cache is off.
+    """File of a result of :func:`recall` in the cache; None if the cache is off.
 
     Args:
         store: Folder in the cache.
-        parts: Everything that determines the result. JSON values.
+        parts: Everything that determines the result, as JSON values.
     """
     folder = cache_folder()
     return None if folder is None else folder / store / f"{key_of(parts)}.json"
 
 
 def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
-    """Content of an entry; None if there is none or it is damaged.
+    """Content of an entry; None if the entry is absent or damaged.
 
     Args:
         path: File of the entry; None if the cache is off.
@@ -135,7 +138,7 @@ def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
 
 
 def _sound(path: Path, design: str) -> DriveMap | None:
-    """The cached map of a design; None if absent, damaged or of another design."""
+    """The cached map of a design; None if absent, damaged or for another design."""
     if not path.exists():
         return None
     try:
@@ -143,12 +146,13 @@ def _sound(path: Path, design: str) -> DriveMap | None:
         if drive.info.get("design_hash") != design:
             raise MapFileError(f"map {path} belongs to another design")
     except MapFileError as exc:
-        _log.warning("cache entry ignored and built again: %s", exc)
+        _log.warning("cache entry ignored and rebuilt: %s", exc)
         return None
     return drive
 
 
 def _built(path: Path, build: Callable[[], DriveMap]) -> DriveMap:
+    """A newly built map, stored in the cache if the file can be written."""
     drive = build()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The map of a drive: constructors, file and spec sheet."""
+"""The map of a drive, with its constructors, file and spec sheet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from swgjoint.maps.potential import Potential
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveMap(Potential):
-    """The reduced drive: torque over torsion and angles.
+    """The reduced drive: output torque as a function of torsion and gear angles.
 
     Data and equations are inherited from :class:`Potential`; this class adds
     constructors, files and the spec sheet.
@@ -41,7 +41,7 @@ class DriveMap(Potential):
             layout: Which member is fixed.
             teeth_flexspline: Number of teeth of the flexspline.
             teeth_circular_spline: Number of teeth of the circular spline.
-            rated_torque: Rated torque [N·m]; the other ratings follow from it.
+            rated_torque: Rated torque [N·m]; the other ratings are multiples of it.
             name: Name of the drive.
 
         >>> from swgjoint import DriveMap
@@ -77,26 +77,27 @@ class DriveMap(Potential):
     def from_catalogue(
         cls, name: str, *, kinematic_error_arcmin: float | None = None, seed: int = 0
     ) -> Self:
-        """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
+        """The map of a catalogue drive such as ``CSG-25-100`` (series, size, ratio).
 
         Stiffness K1, K2, K3 and ratings come from the shipped tables. The hysteresis
-        loss is the stated upper bound if a row has one (CHA). Friction is included if
-        losses are stated (CSG, ratio 100, sizes 14 to 25). The kinematic error is that
-        of an assumed specimen with 2 and 4 cycles per input turn, whose peak to peak is
-        the stated transmission accuracy; that bound says nothing about orders and
-        phases. ``info["kinematic_error"]`` records the assumption and
-        ``info["stated"]`` the figures of the tables.
+        loss is the stated upper bound if the tables state one (CHA). The map includes
+        friction if the tables state losses (CSG, ratio 100, sizes 14 to 25). The
+        kinematic error is that of an assumed specimen: 2 and 4 cycles per input turn,
+        with the stated transmission accuracy as peak-to-peak value by default. The
+        tables do not state orders and phases of the error.
+        ``info["kinematic_error"]`` records the assumption and ``info["stated"]`` the
+        figures of the tables.
 
         Args:
             name: Name of the row.
-            kinematic_error_arcmin: Peak to peak over one output turn [arcmin]. None
-                takes the stated transmission accuracy, or no error if none is stated;
-                0 means no error.
-            seed: Seed of the amplitude ratio of both orders and of their phases.
+            kinematic_error_arcmin: Peak-to-peak kinematic error over one output turn
+                [arcmin]; 0 means no error. None takes the stated transmission accuracy,
+                or no error if none is stated.
+            seed: Seed for the amplitude ratio and the phases of the two orders.
 
         Raises:
-            InputError: If there is no such row (the message lists the nearest names) or
-                an option is out of range.
+            InputError: If there is no such row (the message lists the nearest names),
+                the tables contradict each other or an option is out of range.
 
         >>> from swgjoint import DriveMap
         >>> drive = DriveMap.from_catalogue("CSG-25-100")
@@ -123,15 +124,18 @@ class DriveMap(Potential):
         """The map of a measured drive; ``info["fit"]`` contains the residuals.
 
         Args:
-            path: CSV file of a torque-torsion loop, input locked, both signs of the
-                torque: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
+            path: CSV file of a torque-torsion loop with locked input and both signs of
+                the torque. Columns: ``torque_Nm`` and ``torsion_arcmin`` or
+                ``torsion_rad``.
             teeth_flexspline: Number of teeth of the flexspline, z_fs.
             teeth_circular_spline: Number of teeth of the circular spline, z_cs.
             ratings: All catalogue torques, or only the rated torque [N·m].
-            kinematic_error: CSV file of one output turn without load: ``output_deg``
-                and ``error_arcmin`` (or ``_rad``), output minus ideal output.
-            **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio``,
-                ``name``; see :mod:`swgjoint.maps.fit.measurement`.
+            kinematic_error: CSV file of one unloaded output turn. Columns:
+                ``output_deg`` and ``error_arcmin`` (or ``_rad``), where the error is
+                output minus ideal output. The map has no error if None.
+            **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio`` and
+                ``name``, see
+                :func:`~swgjoint.maps.fit.measurement.map_from_measurement`.
 
         Raises:
             InputError: If a file or a value cannot be used.
@@ -150,25 +154,36 @@ class DriveMap(Potential):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a ``.swg`` file; see :mod:`swgjoint.maps.file`."""
+        """Read a ``.swg`` file.
+
+        Raises:
+            MapFileError: If the file is missing or is not a valid map.
+        """
         from swgjoint.maps.file import read_map
 
         return read_map(path, cls)
 
     def save(self, path: str | Path) -> None:
-        """Write a ``.swg`` file atomically."""
+        """Write a ``.swg`` file atomically.
+
+        Raises:
+            InputError: If the file cannot be written or the map is not valid.
+        """
         from swgjoint.maps.file import write_map
 
         write_map(self, path)
 
     def spec_sheet(self, only: Collection[str] = ()) -> dict[str, Any]:
-        """Catalogue-style figures, measured on the map by the standard procedures.
+        """Catalogue-style figures, determined from the map by the standard procedures.
 
         The keys are those of ``swgjoint spec``. A figure that the map does not provide
         is None, and ``missing`` gives the reason.
 
         Args:
             only: Keys to compute; all if empty.
+
+        Raises:
+            InputError: If a key is unknown.
 
         >>> from swgjoint import DriveMap
         >>> drive = DriveMap.from_catalogue("CSG-25-100")

@@ -11,7 +11,7 @@ from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 CHUNK = 2**14
-"""Angles times harmonics evaluated at once; the arrays then fit in the CPU cache."""
+"""Number of angles times harmonics evaluated at once; these arrays fit in the cache."""
 _NEWTON = 12
 _BISECTIONS = 400
 
@@ -24,24 +24,25 @@ def output_angle(
 ) -> Array:
     """Output angle psi [rad] at which the drive exerts a torque on the output.
 
-    Newton's method starts from the mean curve; points where it does not converge are
-    bisected. If the unloaded output has clearance, its middle (e0) is returned.
+    Newton's method starts from the mean torsion curve; bisection solves the points
+    where it does not converge. For an unloaded output with clearance, the middle of the
+    clearance (e0) is returned. The result has the shape of the broadcast arguments.
 
     Args:
         drive: The map.
         theta: Input angles [rad].
-        torque: T on the output [N·m], broadcast with the angles.
-        sliders: State of the hysteresis; each point is reached from it on a monotone
-            path of the torsion. None takes the conservative part alone.
+        torque: Torque T on the output [N·m], of a shape that broadcasts with ``theta``.
+        sliders: State of the hysteresis elements, from which each point is reached
+            along a monotone torsion path. None ignores hysteresis.
 
     Raises:
-        ComputationError: If the map does not reach a torque.
+        ComputationError: If the map reaches a torque at no output angle.
     """
     theta, torque = np.broadcast_arrays(
         np.asarray(theta, float), np.asarray(torque, float)
     )
     flat_theta, flat_torque = theta.ravel(), torque.ravel()
-    # torsion of the mean curve over torque, for the initial guess
+    # torsion of the mean curve as a function of torque, for the initial guess
     knots = drive.torsion_knots
     x = np.linspace(2.0 * knots[0], 2.0 * knots[-1], 801)
     curve = drive.coefficients(x, 1)[:, 0, 0], x
@@ -62,6 +63,7 @@ def _solve(
     torque: Array,
     sliders: Sliders | None,
 ) -> Array:
+    """Output angles of one chunk [rad]; ``curve`` is torque and torsion of the mean."""
     ideal = theta / drive.ratio
     e0, _, _ = drive.error_at(drive.phases(theta, ideal))
     twist = np.where(torque == 0.0, 0.0, np.interp(torque, *curve))
@@ -74,9 +76,8 @@ def _solve(
         here = psi[open_]
         f, slope = _torque(drive, theta[open_], here, sliders)
         f = f - torque[open_]
-        step = np.where(
-            f == 0.0, 0.0, f / np.where(slope > 0.0, slope, np.nan)
-        )  # the torque falls with psi
+        # the torque decreases with psi, so an excess torque requires a positive step
+        step = np.where(f == 0.0, 0.0, f / np.where(slope > 0.0, slope, np.nan))
         step = np.clip(step, -span, span)
         psi[open_] = here + step
         open_ = open_[~(np.abs(step) <= settled[open_])]
@@ -92,7 +93,7 @@ def _solve(
 def _torque(
     drive: Potential, theta: Array, psi: Array, sliders: Sliders | None
 ) -> tuple[Array, Array]:
-    """T on the output, -dV/dpsi, and the stiffness at fixed phases."""
+    """Torque T on the output [N·m] and the stiffness at fixed phases [N·m/rad]."""
     phases = drive.phases(theta, psi)
     cos, sin = np.cos(phases), np.sin(phases)
     e0, _, e_psi = drive.error_at(phases)
@@ -119,7 +120,7 @@ def _bisect(
     width: float,
     sliders: Sliders | None,
 ) -> Array:
-    """Output angle to round-off by bisection, for stiffness that vanishes or jumps."""
+    """Output angle by bisection to round-off, where stiffness vanishes or jumps."""
 
     def excess(psi: Array) -> Array:
         return _torque(drive, theta, psi, sliders)[0] - torque
@@ -130,8 +131,8 @@ def _bisect(
         while (out := sign * excess(end) > 0.0).any():
             if wide.max() > 1e9 * width:
                 raise ComputationError(
-                    f"torque {float(torque[out][0]):g} N·m is not reached by the map"
-                    f" {drive.name!r}"
+                    f"map {drive.name!r} does not reach a torque of"
+                    f" {float(torque[out][0]):g} N·m"
                 )
             wide[out] *= 2.0
             end = np.where(out, end + sign * wide, end)

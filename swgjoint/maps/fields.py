@@ -1,12 +1,13 @@
-r"""Shape, stress and contact forces of the flexspline for display at any angle.
+r"""Shape, stress and contact forces of the flexspline at any angle, for display.
 
-Without tooth errors every tooth goes through the same states as the wave generator
-passes it. Its state depends on the torque and on its place
+Without tooth errors, every tooth goes through the same states while the wave generator
+passes it. The state of tooth k depends only on the torque and on its place
 
 .. math:: u_k = 2\pi k/z_F + \varphi_F - \varphi_{WG},
 
-counted counter-clockwise from the first lobe. Equilibria at a few positions within one
-pitch therefore sample these functions densely, since they contain all teeth.
+the angle of the tooth relative to the first lobe, positive counter-clockwise. Each
+equilibrium contains all teeth and thus :math:`z_F` places, so a few equilibria within
+one pitch sample the state densely.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ Table = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlexsplineShape:
-    """The flexspline at one or more positions (...), in the frame of the drive."""
+    """N teeth of the flexspline at one or more positions (...), in the drive frame."""
 
     points: Table
-    """Surface points by tooth (..., N, n_nodes, 3) [m]."""
+    """Surface points of each tooth sector (..., N, n_nodes, 3) [m]."""
     von_mises: Table
     """Von Mises stress at the points (..., N, n_nodes) [Pa]."""
     tooth_force: Table
@@ -40,18 +41,19 @@ class FlexsplineShape:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveFields:
-    """State of a tooth sector of the flexspline over torque and place.
+    """State of a tooth sector of the flexspline as a function of torque and place.
 
-    Vectors are in the frame of the tooth: +y points along the undeformed tooth, which
-    turns with its member, and z along the axis, away from the open end.
+    Vectors are in the frame of the tooth, which rotates with the flexspline: +y points
+    radially outwards along the undeformed tooth, +z along the axis away from the open
+    end.
     """
 
     torque: Array
     """Output torques T, increasing [N·m]. Shape (n_torques,)."""
     period: float
-    """Period of the place [rad]: a turn, or half a turn if both lobes are equal."""
+    """Period of the place [rad]: a turn, or the lobe spacing if the lobes are equal."""
     first_place: Array
-    """First stored place at each torque; torsion shifts it (n_torques,) [rad]."""
+    """First stored place at each torque, shifted by the torsion (n_torques,) [rad]."""
     points: Array
     """Undeformed surface nodes (n_nodes, 3) [m]."""
     triangles: NDArray[np.int64]
@@ -67,7 +69,7 @@ class DriveFields:
     wave_generator: Array
     """Outline of the wave generator, first lobe on +y (n_wave_generator, 2) [m]."""
     circular_spline: Array
-    """Outline of a tooth on +y, from root to root (n_circular_spline, 2) [m]."""
+    """Outline of one tooth on +y, from root to root (n_circular_spline, 2) [m]."""
 
     SHAPES: ClassVar[dict[str, tuple[str | int, ...]]] = {
         "torque": ("torques",),
@@ -81,7 +83,7 @@ class DriveFields:
         "wave_generator": ("wave generator", 2),
         "circular_spline": ("circular spline", 2),
     }
-    """Axes of each array, given by name or by length."""
+    """Axes of each array: the name of a variable length, or a fixed length."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.period <= 2.0 * pi * (1.0 + 1e-12):
@@ -98,7 +100,7 @@ class DriveFields:
                         f"fields: {key} has shape {values.shape}, needs {wanted} {axis}"
                     )
             if axes[:2] == ("torques", "places"):
-                # for display: single precision suffices
+                # single precision suffices for display
                 values = values.astype(np.float32)
                 values.setflags(write=False)
             if key == "triangles":
@@ -115,18 +117,19 @@ class DriveFields:
     def evaluate_at(
         self, place: Array, torque: float | Array
     ) -> tuple[Table, Table, Table, Table]:
-        """Displacement, von Mises stress, tooth and wave-generator force at places.
+        """Displacement, stress and both forces of teeth at given places.
 
-        Values are interpolated linearly; beyond the stored torques those of the
-        outermost torque are returned.
+        Values are interpolated linearly in place and torque. Beyond the stored torques,
+        the values at the outermost torque are returned.
 
         Args:
             place: Places of teeth (...) [rad].
             torque: Output torque T, of a shape that broadcasts to the places [N·m].
 
         Returns:
-            Displacement (..., n_nodes, 3) [m], stress (..., n_nodes) [Pa] and both
-            forces (..., 3) [N], in the frames of the teeth.
+            Displacement (..., n_nodes, 3) [m], von Mises stress (..., n_nodes) [Pa],
+            force of the circular spline and force of the wave generator (..., 3) [N],
+            in the frames of the teeth.
         """
         t = np.broadcast_to(np.asarray(torque, dtype=float), np.shape(place))
         j = np.clip(
@@ -145,8 +148,9 @@ class DriveFields:
                 corners.append((row * count + at, (weight * w).astype(np.float32)))
 
         def between(table: Table) -> Table:
+            """Bilinear interpolation of a table at the places and torques."""
             samples = table.reshape(len(self.torque) * count, -1)
-            # allocation costs more than the sums: all corners share one more array
+            # allocation costs more than addition, so all corners share one work array
             total = np.zeros((*t.shape, samples.shape[1]), dtype=np.float32)
             one = np.empty_like(total)
             for at, w in corners:
@@ -163,7 +167,14 @@ class DriveFields:
         )
 
     def repeats(self, teeth: int) -> int:
-        """Number of equal parts of a turn in which a flexspline looks the same."""
+        """Number of equal parts of a turn in which the flexspline has the same shape.
+
+        It is 1 unless the places repeat within a turn and each part contains the same
+        number of teeth.
+
+        Args:
+            teeth: Number of teeth of the flexspline.
+        """
         parts = round(2.0 * pi / self.period)
         whole = abs(parts * self.period - 2.0 * pi) < 1e-9
         return parts if whole and teeth % parts == 0 else 1
@@ -184,8 +195,8 @@ class DriveFields:
             rotation: Rotation of the flexspline (...) [rad].
             wave_generator_angle: Angle of the wave generator (...) [rad].
             torque: Output torque T (...) [N·m].
-            parts: Returns only the first of this number of equal parts; see
-                :meth:`repeats`.
+            parts: Number of equal parts of the turn, of which only the first is
+                returned; see :meth:`repeats`.
         """
         turn, passed, load = (
             np.asarray(value, dtype=float)[..., None]

@@ -2,9 +2,10 @@
 
 Members: ``header.npy`` (JSON text as bytes), the arrays of
 :class:`~swgjoint.maps.drive_map.DriveMap` and, where the map has them, those of its
-:class:`~swgjoint.maps.fields.DriveFields`. The reader trusts no file: it refuses
-compressed and pickled members, checks sizes against the number of bytes before it
-allocates memory, and accepts only a finite, increasing and continuous map.
+:class:`~swgjoint.maps.fields.DriveFields`. The reader trusts no file: it rejects
+compressed and pickled members, compares sizes with the number of bytes before it
+allocates memory, and accepts only a map with finite values and a continuous torque that
+does not decrease with the torsion.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ from swgjoint.maps.potential import Potential
 
 SCHEMA_VERSION = 4
 """Version 2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 the
-fields for display. Older maps are read as maps without these parts."""
+fields for display. A file of an older version is read as a map without these parts."""
 _READABLE = (1, 2, 3, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
-"""Largest file that is read; a thousand harmonics and a hundred knots take 10 MB."""
+"""Largest file that is read [B]; 1000 harmonics with 100 knots take about 10 MB."""
 
 MAX_NAME = 300
-"""Longest name of a map, and longest path that a message repeats in full."""
+"""Longest name of a map, and longest path quoted in full in a message [characters]."""
 
 _ARRAYS: dict[str, tuple[str, int, str]] = {
     "torsion_knots": ("<f8", 1, "rad"),
@@ -62,7 +63,7 @@ _FIELDS: dict[str, tuple[str, int, str]] = {
         ("first_place", "<f8", "rad"),
         ("points", "<f8", "m"),
         ("triangles", "<i8", "nodes"),
-        # for display: single precision suffices
+        # single precision suffices for display
         ("displacement", "<f4", "m"),
         ("von_mises", "<f4", "Pa"),
         ("tooth_force", "<f4", "N"),
@@ -94,14 +95,14 @@ class RatingsHeader(Section):
 
 
 class JenkinHeader(Section):
-    """One Jenkin element of the hysteresis."""
+    """One Jenkin element of the hysteresis; the keys state the units."""
 
     stiffness_Nm_rad: float
     yield_torque_Nm: float
 
 
 class FrictionHeader(Section):
-    """Friction at the input."""
+    """Friction of the wave generator; the keys state the units, ``load`` has none."""
 
     stiffness_Nm_rad: float
     coulomb_Nm: float
@@ -149,7 +150,7 @@ class Header(Section):
 
 
 def map_bytes(drive: Potential) -> bytes:
-    """Content of a ``.swg`` file; equal maps give equal bytes."""
+    """Content of a ``.swg`` file; equal maps and software versions give equal bytes."""
     header = {
         "format": "swgjoint drive map",
         "schema_version": SCHEMA_VERSION,
@@ -218,7 +219,7 @@ def write_map(drive: Potential, path: str | Path) -> None:
 
     Raises:
         InputError: If the file cannot be written.
-        MapFileError: If the reader would refuse the map.
+        MapFileError: If the map is not valid, so that it could not be read again.
     """
     try:
         check_map(drive)
@@ -235,15 +236,15 @@ def read_map(path: str | Path, cls: type[Map]) -> Map:
         cls: Class of the map to return.
 
     Raises:
-        MapFileError: With a message of one line, if the file is missing, damaged,
-            malicious or of an unknown schema version.
+        MapFileError: If the file is missing, damaged, malicious or of an unknown schema
+            version. The message has one line.
     """
     where = str(path) if len(str(path)) <= MAX_NAME else f"{str(path)[:57]}..."
     try:
         return map_from_bytes(_content(Path(path)), cls)
     except OSError as exc:
         raise MapFileError(f"map {where}: cannot be read: {exc.strerror}") from None
-    # zipfile recognises compression and encryption that it does not implement
+    # zipfile raises NotImplementedError for methods of compression it does not support
     except (ValueError, zipfile.BadZipFile, NotImplementedError, EOFError) as exc:
         lines = str(exc).splitlines() or [type(exc).__name__]
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
@@ -312,7 +313,7 @@ def _content(path: Path) -> bytes:
     """The bytes of a regular file of at most :data:`MAX_BYTES`."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
-        raise MapFileError("not a file")
+        raise MapFileError("not a regular file")
     if status.st_size > MAX_BYTES:
         raise MapFileError(f"{status.st_size} bytes; accepted: at most {MAX_BYTES}")
     with path.open("rb") as file:
@@ -337,21 +338,21 @@ def _members(data: bytes) -> dict[str, bytes]:
         infos = archive.infolist()
         if {info.filename for info in infos} not in (names, more):
             found = ", ".join(sorted(info.filename[:40] for info in infos))
-            raise MapFileError(f"members {found}; needed {', '.join(sorted(names))}")
+            raise MapFileError(f"members {found}; expected {', '.join(sorted(names))}")
         for info in infos:
             if info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1:
                 raise MapFileError(f"member {info.filename} is compressed or encrypted")
             if info.compress_size != info.file_size:
-                raise MapFileError(f"member {info.filename} has two different sizes")
+                raise MapFileError(f"member {info.filename} has inconsistent sizes")
         claimed = sum(info.file_size for info in infos)
         if claimed > len(data):
-            raise MapFileError(f"members claim {claimed} bytes of {len(data)}")
+            raise MapFileError(f"members of {claimed} bytes in a file of {len(data)}")
         # read() checks the CRC of each member
         return {info.filename[:-4]: archive.read(info) for info in infos}
 
 
 def _array(data: bytes, name: str, dtype: str, ndim: int) -> NDArray[Any]:
-    """One array, whose shape and dtype must agree with its number of bytes.
+    """One array; its shape and dtype must agree with its number of bytes.
 
     The header of the member is matched as text and never evaluated.
     """
@@ -360,10 +361,10 @@ def _array(data: bytes, name: str, dtype: str, ndim: int) -> NDArray[Any]:
         raise MapFileError(f"{name}: not a plain array of format 1.0")
     stated = head["dtype"].decode()
     if stated != dtype:
-        raise MapFileError(f"{name} has dtype {stated}; needed {dtype}")
+        raise MapFileError(f"{name} has dtype {stated}; expected {dtype}")
     shape = tuple(int(n) for n in head["shape"].decode().split(",") if n.strip())
     if len(shape) != ndim or 0 in shape:
-        raise MapFileError(f"{name} has shape {shape}; needed {ndim} axes, none empty")
+        raise MapFileError(f"{name} has shape {shape}; expected {ndim} non-empty axes")
     body = memoryview(data)[head.end() :]
     needed = np.dtype(dtype).itemsize
     for n in shape:
@@ -394,4 +395,4 @@ def _header(data: bytes) -> Header:
 
 
 def _refuse(constant: str) -> None:
-    raise InputError(f"{constant} is not a number")
+    raise InputError(f"{constant} is not a finite number")

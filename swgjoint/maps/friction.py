@@ -1,8 +1,8 @@
 r"""Friction of a drive in motion: wave-generator bearing, seals and rim bending.
 
-It acts on beta, the rotation of the wave generator relative to the flexspline (theta -
-psi with the circular spline fixed, theta with the flexspline fixed), in which the
-bearing turns and the rim is bent. The model is an elasto-plastic element (a bristle of
+It opposes beta, the rotation of the wave generator relative to the flexspline (theta -
+psi with the circular spline fixed, theta with the flexspline fixed). Beta turns the
+bearing and bends the rim. The model is an elasto-plastic element (a bristle of
 stiffness sigma and damping sigma_1 in series with a slider) and a viscous term. With
 the relative speed nu:
 
@@ -10,24 +10,26 @@ the relative speed nu:
     F = \sigma z + \sigma_1 \dot z + \eta\,\nu, \quad |z| \le f/\sigma, \quad
     f = f_b + f_c + (f_s - f_c)\,e^{-(\nu/\nu_s)^2} + c\,|T/i|
 
-f_b is the bending, f_c the Coulomb and f_s the static friction, and c the part that
-grows with the output torque. The bristle follows beta within its reach f/sigma; beyond
-it slips.
+f_b is the bending friction, f_c the Coulomb and f_s the static friction, nu_s the
+Stribeck speed, and c the factor of the friction that grows with the output torque T.
+The stretch z of the bristle follows beta up to its reach f/sigma, where the slider
+slips.
 
-The LuGre model is not used because its bristle yields slightly at any stretch: it
-drifts under a load that oscillates below f_s, and it is passive only for
+The LuGre model is not used because its bristle yields slightly at any stretch. It
+therefore drifts under a load that oscillates below f_s, and it is passive only for
 :math:`\eta \ge \sigma_1 (f_s - f_c)/f_c` at constant load (Barabanov and Ortega 2000).
-Here the power :math:`F\nu` is the rate of :math:`\sigma z^2/2` plus :math:`\sigma z
-(\nu - \dot z) + \sigma_1 \dot z \nu + \eta\nu^2`. No term is negative, however f >= 0
-varies: the slider moves, and the reach shrinks, only against the pull of the bristle
-(sigma_1 acts while the bristle is stretched further, not while its reach shrinks). The
-model is therefore passive without any condition. At rest below f it is a spring without
-creep.
+In the present model the power :math:`F\nu` is the rate of change of
+:math:`\sigma z^2/2` plus :math:`\sigma z (\nu - \dot z) + \sigma_1 \dot z \nu +
+\eta\nu^2`. No term of this sum is negative, however f >= 0 varies. The slider, of speed
+:math:`\nu - \dot z`, moves only in the direction in which the bristle pulls it, also
+when a shrinking reach makes it slip. The damping sigma_1 acts only while the bristle
+sticks, so that :math:`\dot z = \nu`. The model is therefore unconditionally passive.
+Below f it is a spring without creep.
 
 Source:
     Dupont, Hayward, Armstrong, Altpeter (2002), "Single state elastoplastic friction
-    models", IEEE Trans. Autom. Control 47, 787-792, for the class; Canudas de Wit et
-    al. (1995), IEEE Trans. Autom. Control 40, 419-425, for the Stribeck curve;
+    models", IEEE Trans. Autom. Control 47, 787-792, for the class of models; Canudas de
+    Wit et al. (1995), IEEE Trans. Autom. Control 40, 419-425, for the Stribeck curve;
     Barabanov, Ortega (2000), "Necessary and sufficient conditions for passivity of the
     LuGre friction model", IEEE Trans. Autom. Control 45, 830-832.
 """
@@ -55,12 +57,12 @@ _UNITS = {
 }
 _POSITIVE = ("stribeck_speed", "stiffness")
 _ROUND_OFF = 1e-9
-_LARGEST = 1e30  # far beyond any drive, far below overflow of products
+_LARGEST = 1e30  # far above the values of any drive; products do not overflow
 
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """Friction of the wave generator against the flexspline, at the input."""
+    """Friction that opposes the rotation of the wave generator in the flexspline."""
 
     stiffness: float
     """Bristle stiffness sigma before slip [N·m/rad], > 0."""
@@ -69,13 +71,13 @@ class Friction:
     static: float = 0.0
     """Static friction f_s without load [N·m], at least f_c."""
     stribeck_speed: float = 1.0
-    """Stribeck speed nu_s, at which friction falls from f_s towards f_c [rad/s]."""
+    """Stribeck speed nu_s, where the excess f_s - f_c has fallen to 1/e [rad/s]."""
     viscous: float = 0.0
     """Viscous friction eta [N·m·s/rad]."""
     load: float = 0.0
-    """Load factor c, friction per |T/i| [-]; from about 1 back-driving fails."""
+    """Load factor c, friction per |T/i| [-]; back-driving is impossible if c >= 1."""
     bending: float = 0.0
-    """Bending friction f_b, loss of the turning rim per radian [N·m]."""
+    """Bending friction f_b: energy that rim bending dissipates per radian [N·m]."""
     damping: float = 0.0
     """Bristle damping sigma_1 [N·m·s/rad]."""
     source: str = "given"
@@ -115,7 +117,7 @@ class Friction:
         """Friction torque F after a monotone rotation from the relaxed bristle [N·m].
 
         Args:
-            rotation: Rotation beta since the bristle was relaxed [rad].
+            rotation: Rotation beta from the position of the relaxed bristle [rad].
             speed: Relative speed nu [rad/s].
             input_torque: Elastic torque on the input, T/i [N·m].
         """
@@ -142,6 +144,8 @@ def play_friction(
 ) -> Array:
     """Friction torque F along a history that begins with a relaxed bristle [N·m].
 
+    The result has the shape (n,).
+
     Args:
         friction: Friction parameters.
         rotation: Relative rotation beta [rad]. Shape (n,).
@@ -155,7 +159,7 @@ def play_friction(
 
 
 def play_bristle(rotation: Array, reach: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Bristle stretch z along a history [rad], and whether it slips. Shapes (n,).
+    """Bristle stretch z along a history [rad] and whether it slips. Shapes (n,).
 
     Args:
         rotation: Relative rotation beta; the bristle is relaxed at the first sample
