@@ -1,12 +1,13 @@
 """A drive map from a row of the shipped catalogue tables.
 
-Torque against torsion has the slopes K1, K2, K3 on 0..T1, T1..T2 and above. The two
-corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNER`), so
-torque and stiffness are continuous. A catalogue states two figures as upper bounds: the
-hysteresis loss and the transmission accuracy. The map takes both at the bound, with a
-label that a drive may have less. The transmission accuracy becomes the kinematic error
-of an assumed specimen; see :mod:`swgjoint.maps.fit.error_spectrum`. The map has
-friction if the catalogue states running losses.
+The curve of torque against torsion has the slopes K1 from 0 to T1, K2 from T1 to T2 and
+K3 above T2. Parabolas that end on the lines of the catalogue round the two corners
+(:data:`CORNER`), so torque and stiffness are continuous. Two catalogue figures are
+upper bounds: the hysteresis loss and the transmission accuracy. The map has both at the
+bound, and its labels note that a real drive may have less. The transmission accuracy
+becomes the kinematic error of an assumed specimen; see
+:mod:`swgjoint.maps.fit.error_spectrum`. The map has friction if the catalogue states
+running losses.
 """
 
 from __future__ import annotations
@@ -37,16 +38,18 @@ from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin
 
 SHARED_SERIES = ("CSF", "CSG", "SHG", "HFUC", "HFUS", "CHA")
-"""Series that share ``stiffness.csv``; only CSG has its own ratings there."""
+"""Series that share ``stiffness.csv``; ``ratings.csv`` covers CSG only."""
 CORNER = 0.04
-"""Half width of a rounded corner, as a fraction of the shorter adjacent line. The chord
-over a line of slope K next to one of slope K' changes by CORNER |K'/K - 1|/4: less
-than 1 % for every shipped row."""
+"""Half width of a rounded corner, as a fraction of the shorter adjacent line. Rounding
+changes the chord of a line of slope K next to one of slope K' by the relative amount
+CORNER |K'/K - 1|/4, which is less than 1 % for every shipped row."""
 LOBES = 2
+"""Number of lobes, equal to the difference of the tooth counts."""
 SLOPES = ("K1", "K2", "K3")
 CLOSE = 1e-4
 """Relative tolerance of the slopes and the hysteresis loss of the loop."""
 ROUNDS = 50
+"""Largest number of iterations that adjust the loop."""
 
 _NAME = re.compile(r"([A-Z]+)-(\d{1,4})-(\d{1,4})")
 _NO_ERROR = (
@@ -63,14 +66,14 @@ def catalogue_names() -> list[str]:
 
 
 def is_catalogue_name(text: str) -> bool:
-    """Whether a reference begins with a catalogue series."""
+    """Whether a reference begins with a catalogue series and is not a TOML file."""
     series = "|".join(SHARED_SERIES)
     name = re.match(rf"(?:{series})(?:[-\s\d]|$)", text, re.IGNORECASE)
     return name is not None and not text.endswith(".toml")
 
 
 def find_row(name: str) -> CatalogueRow:
-    """The row of a name such as ``CSG-25-100``: series, size, ratio.
+    """The row of a name such as ``CSG-25-100`` (series, size, ratio).
 
     Raises:
         InputError: If no row with ratings has this name; the message lists the nearest
@@ -89,7 +92,7 @@ def find_row(name: str) -> CatalogueRow:
         )
     else:
         why = "is not in models/catalogue/ratings.csv"
-    # nearest by the factors of size and ratio; a ratio of 100 if the name has none
+    # nearest by the factors of size and ratio, which default to 25 and 100
     digits = [max(1, int(text)) for text in re.findall(r"\d{1,4}", wanted)]
     size, ratio = ([*digits, 100] if digits else [25, 100])[:2]
     near = sorted(
@@ -116,8 +119,8 @@ def map_from_catalogue(
     Args:
         name: Name of the row, such as ``CSG-25-100``.
         cls: Class of the map to return.
-        kinematic_error_arcmin: Peak to peak over one output turn [arcmin]; the stated
-            transmission accuracy if None.
+        kinematic_error_arcmin: Peak-to-peak kinematic error over one output turn
+            [arcmin]; the stated transmission accuracy if None.
         seed: Seed of the assumed kinematic error.
 
     Raises:
@@ -135,12 +138,15 @@ def with_stated_error(
     seed: int = 0,
     joint: str = "",
 ) -> Map:
-    """A catalogue drive without kinematic error, given that of an assumed specimen.
+    """The map of a catalogue drive with the kinematic error of an assumed specimen.
+
+    If the tables state no transmission accuracy and no value is given, the map has no
+    error, and ``info["kinematic_error"]`` says so.
 
     Args:
-        drive: Map of a catalogue row.
-        kinematic_error_arcmin: Peak to peak over one output turn [arcmin]; the stated
-            transmission accuracy if None.
+        drive: Map of a catalogue row, without kinematic error.
+        kinematic_error_arcmin: Peak-to-peak kinematic error over one output turn
+            [arcmin]; the stated transmission accuracy if None.
         seed: Seed of the assumed error.
         joint: Name of the joint that the drive is for, see
             :func:`~swgjoint.maps.fit.error_spectrum.with_assumed_error`.
@@ -204,7 +210,7 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
 
 
 def _spring(row: CatalogueRow, s: dict[str, float]) -> dict[str, Any]:
-    """Knots, potential and end stiffness of three lines."""
+    """Arguments of a map with three lines: knots, potential and end stiffness."""
     top = max(row.momentary_peak, 1.5 * s["T2"])
     knots, stiffness = three_lines(
         s["T1"], s["T2"], s["K1"], s["K2"], s["K3"], largest=top
@@ -218,15 +224,15 @@ def _with_hysteresis(
 ) -> Map:
     """The map whose loop has the slopes of the row and a hysteresis loss [rad].
 
-    The mid-line of a loop differs from the spring: it mixes the slopes around T1 and
-    T2, and the elements also carry load at the tip, where both branches meet. The
-    slopes of the spring are therefore chosen so that the slopes measured on the loop
-    equal those of the catalogue.
+    The mid-line of a loop differs from the curve of the spring: it mixes the slopes
+    around T1 and T2, and at the tip, where both branches meet, the hysteresis elements
+    carry part of the torque. The slopes of the spring are therefore iterated until the
+    slopes measured on the loop equal those of the catalogue.
     """
     r = drive.ratings
     limits = (0.0, r.T1, r.T2, largest_torque(r))
     wanted = np.array([*(s[k] for k in SLOPES), loss])
-    # yield torque of one element in parallel with K1
+    # initial yield torque: that of one element in parallel with K1
     trial = wanted * [1.0, 1.0, 1.0, 0.5 * s["K1"]]
     for _ in range(ROUNDS):
         slopes = dict(zip(SLOPES, map(float, trial), strict=False))
@@ -254,8 +260,9 @@ def three_lines(
     """Knots [rad] and stiffness there [N·m/rad] of three lines with rounded corners.
 
     The slope is K1 up to T1, K2 up to T2 and K3 beyond; the curve is odd in the
-    torsion. Within a corner the stiffness is linear, so that by the trapezoidal rule
-    the torque ends exactly on the next line.
+    torsion. Within a corner the stiffness varies linearly, so its mean is that of the
+    two slopes and the torque ends exactly on the next line. Both arrays have the shape
+    (10,).
 
     Args:
         T1: End of the first line [N·m].
@@ -278,9 +285,10 @@ def three_lines(
 
 
 def _missing(stated: dict[str, float | None]) -> dict[str, str]:
-    """Why the map does not provide a figure, and what the catalogue states instead."""
+    """Reasons why the map lacks a figure, with the value that the catalogue states."""
 
     def stated_as(key: str) -> str:
+        """What the tables state about a figure, as text."""
         value = stated[key]
         return (
             "the catalogue tables do not state it"

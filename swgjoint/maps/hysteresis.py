@@ -5,9 +5,9 @@ torsion at which its spring is relaxed,
 
 .. math:: q = k (\Delta - r), \qquad r \in [\Delta - f/k, \Delta + f/k],
 
-and r moves only if an end of that interval pushes it. In increments:
-:math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`. Along a monotone path only
-the last torsion matters, so the final r follows from the initial r.
+and r changes only when an end of that interval moves past it. In increments:
+:math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`. After a monotone path, r
+depends only on the initial r and the final torsion.
 
 The element is passive: the work :math:`q\,d\Delta` is the change of :math:`q^2/2k` plus
 f times the slip :math:`|dr|`, which is never negative. A steady cycle of amplitude
@@ -33,7 +33,7 @@ from swgjoint.errors import InputError
 from swgjoint.typing import Array
 
 MAX_ELEMENTS = 64
-"""Largest number of elements; a measured loop cannot distinguish that many."""
+"""Largest number of elements, more than a measured loop can distinguish."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Jenkin:
         for key, unit in (("stiffness", "N·m/rad"), ("yield_torque", "N·m")):
             value = getattr(self, key)
             number = isinstance(value, int | float) and not isinstance(value, bool)
-            # far beyond any drive, far below overflow of products
+            # far above the values of any drive; products do not overflow
             if not (number and isfinite(value) and 1e-60 < value < 1e60):
                 raise InputError(
                     f"hysteresis {key} {value!s:.40} {unit}; accepted: a finite number"
@@ -64,18 +64,18 @@ class Jenkin:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sliders:
-    """Parameters and relaxed torsions of Jenkin elements; immutable."""
+    """Parameters and state of the Jenkin elements of a drive; immutable."""
 
     stiffness: Array
     """Stiffness k [N·m/rad]. Shape (n,)."""
     reach: Array
     """Yield torsion f/k [rad]. Shape (n,)."""
     rest: Array
-    """Torsion r at which an element is relaxed [rad]. Shape (n,)."""
+    """Torsion r at which each element is currently relaxed [rad]. Shape (n,)."""
 
     @classmethod
     def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
-        """Elements that are relaxed at a torsion.
+        """State in which all elements are relaxed at a torsion.
 
         Args:
             elements: Jenkin elements of the drive.
@@ -93,11 +93,11 @@ class Sliders:
         return Sliders(stiffness=self.stiffness, reach=self.reach, rest=rest)
 
     def torque(self, torsion: ArrayLike) -> Array:
-        """Torque after a monotone path to each torsion [N·m]."""
+        """Total torque after a monotone path to each torsion [N·m]."""
         return np.asarray(self._stretch(torsion) @ self.stiffness)
 
     def tangent(self, torsion: ArrayLike) -> Array:
-        """Stiffness of the elements that stick at each torsion [N·m/rad]."""
+        """Total stiffness of the elements that stick at each torsion [N·m/rad]."""
         sticks = np.abs(self._stretch(torsion)) < self.reach
         return np.asarray(sticks @ self.stiffness)
 
@@ -111,7 +111,7 @@ class Sliders:
 
 
 def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
-    """Torque of the elements along a history of torsion [N·m]. Shapes (n,).
+    """Total torque of the elements along a torsion history [N·m]. Shape (n,).
 
     The elements start relaxed at zero torsion, as after a reset of the simulation
     engine.
@@ -127,11 +127,13 @@ def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
 
 
 def stretches(torsion: Array, reach: float) -> Array:
-    """Stretch x - r of one spring along a history, relaxed at zero torsion [rad].
+    """Stretch x - r of one element along a torsion history x [rad]. Shape (n,).
+
+    The element starts relaxed at zero torsion.
 
     Args:
         torsion: History of the torsion [rad]. Shape (n,).
-        reach: Stretch at which the spring slips [rad].
+        reach: Stretch at which the slider of the element slips [rad].
     """
     stretch, rest = np.empty(len(torsion)), 0.0
     for k, x in enumerate(np.asarray(torsion, float).tolist()):

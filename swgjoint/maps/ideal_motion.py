@@ -1,13 +1,14 @@
-r"""A map near its ideal motion: cheap torques for many positions and harmonics.
+r"""A map linearised about its ideal motion, for many positions and harmonics.
 
-The output stays within a milliradian of theta/i, and over this distance the phases of
-the harmonics change very little. To second order in the distance s, at each theta,
+The output angle psi stays within about a milliradian of theta/i, so the phases of the
+harmonics change very little over the distance s = psi - theta/i. Their effect is
+linearised in s at each theta:
 
 .. math:: V = V_0(\Delta) + s V_1(\Delta), \quad e_0 = a + s b, \quad
     \Delta = e_0 - s, \quad T = -\frac{dV}{ds} .
 
-The sums over the harmonics are matrix products, computed once per position instead of
-once per iteration.
+The sums over the harmonics are then matrix products, computed once per position instead
+of once per iteration.
 """
 
 from __future__ import annotations
@@ -22,26 +23,33 @@ from swgjoint.typing import Array
 
 _NEWTON = 12
 _BEND = 1e-3
-"""Largest second-order term, (q s)^2/2, that may be neglected."""
+"""Largest second-order term (q s)^2/2 that is neglected; q is the largest order of psi
+[-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdealMotion:
-    """Polynomials of the torsion at n given input angles."""
+    """Polynomials of the torsion at n input angles, summed over the harmonics."""
 
     drive: Potential
     theta: Array
     """Input angles [rad]. Shape (n,)."""
     error: Array
-    """e0 at psi = theta/i [rad] and its derivative by psi [-]. Shape (2, n)."""
+    """a [rad] and b [-], which are e0 and de0/dpsi at psi = theta/i. Shape (2, n)."""
     potential: Array
-    """Coefficients of V_0 and V_1, as in a map. Shape (2, n, n_knots - 1, 5)."""
+    """Coefficients of V_0 [J/rad^k] and V_1 [J/rad^(k+1)], as in a map.
+
+    Shape (2, n, n_knots - 1, 5).
+    """
     ends: Array
-    """V_0'' and V_1'' below and above the knots. Shape (2, n, 2)."""
+    """V_0'' [N·m/rad] and V_1'' [N·m/rad²] below and above the knots.
+
+    Shape (2, n, 2).
+    """
 
     @classmethod
     def from_map(cls, drive: Potential, theta: Array) -> IdealMotion:
-        """Sum the harmonics at psi = theta/i.
+        """The harmonics of a map, summed at psi = theta/i.
 
         Args:
             drive: The map.
@@ -50,7 +58,7 @@ class IdealMotion:
         phases = drive.phases(theta, theta / drive.ratio)
         cos, sin = np.cos(phases), np.sin(phases)
         n_psi = drive.angle_orders[:, 1]
-        # factors of the cosine and sine amplitudes: in the value, in its psi derivative
+        # factors of the cosine and sine amplitudes, for a value and its psi derivative
         value = np.stack([cos, sin], axis=-1).reshape(theta.size, -1)
         slope = np.stack([-n_psi * sin, n_psi * cos], axis=-1).reshape(theta.size, -1)
         both = np.stack([value, slope])
@@ -65,9 +73,10 @@ class IdealMotion:
         )
 
     def torque(self, shift: Array) -> tuple[Array, Array]:
-        """T on the output at psi = theta/i + shift, and -dT/dpsi [N·m, N·m/rad].
+        """Torque T on the output [N·m] and stiffness -dT/dpsi [N·m/rad]. Shapes (n,).
 
-        ``shift`` has the shape (n,) [rad].
+        Args:
+            shift: Distance s = psi - theta/i [rad]. Shape (n,).
         """
         knots = self.drive.torsion_knots
         a, b = self.error
@@ -87,10 +96,16 @@ class IdealMotion:
         return torque, stiffness
 
     def output_angle(self, torque: float) -> Array:
-        """Psi at which the drive exerts a torque on the output [rad].
+        """Output angle psi at which the drive exerts a torque [rad]. Shape (n,).
 
-        Positions where Newton's method does not converge, and those far from the ideal
-        motion, are solved on the map itself.
+        The full map is solved at positions where Newton's method does not converge or
+        the second-order term exceeds :data:`_BEND`.
+
+        Args:
+            torque: Torque T on the output [N·m].
+
+        Raises:
+            ComputationError: If the map reaches the torque at no output angle.
         """
         drive = self.drive
         shift = self.error[0] - (drive.mean_torsion(torque) if torque else 0.0)

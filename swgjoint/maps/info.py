@@ -1,8 +1,8 @@
-"""Checks of the record ``info`` of a map that comes from a file.
+"""Checks of the record ``info`` of a map that was read from a file.
 
-A map is usable without its record. A known key whose type differs from what this
-package writes is therefore dropped with a warning, so that code which reads a key can
-rely on its type. ``validation`` has its own reader, see
+A map is usable without its record. A known key is therefore dropped with a warning if
+its type differs from the one that this package writes, so that code that reads a key
+can rely on its type. ``validation`` has its own reader, see
 :mod:`swgjoint.maps.sheet.map_validity`; unknown keys are kept unchanged.
 """
 
@@ -16,13 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from swgjoint.errors import MapFileError
 
 MOST_DEPTH = 30
-"""Deepest nesting of tables and lists; a validation record has five levels."""
+"""Deepest accepted nesting of objects and lists; a validation record has 5 levels."""
 Number = Annotated[float, Field(ge=-1e60, le=1e60, allow_inf_nan=False, strict=True)]
 Text = Annotated[str, Field(strict=True)]
 
 
 class Pruned(BaseModel):
-    """Dropped harmonics and bounds of their effect."""
+    """Dropped harmonics and bounds on their effect."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -35,7 +35,7 @@ class Pruned(BaseModel):
 
 
 class Label(BaseModel):
-    """What the finite elements model; other entries are shown unchanged."""
+    """What the finite elements model; other entries are not checked."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -61,11 +61,11 @@ KINDS: dict[str, TypeAdapter[Any]] = {
     "perfect_teeth": TypeAdapter(dict[str, Any]),
     "stiffness_range_Nm_rad": TypeAdapter(tuple[Number, Number]),
 }
-"""Type of every key that the package reads."""
+"""Types of the keys that the package reads from the record of a loaded map."""
 
 
 def sound_info(info: dict[str, Any], *, name: str) -> dict[str, Any]:
-    """The record without the keys of a wrong type, which one warning lists.
+    """The record without keys of a wrong type; one warning lists the dropped keys.
 
     Args:
         info: Record as read from the file.
@@ -76,8 +76,8 @@ def sound_info(info: dict[str, Any], *, name: str) -> dict[str, Any]:
     ]
     if wrong:
         warnings.warn(
-            f"map {name[:60]!r}: info {', '.join(wrong)} ignored: not of the type that"
-            " swgjoint writes; the drive itself is not affected",
+            f"map {name[:60]!r}: info {', '.join(wrong)} ignored: its type differs from"
+            " that written by swgjoint; the drive itself is not affected",
             stacklevel=2,
         )
     return {key: value for key, value in info.items() if key not in wrong}
@@ -92,7 +92,7 @@ def _fits(kind: TypeAdapter[Any], value: Any) -> bool:
 
 
 def check_texts(content: Any) -> None:
-    """Refuse a header that could not be written again.
+    """Reject a header that could not be written to a file again.
 
     Raises:
         MapFileError: If it is nested too deeply or a text is not valid Unicode.
@@ -102,7 +102,7 @@ def check_texts(content: Any) -> None:
         value, depth = todo.pop()
         if depth > MOST_DEPTH:
             raise MapFileError(
-                f"header nested too deeply; accepted: {MOST_DEPTH} tables and lists"
+                f"header nested too deeply; accepted: at most {MOST_DEPTH} levels"
             )
         if isinstance(value, dict):
             todo += [(one, depth + 1) for pair in value.items() for one in pair]
@@ -112,4 +112,6 @@ def check_texts(content: Any) -> None:
             try:
                 value.encode()
             except UnicodeEncodeError:
-                raise MapFileError("header with text that is not Unicode") from None
+                raise MapFileError(
+                    "header contains text that is not valid Unicode"
+                ) from None
