@@ -6,13 +6,13 @@ r"""The reduced drive: a potential of torsion and of the two gear angles.
     \quad \varphi_k = p_k \alpha + q_k \beta,
 
 with :math:`\Delta = \theta/i + e_0(\alpha, \beta) - \psi`. The coefficients are
-piecewise polynomials of degree four, so torque is piecewise cubic. Outside the
-sampled torsion every coefficient continues as a parabola, the torque linearly.
+piecewise polynomials of degree four, so the torque is piecewise cubic. Outside the
+sampled torsion every coefficient continues as a parabola and the torque linearly.
 
 In addition to the potential, a map may have hysteresis (Jenkin elements along the
 torsion, see :mod:`swgjoint.maps.hysteresis`) and friction of the wave generator (see
-:mod:`swgjoint.maps.friction`). Everything in this module except these two is
-conservative.
+:mod:`swgjoint.maps.friction`). The forces that this module computes exclude both and
+are therefore conservative.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from swgjoint.units import arcmin
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """Torsion and generalised forces at given angles; all arrays have their shape."""
+    """Torsion and generalised forces at given angles, in the shape of the angles."""
 
     torsion: Array
     """Torsion [rad]."""
     by_theta: Array
-    """Derivative of the torsion by the input angle [-]."""
+    """Derivative of the torsion by the input angle theta [-]."""
     by_psi: Array
-    """Derivative of the torsion by the output angle [-]."""
+    """Derivative of the torsion by the output angle psi [-]."""
     input_force: Array
     """Generalised force on the input, -dV/dtheta [N·m]."""
     output_force: Array
@@ -64,10 +64,11 @@ class Potential:
     level: str
     """Origin: ``ring``, ``2d``, ``3d``, ``catalogue``, ``measurement``, ``linear``."""
     layout: str
+    """Which member is fixed, one of :data:`~swgjoint.gear.kinematics.LAYOUTS`."""
     teeth_flexspline: int
     teeth_circular_spline: int
     torsion_knots: Array
-    """Increasing breakpoints of the torsion [rad]. Shape (n_knots,)."""
+    """Torsions at which the polynomials join, increasing [rad]. Shape (n_knots,)."""
     orders: NDArray[np.int64]
     """(p, q) of every harmonic, the mean (0, 0) first. Shape (n_harmonics, 2)."""
     potential: Array
@@ -76,7 +77,7 @@ class Potential:
     Shape (n_harmonics, 2, n_knots - 1, 5).
     """
     end_stiffness: Array
-    """Slope of the torque of A and B below and above the knots [N·m/rad].
+    """Second derivative of A and B below and above the knots [N·m/rad].
 
     Shape (n_harmonics, 2, 2).
     """
@@ -84,14 +85,15 @@ class Potential:
     """Cosine and sine amplitude of e0 for every harmonic [rad]. (n_harmonics, 2)."""
     ratings: Ratings
     damping_ratio: float = 0.02
+    """Default damping of a joint with this drive, as a fraction of critical [-]."""
     hysteresis: tuple[Jenkin, ...] = ()
-    """Jenkin elements whose torque adds to that of the potential; none by default."""
+    """Jenkin elements whose torque is added to that of the potential."""
     friction: Friction | None = None
-    """Friction of the wave generator against the flexspline; None by default."""
+    """Friction between wave generator and flexspline; None for a map without it."""
     fields: DriveFields | None = None
-    """Shape and stress of the flexspline for display; None without finite elements."""
+    """Shape and stress of the flexspline for display; None if not computed."""
     info: Mapping[str, Any] = field(default_factory=dict)
-    """Provenance and residuals, JSON values only."""
+    """Provenance and residuals; JSON values only."""
 
     def __post_init__(self) -> None:
         if self.layout not in LAYOUTS:
@@ -132,25 +134,25 @@ class Potential:
 
     @property
     def ratio(self) -> float:
-        """Signed ratio i, output = input / i."""
+        """Signed ratio i [-]; the ideal output angle is theta/i."""
         return ratio(self.layout, self.teeth_flexspline, self.teeth_circular_spline)
 
     @property
     def angle_orders(self) -> NDArray[np.int64]:
-        """(d phi/d theta, d phi/d psi) of every harmonic. Shape (n_harmonics, 2)."""
+        """Derivatives of each phase by theta and psi [-]. Shape (n_harmonics, 2)."""
         alpha, beta = angle_coefficients(self.layout)
         return np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
 
     @property
     def friction_direction(self) -> tuple[int, int]:
-        """(d beta/d theta, d beta/d psi) of the rotation that friction opposes."""
+        """Derivatives of every phase by theta and psi [-]. (n_harmonics, 2)."""
         return angle_coefficients(self.layout)[1]
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Phases of the harmonics [rad], appended as the last axis.
 
         Args:
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         angles = np.stack(
@@ -159,7 +161,10 @@ class Potential:
         return np.asarray(angles @ self.angle_orders.T.astype(float))
 
     def error_at(self, phases: Array) -> tuple[Array, Array, Array]:
-        """Kinematic error e0 [rad] and its derivatives by theta and psi [-]."""
+        """Kinematic error e0 [rad] and its derivatives by theta and psi [-].
+
+        ``phases`` are those of :meth:`phases` [rad]. Shape (..., n_harmonics).
+        """
         cos, sin = np.cos(phases), np.sin(phases)
         a, b = self.kinematic_error.T
         slope = b * cos - a * sin
@@ -174,7 +179,7 @@ class Potential:
         """Torsion theta/i + e0 - psi [rad].
 
         Args:
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         e0, _, _ = self.error_at(self.phases(theta, psi))
@@ -188,10 +193,11 @@ class Potential:
 
         Args:
             torsion: Torsion of any shape [rad].
-            derivative: 0, 1 or 2 derivatives by the torsion.
+            derivative: Order of the derivative by the torsion, 0 to 2.
 
         Returns:
-            Shape torsion.shape + (n_harmonics, 2).
+            A and B [J], their first [N·m] or second derivative [N·m/rad]. Shape (...,
+            n_harmonics, 2) with the axes of ``torsion`` first.
         """
         x = np.asarray(torsion, float)
         knots = self.torsion_knots
@@ -216,6 +222,7 @@ class Potential:
         return np.asarray(v0 + out * (v1 + 0.5 * out * k_end) if beyond else v0)
 
     def _sum(self, torsion: ArrayLike, phases: Array, derivative: int) -> Array:
+        """A derivative of V by the torsion at given phases."""
         ab = self.coefficients(torsion, derivative)
         return np.asarray(
             np.sum(ab[..., 0] * np.cos(phases) + ab[..., 1] * np.sin(phases), axis=-1)
@@ -226,7 +233,7 @@ class Potential:
 
         Args:
             torsion: Torsion [rad].
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         return self._sum(torsion, self.phases(theta, psi), 0)
@@ -236,7 +243,7 @@ class Potential:
 
         Args:
             torsion: Torsion [rad].
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         return self._sum(torsion, self.phases(theta, psi), 1)
@@ -246,7 +253,7 @@ class Potential:
 
         Args:
             torsion: Torsion [rad].
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         return self._sum(torsion, self.phases(theta, psi), 2)
@@ -254,11 +261,11 @@ class Potential:
     def forces(self, theta: ArrayLike, psi: ArrayLike) -> tuple[Array, Array]:
         """Generalised forces -dV/dtheta and -dV/dpsi of the drive [N·m].
 
-        The second is the torque T that the drive exerts on the output; minus the
-        first is the external torque that holds the input in slow motion.
+        The second is the torque T that the drive exerts on the output. The negative of
+        the first is the external torque that holds the input in slow motion.
 
         Args:
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         law = self.law(theta, psi)
@@ -268,7 +275,7 @@ class Potential:
         """Torsion, its derivatives and both generalised forces at given angles.
 
         Args:
-            theta: Motor angle of the input [rad].
+            theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         phases = self.phases(theta, psi)
@@ -296,7 +303,7 @@ class Potential:
 
     @property
     def mean_stiffness(self) -> float:
-        """Stiffness of the mean curve between -rated and +rated torque [N·m/rad]."""
+        """Secant stiffness of the mean curve from -rated to +rated torque [N·m/rad]."""
         low, high = (
             self.mean_torsion(sign * self.ratings.rated_torque) for sign in (-1, 1)
         )
@@ -304,9 +311,10 @@ class Potential:
 
     @property
     def max_stiffness(self) -> float:
-        """Upper bound of the stiffness at any torsion and angles [N·m/rad].
+        """Upper bound of the stiffness over all angles, the largest one [N·m/rad].
 
-        It includes the continuation beyond the sampled torsion.
+        The bound is evaluated at nine torsions per knot interval and in the linear
+        continuation beyond the knots.
         """
         x = np.concatenate(
             [
@@ -324,12 +332,15 @@ class Potential:
 
     @property
     def torque_range(self) -> tuple[float, float]:
-        """Sampled range of the mean torque [N·m]; beyond it the map continues."""
+        # for single points, as in a root search, plain floats are five times faster
         ends = self.coefficients(self.torsion_knots[[0, -1]], 1)[:, 0, 0]
         return float(ends[0]), float(ends[1])
 
     def mean_torsion(self, torque: float) -> float:
-        """Torsion of the mean curve at an output torque [rad].
+        """Torsion of the mean curve [rad] at an output torque [N·m].
+
+        Raises:
+            ValueError: If the mean curve does not reach the torque.
 
         >>> from swgjoint import DriveMap
         >>> DriveMap.linear(1e4, rated_torque=50.0).mean_torsion(20.0)
@@ -337,7 +348,7 @@ class Potential:
         """
         from scipy.optimize import brentq
 
-        # the root search evaluates single points: plain floats are five times as fast
+        # for the single points of a root search, plain floats are five times faster
         knots, pieces = self.torsion_knots.tolist(), self.potential[0, 0].tolist()
         before, after = self.end_stiffness[0, 0].tolist()
 
@@ -355,10 +366,10 @@ class Potential:
             if residual(low) <= 0.0 <= residual(high):
                 return float(brentq(residual, low, high, xtol=1e-18, rtol=1e-14))
             low, high, span = low - span, high + span, 2.0 * span
-        raise ValueError(f"torque {torque} N·m is not reached by this map")
+        raise ValueError(f"this map does not reach a torque of {torque} N·m")
 
     def with_harmonics(self, keep: ArrayLike) -> Self:
-        """A copy with the mean and the harmonics for which ``keep`` is true."""
+        """A copy with the mean and the harmonics where the mask ``keep`` is true."""
         mask = np.array(keep, dtype=bool)
         mask[0] = True
         return replace(
@@ -372,15 +383,15 @@ class Potential:
     def pruned(self, tolerance_arcmin: float) -> Self:
         """A copy without the weakest harmonics, within a tolerance.
 
-        ``info["pruned"]`` lists the dropped harmonics and bounds their effect on output
-        angle, kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
+        ``info["pruned"]`` lists the dropped harmonics, with bounds on their effect on
+        output angle, kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
 
         Args:
             tolerance_arcmin: Largest change of the output angle at a given torque and
                 input angle [arcmin].
 
         Raises:
-            InputError: If the tolerance is not positive or the map gives no bound.
+            InputError: If the tolerance is not positive or the effect has no bound.
         """
         from swgjoint.maps.fit.pruning import pruned_map
 

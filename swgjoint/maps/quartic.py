@@ -20,10 +20,13 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
         values: V, V' and V'' at the knots. Shape (3, n).
 
     Returns:
-        Breakpoints (2 n - 1,) and ascending coefficients (2 n - 2, 5).
+        Breakpoints (2 n - 1,), and for each piece the coefficients in ascending powers
+        of the distance from its first breakpoint (2 n - 2, 5).
     """
-    # on [0, 2] with the cut at 1: the left quartic a0..a4, the right one in powers of
-    # (x - 1); continuity of order three gives the right one up to its b4
+    # The interval is scaled to [0, 2] and cut at 1. The left quartic has the
+    # coefficients a0..a4. Continuity of order three gives the right one, in powers of
+    # (x - 1), except for its b4. Value and derivatives at x = 2 are ``known`` times
+    # a0..a2 plus ``condition`` times a3, a4, b4.
     condition = np.zeros((3, 3))
     known = np.zeros((3, 3))
     for row in range(3):  # derivative at x = 2
@@ -55,7 +58,7 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
 
 
 def evaluate(breaks: Array, pieces: Array, at: Array) -> Array:
-    """Value and two derivatives of a chain at points inside it.
+    """Value and two derivatives of a chain of quartics at points inside it.
 
     Args:
         breaks: Breakpoints from :func:`quartic_chain`. Shape (m + 1,).

@@ -1,4 +1,4 @@
-"""Input of a map fit: simulated equilibria over torque and angle."""
+"""Input of a map fit: simulated equilibria at several torques and angles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FullSolves:
-    """Equilibria that validate a map and are not used in its fit. Shapes (n,)."""
+    """Equilibria that validate a map and are not used to fit it. Shapes (n,)."""
 
     input_angle: Array
     """Input angle theta [rad]."""
@@ -49,10 +49,10 @@ class ToleranceSamples:
     perfect: Array
     """The same quantities without tooth errors. Shape (3, n_torques, phases)."""
     free: int = 0
-    """Number of positions where the unloaded output has clearance, which is sampled at
-    its middle."""
+    """Number of positions where the unloaded output has clearance; they are sampled in
+    the middle of the clearance."""
     solved: FullSolves | None = None
-    """Solves of the same drive and errors without linearisation."""
+    """Full solves of the same drive and errors, without linearisation."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -68,7 +68,11 @@ class ToleranceSamples:
             object.__setattr__(self, key, table)
 
     def in_series(self, compliance: float) -> ToleranceSamples:
-        """The same drive with a spring of this compliance at its output [rad/(N·m)]."""
+        """The samples of the drive in series with an output spring.
+
+        Args:
+            compliance: Compliance of the spring [rad/(N·m)].
+        """
         t = self.torque[:, None]
         spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) * compliance
         solved = self.solved
@@ -92,11 +96,14 @@ class MapSamples:
 
     name: str
     level: str
+    """Finite-element model: ``ring``, ``2d`` or ``3d``."""
     layout: str
+    """Which member is fixed, one of :data:`~swgjoint.gear.kinematics.LAYOUTS`."""
     teeth_flexspline: int
     teeth_circular_spline: int
     ratings: Ratings
     damping_ratio: float
+    """Damping ratio of the map [-]."""
     order: tuple[int, int]
     """(p, q): the pattern is a function of p alpha + q beta with period 2 pi."""
     input_angle: Array
@@ -110,23 +117,24 @@ class MapSamples:
     compliance: Array
     """Tangent compliance d(torsion)/dT at a fixed input [rad/(N·m)]."""
     input_torque: Array
-    """External torque on the input [N·m]; used to check the fit, not in it."""
+    """External torque on the input [N·m]; it checks the fit and does not enter it."""
     tolerances: ToleranceSamples | None = None
     """Samples of the drive with tooth errors; None if its teeth are perfect."""
     free: bool = False
-    """Whether the unloaded output has clearance. The entries next to zero torque are
-    then the ends of the clearance instead of equilibria."""
+    """Whether the unloaded output has clearance. The entries at the torques next to
+    zero are then the ends of the clearance instead of equilibria."""
     solved: NDArray[np.bool_] | None = None
-    """Whether all angles were solved at a torque; None means at all torques. At the
-    others the tables follow the load paths, and the input torque is interpolated
-    linearly. Shape (n_torques,)."""
+    """Whether each torque was solved at every angle; None if all were. At the other
+    torques the tables are interpolated along the load paths, the input torque linearly.
+    Shape (n_torques,)."""
     unseen: FullSolves | None = None
-    """Equilibria at other angles and torques, including unloaded ones."""
+    """Equilibria at other angles and torques, zero included; None without any."""
     shortfall: str = ""
-    """Sampling goal that was not reached, with the reason; empty if it was."""
+    """Sampling goals that were not reached, with the reason; empty if all were."""
     fields: DriveFields | None = None
     """Fields of the flexspline with perfect teeth, for display."""
     info: dict[str, Any] = field(default_factory=dict)
+    """Provenance of the samples, JSON values; part of the record of the map."""
 
     def __post_init__(self) -> None:
         angle = frozen_array(self.input_angle, "input angle [rad]", ndim=1)

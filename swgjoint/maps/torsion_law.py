@@ -2,9 +2,9 @@ r"""Potential of a torsional stiffness that is piecewise linear in the torsion.
 
 .. math:: T(\Delta) = \int_0^\Delta k(s)\,ds, \quad V(\Delta) = \int_0^\Delta T(s)\,ds
 
-with k linear between the knots and constant beyond them. Torque and its slope are
-continuous, corners are rounded by parabolas, and the torque increases wherever every k
-is positive.
+with k linear between the knots and constant beyond them. The torque and its slope are
+continuous, the torque is a parabola on each interval, and it increases everywhere if
+all k are positive.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from swgjoint.typing import Array
 
 
 def torque_at_knots(knots: Array, stiffness: Array) -> Array:
-    """Torque at the knots, zero at zero torsion [N·m]. Shape (n,).
+    """Torque at the knots, where zero torsion has zero torque [N·m]. Shape (n,).
 
     Args:
         knots: Increasing torsions, zero inside their range [rad]. Shape (n,).
@@ -35,11 +35,11 @@ def potential_of_stiffness(
     Args:
         knots: Increasing torsions, zero inside their range [rad]. Shape (n,).
         stiffness: Stiffness at the knots [N·m/rad]. Shape (n,).
-        n_harmonics: Harmonics of the map; all except the mean get a zero potential.
+        n_harmonics: Number of harmonics; all except the mean get a zero potential.
 
     Returns:
-        ``potential`` (n_harmonics, 2, n - 1, 5), V(0) = 0, and ``end_stiffness``
-        (n_harmonics, 2, 2).
+        ``potential`` with V(0) = 0 (n_harmonics, 2, n - 1, 5) [J/rad^k] and
+        ``end_stiffness`` (n_harmonics, 2, 2) [N·m/rad].
     """
     h = np.diff(knots)
     bend = np.diff(stiffness) / h
@@ -59,7 +59,7 @@ def potential_of_stiffness(
 
 
 def _zero(knots: Array, stiffness: Array) -> tuple[int, float, float]:
-    """Interval that contains zero torsion, the distance to it, and dk/dx there."""
+    """Interval of zero torsion, distance of zero from its first knot, and its dk/dx."""
     j = int(np.clip(np.searchsorted(knots, 0.0) - 1, 0, knots.size - 2))
     bend = (stiffness[j + 1] - stiffness[j]) / (knots[j + 1] - knots[j])
     return j, -float(knots[j]), float(bend)

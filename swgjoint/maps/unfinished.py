@@ -1,8 +1,8 @@
 """Intermediate results of a map that is being built, in the cache folder.
 
-An interrupted build resumes from them. The parts have the key of the map itself, which
-is the hash of design, fidelity and code, so that results of other code or of another
-design are never used. They are removed once the map is complete.
+An interrupted build resumes from them. Their folder is named by the cache key of the
+map, a hash of design, fidelity and code, so results of other code or of another design
+are never used. They are removed once the map is complete.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from swgjoint.maps.cache import key_of
 from swgjoint.store import arrays_content, arrays_file, cache_folder, keep, read_kept
 
 FORGOTTEN = 14 * 24 * 3600.0
-"""Parts of a map that is not resumed are removed after this time [s]."""
+"""Age after which the parts of an interrupted map are removed [s]."""
 
 Part = TypeVar("Part")
 
@@ -28,10 +28,11 @@ class Unfinished:
     """A folder with the parts of one map that is being built."""
 
     folder: Path
+    """Folder of the parts; it may not exist yet."""
 
     @classmethod
     def from_parts(cls, parts: Mapping[str, Any]) -> Unfinished | None:
-        """The parts of a map; None if there is no cache.
+        """The folder for the parts of a map; None if the cache is off.
 
         Args:
             parts: Everything that determines the map, as for
@@ -44,16 +45,17 @@ class Unfinished:
         return cls(folder=cache / "unfinished" / key_of(parts))
 
     def read(self, name: str, take: Callable[[dict[str, Any]], Part]) -> Part | None:
-        """A part; None if it was not kept or is damaged.
+        """A stored part; None if it is absent or damaged.
 
         Args:
             name: Name of the part.
-            take: Builds the part from its arrays; an exception means damage.
+            take: Builds the part from its arrays and raises an exception if they are
+                damaged.
         """
         return read_kept(self._path(name), lambda data: take(arrays_content(data)))
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Write a part atomically; a full disk does not stop the build.
+        """Write a part atomically; a failure such as a full disk is only logged.
 
         Args:
             name: Name of the part.
@@ -65,7 +67,7 @@ class Unfinished:
         return self.folder / f"{name}.npz"
 
     def clear(self) -> None:
-        """Remove all parts: the map is complete."""
+        """Remove all parts, once the map is complete."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
