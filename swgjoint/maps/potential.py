@@ -145,7 +145,7 @@ class Potential:
 
     @property
     def friction_direction(self) -> tuple[int, int]:
-        """Derivatives of every phase by theta and psi [-]. (n_harmonics, 2)."""
+        """Derivatives by theta and psi of beta, the rotation that friction opposes."""
         return angle_coefficients(self.layout)[1]
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
@@ -311,7 +311,7 @@ class Potential:
 
     @property
     def max_stiffness(self) -> float:
-        """Upper bound of the stiffness over all angles, the largest one [N·m/rad].
+        """Largest stiffness over the torsion, bounded over all angles [N·m/rad].
 
         The bound is evaluated at nine torsions per knot interval and in the linear
         continuation beyond the knots.
@@ -332,7 +332,7 @@ class Potential:
 
     @property
     def torque_range(self) -> tuple[float, float]:
-        # for single points, as in a root search, plain floats are five times faster
+        """Mean torque at the outermost knots [N·m]; beyond it the map continues."""
         ends = self.coefficients(self.torsion_knots[[0, -1]], 1)[:, 0, 0]
         return float(ends[0]), float(ends[1])
 
