@@ -1,1 +1,1 @@
-"""Map coefficients from sampled equilibria, measurements and stated figures."""
+"""Fits of maps to sampled equilibria, measurements and catalogue figures."""

@@ -21,15 +21,16 @@ ORDERS: tuple[tuple[int, int], ...] = (
     (1, -1),
     (2, -2),
 )
-"""Orders (p, q) of p alpha + q beta that are fitted to a record: low orders of either
-member and the output turn itself."""
+"""Orders (p, q) of p alpha + q beta that are fitted to a record: one to six cycles per
+turn of alpha and of beta, and one and two cycles per turn of alpha - beta, which is the
+output angle up to sign if the wave generator is the input."""
 KEEP = 0.01
-"""A harmonic is kept if it reaches this fraction of the largest one."""
+"""A harmonic is kept if its amplitude reaches this fraction of the largest one."""
 
-_PER_WAVE = 2.5  # samples needed per wave
-_TURN = 0.98  # part of a turn that a record must cover
-_REZERO = 4  # iterations for the constant of a record
-_CONDITION = 1e4  # beyond it, two orders of the record cannot be distinguished
+_PER_WAVE = 2.5  # samples needed per cycle
+_TURN = 0.98  # fraction of an output turn that a record must cover
+_REZERO = 4  # iterations for the constant offset of a record
+_CONDITION = 1e4  # condition number above which two orders cannot be distinguished
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +42,7 @@ class ErrorFit:
     amplitudes: Array
     """Cosine and sine amplitudes [rad]. Shape (n, 2)."""
     report: dict[str, Any]
+    """Residuals, kept, dropped and unresolved orders; JSON values."""
 
 
 def fit_error(
@@ -61,11 +63,13 @@ def fit_error(
         layout: Which member is fixed.
         teeth_flexspline: Number of teeth of the flexspline, z_fs.
         teeth_circular_spline: Number of teeth of the circular spline, z_cs.
-        orders: (p, q) to fit; the report lists those that the samples cannot resolve.
-        where: Name of the record for messages.
+        orders: Pairs (p, q) to fit. The report lists those that the samples do not
+            resolve; (0, 0) is ignored.
+        where: Name of the record in messages.
 
     Raises:
-        InputError: If the record is shorter than a turn or cannot resolve the orders.
+        InputError: If the record is shorter than an output turn, resolves none of the
+            orders or cannot distinguish them.
     """
     span = float(np.ptp(output)) if output.size else 0.0
     if span < _TURN * 2.0 * np.pi or output.size < 16:
@@ -85,10 +89,11 @@ def fit_error(
     if not len(wanted):
         raise InputError(
             f"{where}: {output.size} samples resolve none of the orders; accepted: at"
-            f" least {_PER_WAVE * per_turn.min():.0f} a turn"
+            f" least {_PER_WAVE * per_turn.min():.0f} per output turn"
         )
 
     def solve(n: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Amplitudes (n_orders, 2) and residual of the record."""
         # the zero of the error is arbitrary; its constant part shifts the input angle
         constant = 0.0
         for _ in range(_REZERO):
@@ -98,12 +103,13 @@ def fit_error(
         return pairs, rest
 
     def project(columns: Array) -> tuple[float, Array, Array]:
+        """Constant, amplitudes and residual by least squares at given phases."""
         parts = [np.ones((output.size, 1)), np.cos(columns), np.sin(columns)]
         basis = np.hstack(parts)
         weights, _, rank, sizes = np.linalg.lstsq(basis, error, rcond=None)
         if rank < basis.shape[1] or sizes[0] > _CONDITION * sizes[-1]:
             raise InputError(
-                f"{where}: its orders cannot be distinguished; use fewer 'orders' or a"
+                f"{where}: the orders cannot be distinguished; use fewer 'orders' or a"
                 " record with equal steps over the whole turn"
             )
         count = columns.shape[1]

@@ -1,18 +1,20 @@
 r"""Assumed kinematic error of a drive whose source states only an upper bound.
 
-A catalogue bounds the error of a drive, peak to peak over one output turn, and does not
-state its orders. After averaging by two opposite lobes, tooth position errors appear at
-2 and 4 cycles per turn of the wave generator. The assumed specimen therefore has
+A catalogue bounds the peak-to-peak error over one output turn and does not state its
+orders. Two opposite lobes average the position errors of the teeth, which then appear
+mainly at 2 and 4 cycles per turn of the wave generator. The assumed specimen therefore
+has
 
 .. math:: e_0 = a\left[\cos(2x + \phi_2) + r\cos(4x + \phi_4)\right]
 
-with the angle x of the wave generator relative to the fixed member, r and both phases
-drawn from a seed, and a such that the peak to peak equals the stated value. The error
-repeats with every input turn, so that each input turn contains all of it. The error of
-a real drive is also modulated over the output turn and stays below the bound.
+where x is the input angle: that of the wave generator relative to the fixed spline or,
+with the wave generator fixed, relative to the flexspline. A random generator with a
+given seed draws r and both phases; a is such that the peak-to-peak error equals the
+stated value. The assumed error repeats with every input turn. The error of a real drive
+is also modulated over the output turn and stays below the bound.
 
-Studies of specimens use more orders (:data:`AMPLITUDES`), taken from finite elements of
-one drive at the limits of its tolerances.
+Studies of specimens use more orders (:data:`AMPLITUDES`), which come from finite
+elements of one drive at the limits of its tolerances.
 """
 
 from __future__ import annotations
@@ -45,20 +47,23 @@ AMPLITUDES: dict[tuple[int, int], float] = {
     (1, 0): 0.15,
     (0, 1): 0.07,
 }
-"""Amplitudes by (p, q) of p alpha + q beta, relative to that of 2 alpha: low orders of
-e0 in the map of ``reference-2d-tolerances`` (model 2d). Its teeth have errors of
-ISO 1328-1 class 4, and the roundness and concentricity of its members follow ISO 286-1
-IT3 and IT4. The amplitude of 2 alpha is 0.138 arcmin there."""
+"""Amplitudes by (p, q) of p alpha + q beta, relative to that of 2 alpha [-].
+
+They are the low orders of e0 in the 2D map of ``reference-2d-tolerances``, where the
+amplitude of 2 alpha is 0.138 arcmin. The teeth of that drive have errors of ISO 1328-1
+class 4; roundness and concentricity of its members follow ISO 286-1 IT3 and IT4.
+"""
 SHARE = (0.25, 0.75)
-"""Range of r, the ratio of the amplitudes at 4 and at 2 cycles per turn; it includes
-the 0.46 and 0.48 of :data:`AMPLITUDES`."""
+"""Range of r, the amplitude at 4 cycles per turn over that at 2 [-]; it includes the
+values 0.46 and 0.48 of :data:`AMPLITUDES`."""
 LARGEST = 60.0
-"""Largest assumed error [arcmin], forty times the bound of any catalogue row."""
-_SAMPLES = 2**16  # per period; relative error of the peak to peak below 1e-8
+"""Largest accepted peak-to-peak error [arcmin], 40 times the largest bound of a
+catalogue drive."""
+_SAMPLES = 2**16  # per period; the relative error of the peak to peak is below 1e-8
 
 
 def peak_to_peak(drive: Potential) -> float:
-    """Peak to peak of e0 over one turn of the output [rad]."""
+    """Peak to peak of e0 over one output turn [rad], at 40 positions per input turn."""
     psi = np.linspace(0.0, 2.0 * np.pi, 40 * round(abs(drive.ratio)) + 1)
     phases = drive.phases(drive.ratio * psi, psi)
     return float(np.ptp(drive.error_at(phases)[0]))
@@ -67,9 +72,11 @@ def peak_to_peak(drive: Potential) -> float:
 def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
     """The drive with another kinematic error in place of its original one.
 
+    The potential is kept. The label of the original error and the validation record,
+    which no longer apply, are removed.
+
     Args:
-        drive: The map. Its potential is kept; the label of its error and the validation
-            of its ripple are removed.
+        drive: The map.
         orders: (p, q) of p alpha + q beta. Shape (n, 2).
         amplitudes: Cosine and sine amplitudes [rad]. Shape (n, 2).
     """
@@ -96,18 +103,18 @@ def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
 def with_assumed_error(
     drive: Map, peak_to_peak: float, *, seed: int = 0, joint: str = ""
 ) -> Map:
-    """A drive without kinematic error, given the assumed error of one specimen.
+    """A drive without kinematic error, completed by the assumed error of one specimen.
 
     ``info["kinematic_error"]`` states the assumption with its size and seed. Reasons in
     ``info["missing"]`` for the absence of an error are removed.
 
     Args:
         drive: Map without kinematic error.
-        peak_to_peak: Peak to peak of the error over one output turn [rad]; zero leaves
-            the map unchanged.
-        seed: Seed of the amplitude ratio of both orders and of their phases, >= 0.
-        joint: Name of the joint that the drive is for; drives of several joints with
-            the same seed differ by it.
+        peak_to_peak: Peak-to-peak error over one output turn [rad]; zero leaves the map
+            unchanged.
+        seed: Seed for the amplitude ratio and the phases of the two orders, >= 0.
+        joint: Name of the joint that the drive is for. It is combined with the seed, so
+            joints with the same seed get different errors.
 
     Raises:
         InputError: If the map already has an error, or a value is out of range.
@@ -145,6 +152,7 @@ def with_assumed_error(
 
 
 _OF_OWN_ERROR = ("kinematic_error", "validation")
+"""Keys of ``info`` that apply to the original error only."""
 _ABSENT = (
     "transmission_accuracy_arcmin",
     "transmission_accuracy_rated_arcmin",
@@ -152,6 +160,7 @@ _ABSENT = (
     "ripple_rms_percent",
     "ripple_pp_percent",
 )
+"""Keys of ``info["missing"]`` for figures that a map without error cannot provide."""
 
 
 def _orders(layout: str) -> Sequence[tuple[int, int]]:

@@ -1,15 +1,15 @@
 r"""Fit of the potential to sampled equilibria.
 
-At every angle the samples give the potential and its first two derivatives by the
-torsion at the sampled torques (strain energy, torque and tangent stiffness):
+At every angle the samples provide the potential and its first two derivatives by the
+torsion at the sampled torques, which are strain energy, torque and tangent stiffness:
 
 .. math:: V = U(T, \varphi) - \overline{U(0, \varphi)}, \quad
     V' = T, \quad V'' = \left(\frac{d\Delta}{dT}\right)^{-1} .
 
 Quintic Hermite interpolation transfers them to common knots, a Fourier transform over
-the angle gives the harmonics, and each harmonic becomes a chain of quartics with these
-values at the knots. The fit does not use the simulated input torque, which must follow
-as the derivative of V.
+the angle provides the harmonics, and each harmonic becomes a chain of quartics with
+these values at the knots. The fit does not use the simulated input torque. That torque
+must follow from the derivative of V, which is an independent check of the fit.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ KEEP = 0.005
 reaches this fraction of the largest one."""
 
 BETWEEN = (0.05, 0.15, 0.35, 0.65)
-"""Additional fractions of the repeated peak torque at which harmonics are weighed;
-contact moves with the torque, so each torque has other harmonics."""
+"""Additional fractions of the repeated peak torque at which harmonics are compared. The
+contact moves with the torque, so other harmonics dominate at other torques."""
 
 END_STEPS = 6
-"""Newton steps to the torsion at which the mean torque equals the largest one."""
+"""Newton steps to the torsion at which the mean torque is the largest sampled one."""
 LADDER = 12
-"""Largest number of knots across the end of a clearance."""
+"""Largest number of knot intervals across the end of a clearance."""
 
 
 def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
-    """Fit the potential map; its ``info`` contains residuals and the energy check.
+    """The map fitted to samples; its ``info`` contains residuals and the energy check.
 
     Args:
-        samples: Equilibria over one period.
-        keep: Threshold for harmonics, see :data:`KEEP`; zero keeps all.
+        samples: Equilibria over one period of the pattern, with tolerances or without.
+        keep: Threshold for harmonics [-], see :data:`KEEP`; zero keeps all.
     """
     knots, pattern = _pattern_harmonics(samples)
     if samples.tolerances is None:
@@ -79,7 +79,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
 
 
 def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
-    """Knots [rad] and all harmonics of the perfect pattern, with an empty record."""
+    """Knots [rad] and all harmonics of the pattern of perfect teeth."""
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     unloaded = samples.output_error[zero]
     e0 = unloaded - unloaded.mean()
@@ -102,7 +102,7 @@ def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
 
 
 def _map_of(samples: MapSamples, knots: Array, harmonics: Combined) -> DriveMap:
-    """The map with these harmonics, as chains of quartics and stable ends."""
+    """The map of these harmonics: chains of quartics with a stable continuation."""
     modes = harmonics.potential
     chains = [[quartic_chain(knots, part) for part in mode] for mode in modes]
     ends = modes[:, :, 2][:, :, [0, -1]]
@@ -144,7 +144,7 @@ def _select_harmonics(
 def _tolerance_record(
     drive: DriveMap, samples: MapSamples, tolerances: dict[str, Any], keep: float
 ) -> dict[str, Any]:
-    """Record of the fit of a toleranced drive, with that of its perfect teeth."""
+    """Record of the fit of a toleranced drive, and of the drive with perfect teeth."""
     perfect = fit_map(replace(samples, tolerances=None), keep=keep).info
     strength = harmonic_strength(drive)
     checks: dict[str, dict[str, float]] = {}
@@ -167,22 +167,23 @@ def _ranges(drive: DriveMap, samples: MapSamples) -> dict[str, list[float]]:
 
 
 def _knots(samples: MapSamples, torsion: Array) -> Array:
-    """Torsions at which the curves of all angles are compared [rad]."""
+    """Common torsion knots of the curves at all angles [rad]. Shape (n_knots,)."""
     zero = at = int(np.flatnonzero(samples.torque == 0.0)[0])
     tolerances = samples.tolerances
     if tolerances is None:
-        # the mean torsions, ends inside the sampled range of every angle
+        # the mean torsions, with both ends inside the sampled range of every angle
         knots = torsion.mean(axis=1)
         knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
-        # stiff angles may end before the mean torsion of a torque close to the last one
+        # the range of stiff angles may end before the mean torsion of the last torques
         least = 0.3 * np.abs(np.diff(torsion.mean(axis=1))[[0, -1]])
         inside = (knots > knots[0] + least[0]) & (knots < knots[-1] - least[1])
         inside[[0, -1]] = True
         at -= int((~inside[:zero]).sum())
         knots = knots[inside]
     else:
-        # with tooth errors the stiffness varies so much that stiff positions would end
-        # the range far below the largest torque: their curves are continued instead
+        # with tooth errors the stiffness varies so much that the range common to all
+        # positions would end far below the largest torque, so that the curves of stiff
+        # positions are extrapolated instead
         error = tolerances.table[0]
         rest = error[int(np.flatnonzero(tolerances.torque == 0.0)[0])]
         mean = PchipInterpolator(tolerances.torque, (rest - error).mean(axis=1))
@@ -200,9 +201,10 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
 def _end_at_largest_torque(
     knots: Array, tolerances: ToleranceSamples, torsion: Array
 ) -> None:
-    """Scale the knots of each sign to end at the largest sampled mean torque.
+    """Scale the knots of each sign in place to end at the largest sampled torque.
 
-    Stiff positions are continued up to there and raise the mean at the mean torsion.
+    The extrapolated curves of stiff positions raise the mean torque, so it reaches the
+    largest sampled torque at less than the mean torsion.
     """
     torque = np.broadcast_to(tolerances.torque[:, None], torsion.shape)
     curve = np.stack([tolerances.table[1], torque, 1.0 / tolerances.table[2]])
@@ -216,7 +218,7 @@ def _end_at_largest_torque(
 
 
 def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
-    """Mask of the knots at which tooth errors, sampled at few torques, are compared."""
+    """Mask of the knots for tooth errors, sampled at fewer torques (n_knots,)."""
     assert samples.solved is not None
     coarse = np.array(samples.solved)
     if samples.free:  # the ends of the clearance
@@ -227,16 +229,17 @@ def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
 
 
 def _clearance_knots(beyond: Array, ends: Array) -> Array:
-    """Knots of one side with a ladder across the end of the clearance.
+    """Knots of one side, with equal steps across the end of the clearance [rad].
 
-    The end varies with the angle by more than the elastic torsion of a stiff drive. The
-    ladder spans from the torsion where no angle has left the clearance to the one where
-    all have left it, in steps of the transition of a single angle.
+    The torsion at which the clearance ends varies with the angle by more than the
+    elastic torsion of a stiff drive. The steps extend from the torsion where no angle
+    has left the clearance to the one where all have left it. Each is about as long as
+    the transition at a single angle; there are at most :data:`LADDER`.
 
     Args:
         beyond: Usual knots, from the first torque after the one that takes up the
             clearance [rad]. Shape (n,).
-        ends: Torsion at the end of the clearance and where the clearance is taken up
+        ends: Torsion at the end of the clearance, and under the torque that takes it up
             [rad]. Shape (2, n_angles).
     """
     first, last = float(ends[0].min()), float(ends[1].max())
@@ -248,9 +251,10 @@ def _clearance_knots(beyond: Array, ends: Array) -> Array:
 
 
 def _modes(values: Array) -> Array:
-    """Cosine and sine amplitudes over the first axis. (n_modes, 2, ...).
+    """Cosine and sine amplitudes of values over the first axis. (n_modes, 2, ...).
 
-    The highest mode of an even count is omitted because its phase is not determined.
+    The highest mode of an even number of values is omitted because its phase is not
+    determined.
     """
     n = len(values)
     spectrum = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
@@ -259,7 +263,7 @@ def _modes(values: Array) -> Array:
 
 
 def _clip_ends(ends: Array, knots: Array, mean_torque: Array) -> None:
-    """Keep the continuation stable: a positive, bounded slope at every angle."""
+    """Limit the end stiffness in place to be positive and bounded at every angle."""
     secant = (mean_torque[-1] - mean_torque[0]) / (knots[-1] - knots[0])
     ends[0, 0] = np.clip(ends[0, 0], 0.1 * secant, 3.0 * secant)
     swing = np.hypot(ends[1:, 0], ends[1:, 1]).sum(axis=0)
@@ -270,8 +274,9 @@ def _clip_ends(ends: Array, knots: Array, mean_torque: Array) -> None:
 def harmonic_strength(drive: DriveMap) -> Array:
     """Kinematic error [rad] and input-torque ripple [N·m] of each harmonic.
 
-    The ripple is the amplitude of T de0/dtheta + dV/dtheta, at zero, rated and repeated
-    peak torque and the fractions :data:`BETWEEN` of the peak, with both signs. Shape
+    The first column is the amplitude of e0. The other columns are the amplitude of
+    T de0/dtheta + dV/dtheta at zero torque and, with both signs, at rated torque, at
+    repeated peak torque and at the fractions :data:`BETWEEN` of the peak. Shape
     (n_harmonics, 14).
     """
     columns = [np.hypot(*drive.kinematic_error.T)]
@@ -288,6 +293,7 @@ def harmonic_strength(drive: DriveMap) -> Array:
 def _describe(
     drive: DriveMap, strength: Array, kept: NDArray[np.bool_]
 ) -> list[dict[str, Any]]:
+    """Order, strength and selection of every harmonic, as JSON values."""
     return [
         {
             "alpha": int(p),

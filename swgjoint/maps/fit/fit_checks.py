@@ -1,4 +1,4 @@
-"""Deviations of a fitted map from its samples and from unseen equilibria."""
+"""Deviations of a fitted map from its samples and from equilibria unused in the fit."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from swgjoint.maps.samples import FullSolves, MapSamples
 
 
 def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """Deviations of the map from the samples it was fitted to.
+    """Deviations of a map from the samples to which it was fitted.
 
     Args:
         drive: The fitted map.
         samples: Its samples.
 
     Returns:
-        Largest deviation of e0 [rad] and of the torque at the sampled positions [N·m],
-        inside the range of the map.
+        Largest deviation of e0 without load [rad], and of the torque at the sampled
+        positions inside the knots of the map [N·m].
     """
     theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
@@ -39,7 +39,7 @@ def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
 def against_solves(
     drive: DriveMap, samples: MapSamples, solved: FullSolves
 ) -> dict[str, dict[str, float]]:
-    """Deviations of the map of a toleranced drive from unseen equilibria.
+    """Deviations of the map of a toleranced drive from equilibria unused in the fit.
 
     Args:
         drive: The fitted map.
@@ -47,15 +47,16 @@ def against_solves(
         solved: Equilibria that the fit did not use.
 
     Returns:
-        ``residual``: largest deviation of the output error [rad], and the same relative
-        to the peak to peak of the superposition over the cycle. ``energy_check``: as
-        :func:`energy_check`, at the solved torques.
+        ``residual``: largest deviation of the output error [rad], also relative to the
+        peak to peak of the superposed unloaded error over the cycle. ``energy_check``:
+        peak to peak of the ripple of the input torque over all equilibria, largest
+        deviation of the map from it, and their ratio.
     """
     theta = solved.input_angle
     zero = solved.torque == 0.0
     error = output_angle(drive, theta, solved.torque) - theta / drive.ratio
     wrong = solved.output_error - error
-    # the map has its zero at the mean of the unloaded error
+    # the zero of the map is the mean of the unloaded error
     wrong -= wrong[zero].mean()
     tolerances = samples.tolerances
     assert tolerances is not None
@@ -82,9 +83,10 @@ def against_solves(
 
 
 def stiffness_range(drive: DriveMap) -> list[float]:
-    """Smallest and largest stiffness over torsion and angle [N·m/rad].
+    """Smallest and largest sampled stiffness inside the knots [N·m/rad].
 
-    A stiffness that is not positive would make an equilibrium unstable.
+    The input angles cover one cycle of the largest order of alpha or beta. An
+    equilibrium where the stiffness is not positive would be unstable.
     """
     knots = drive.torsion_knots
     x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
@@ -94,17 +96,18 @@ def stiffness_range(drive: DriveMap) -> list[float]:
 
 
 def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """Deviation of the map's input torque from the simulated one, unused in the fit.
+    """Deviation of the input torque of a map from the simulated one, unused in the fit.
 
     Args:
         drive: The fitted map.
         samples: Its samples.
 
     Returns:
-        ``input_torque_pp_Nm``: largest peak-to-peak of the simulated ripple over the
-        torques; ``input_torque_error_Nm``: largest deviation of the map from it;
-        ``relative``: their ratio; ``strain_energy_relative``: largest deviation of the
-        energy gain over no load, relative to the largest gain.
+        ``input_torque_pp_Nm``: peak to peak of the simulated ripple, the largest of all
+        torques; ``input_torque_error_Nm``: largest deviation of the ripple of the map;
+        ``relative``: largest ratio of this deviation to the peak to peak at the same
+        torque; ``strain_energy_relative``: largest deviation of the energy gained from
+        the unloaded state, relative to the largest gain.
     """
     theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
@@ -118,7 +121,7 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     )
     if samples.solved is not None:
         inside &= samples.solved
-    if samples.free:  # the corner at the end of the clearance
+    if samples.free:  # exclude the corner at the end of the clearance
         inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
     ripple = np.ptp(samples.input_torque, axis=1)
     inside &= ripple > 0.0
