@@ -1,18 +1,19 @@
 r"""Friction of a catalogue drive from its stated losses.
 
 Three figures determine three parameters in closed form: the starting torque gives the
-friction at rest, the no-load running torque at 2000 rpm its rise with the speed, and
-the efficiency at rated torque its rise with the load. With the ratio i and the friction
-F on the relative rotation, a load T at the output requires the input torque
+friction at rest, the no-load running torque at 2000 rpm its increase with speed, and
+the efficiency at rated torque its increase with load. With the ratio i and the torque F
+of friction on the relative rotation, a load T at the output requires the input torque
 
 .. math:: \tau = |T/i| + F (1 + 1/|i|), \qquad F = F_0 + c\,(|T| + F)/|i|
 
-with the circular spline fixed (the flexspline also carries the friction). The
-back-driving torque is not used, so the map predicts it.
+with the circular spline fixed, where the flexspline carries the load and the friction.
+F_0 is the friction at zero torsion, and c the load factor. The back-driving torque is
+not used, so the map predicts it.
 
 The tables state neither the difference between static and slipping friction nor the
-friction between rest and 2000 rpm. The model therefore has no Stribeck part and a
-straight line.
+friction between rest and 2000 rpm. The model therefore has no Stribeck effect, and its
+friction increases linearly with speed.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ from swgjoint.maps.friction import Friction
 from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 
 PRESLIDING = 1e-3
-"""Rotation before the bearing slips [rad], a few tens of micrometres at a race of a few
-centimetres. Assumed."""
+"""Assumed rotation before the bearing slips [rad]. It corresponds to a few tens of
+micrometres at a race with a radius of a few centimetres."""
 RELAXATION = 1e-3
-"""Relaxation time of the bristle, sigma_1/sigma [s]. Assumed."""
+"""Assumed relaxation time of the bristle, sigma_1/sigma [s]."""
 
 
 def friction_of_losses(losses: StatedLosses, ratio: float, *, source: str) -> Friction:
-    """Friction with the stated starting torque, running torque and efficiency.
+    """Friction that reproduces stated starting torque, running torque and efficiency.
 
     Args:
         losses: Stated losses; the back-driving torque is not used.
-        ratio: Ratio i, negative because the circular spline is fixed.
-        source: Source of the figures.
+        ratio: Ratio i [-], negative because the circular spline is fixed.
+        source: Source of the figures, to which the assumptions are added.
 
     Raises:
         InputError: If the figures contradict each other.
@@ -55,6 +56,6 @@ def friction_of_losses(losses: StatedLosses, ratio: float, *, source: str) -> Fr
         static=rest,
         viscous=(running - rest) / (RUNNING_SPEED * along),
         load=load,
-        source=f"{source}; assumed: slip after {PRESLIDING:g} rad, no Stribeck part, a"
-        " straight line from rest to 2000 rpm",
+        source=f"{source}; assumed: slip after {PRESLIDING:g} rad, no Stribeck effect,"
+        " linear increase from rest to 2000 rpm",
     )

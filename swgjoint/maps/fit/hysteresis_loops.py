@@ -1,20 +1,21 @@
 r"""Hysteresis from computed loops with and without friction.
 
-At every input position the loop with friction gives the torsion x(T). The drive without
-friction gives the torsion :math:`x_0(T)`, whose inverse is the torque :math:`T_0(x)` of
-the potential. The torque that friction adds at the same torsion,
+At every input position the loop with friction provides the torsion x(T). The drive
+without friction provides the torsion :math:`x_0(T)`, whose inverse is the torque
+:math:`T_0(x)` of the potential. The torque that friction adds at the same torsion,
 
 .. math:: R = T - T_0(x), \qquad \oint R\,dx = \oint T\,dx = \text{work of friction},
 
-is the target of the Jenkin elements. For a given yield torsion, the torque of an
-element is its yield torque times a known signal, so that the yield torques follow from
-a bounded least-squares problem. It is weighted with the torsion travelled: an element
-that slips throughout then takes the mean of R and thereby the work of a round.
+is the target of the fit of Jenkin elements. For a given yield torsion, the torque of an
+element is its yield torque times a known signal, so the yield torques follow from a
+non-negative least-squares problem. Samples are weighted with the torsion between them.
+An element that slips throughout then takes the mean of R and thereby dissipates the
+work of friction in a round.
 
 Elements yield at a constant torque, whereas tooth friction varies with the load and the
-sliding of the teeth. Its loop may be narrower in the middle than under load, which
-parallel elements cannot reproduce: they are then too wide in the middle and too narrow
-elsewhere. The report states the differences.
+sliding of the teeth. The loop of tooth friction may be narrower in the middle than
+under load. Parallel elements cannot reproduce this: their loop is then too wide in the
+middle and too narrow elsewhere. The report states the differences.
 """
 
 from __future__ import annotations
@@ -38,23 +39,23 @@ from swgjoint.units import arcmin
 Map = TypeVar("Map", bound=Potential)
 
 REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
-"""Yield torsions of the candidate elements, as fractions of the travel: from that of an
-element that always sticks, like teeth that do not slide and stiffen a drive, to 0.1 %.
-"""
+"""Yield torsions of the candidate elements as fractions of the travel [-], from 1 to
+0.1 %. An element with 1 always sticks, like teeth that do not slide and thereby stiffen
+a drive."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionLoop:
-    """Torque loop with a locked input that starts at zero and ends with a full round.
+    """Torque loop with locked input, from the first loading to a closed round.
 
-    The last round is T -> 0 -> -T -> 0 -> T. When it begins, the drive has forgotten
-    its first loading.
+    The last round is T -> 0 -> -T -> 0 -> T. When it begins, the first loading no
+    longer affects the drive.
     """
 
     input_angle: float
     """Locked input angle theta [rad]."""
     quarter: int
-    """Number of steps n in each quarter of the last round."""
+    """Number n of steps in each quarter of the last round."""
     torque: Array
     """Torque T along the path, at least 4 n + 1 values [N·m]. Shape (n_points,)."""
     torsion: Array
@@ -92,7 +93,7 @@ class FrictionLoop:
         return slice(-4 * self.quarter - 1, None)
 
     def branches(self, values: Array) -> tuple[Array, Array]:
-        """Values while the torque falls and while it rises, from -T to T (2 n + 1,)."""
+        """Values of the falling and the rising branch, both from -T to T (2 n + 1,)."""
         n = self.quarter
         last = values[self.round]
         return last[: 2 * n + 1][::-1], last[2 * n :]
@@ -126,14 +127,14 @@ class FrictionLoop:
 
     @property
     def gap(self) -> float:
-        """Gap between the ends of the round [rad]."""
+        """Torsion at the end of the round minus that at its start [rad]."""
         return float(self.torsion[-1] - self.torsion[self.round][0])
 
     @property
     def friction_torque(self) -> Array:
         """R = T - T_0(x) along the path (n_points,) [N·m]."""
         torque, place = np.unique(self.torque, return_index=True)
-        # interpolate by values and slopes, since friction shifts x slightly
+        # friction shifts x only slightly, so interpolation by value and slope suffices
         elastic = CubicHermiteSpline(
             self.elastic_torsion[place], torque, self.stiffness[place]
         )
@@ -141,7 +142,7 @@ class FrictionLoop:
 
 
 def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
-    """Jenkin elements that follow the friction torque, one set for all positions."""
+    """Jenkin elements fitted to the friction torque, one set for all positions."""
     from scipy.optimize import nnls
 
     travel = max(float(np.ptp(loop.torsion)) for loop in loops)
@@ -167,7 +168,7 @@ def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
 
 
 def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
-    """The map with elements fitted to the loops; its info compares both.
+    """The map with hysteresis elements fitted to loops; its info compares both.
 
     Args:
         drive: The map of the drive without friction.
@@ -220,7 +221,9 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
 
 
 def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
-    """The loop of the map along the torques of a computed loop.
+    """The loop of a map along the torques of a computed loop.
+
+    Its work of friction is not computed and is zero.
 
     Args:
         drive: The map.

@@ -1,12 +1,12 @@
-"""Spring and elements whose loop reproduces the sheet figures of a measured loop.
+"""Spring and elements whose loop has the hysteresis loss and lost motion measured.
 
-Least squares fit a loop as a whole. Parallel elements have a constant width in torque,
-whereas a loop of constant width in torsion is wider in torque where the drive is
-stiffer. The mean of these widths is too large at zero torque, where the drive is
-softest. The yield torques are therefore scaled until the loop of the map is as wide at
-zero torque as the measured one. The spring is then fitted again, and its stiffness
-around zero torque is scaled until the lost motion matches. The remaining differences
-occur under load, and the report states them.
+A least-squares fit approximates a loop as a whole. Parallel elements have a constant
+width in torque, whereas a loop of constant width in torsion is wider in torque where
+the drive is stiffer. The mean of these widths is too large at zero torque, where the
+drive is softest. The yield torques are therefore scaled until the loop of the map is as
+wide at zero torque as the measured one. In each round the spring is fitted again, and
+its stiffness around zero torque is scaled until the lost motion matches. The remaining
+differences occur under load, and the report states them.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, TorqueLoop, torque_loop
 from swgjoint.typing import Array
 
 CLOSE = 0.002
-"""Relative tolerance of hysteresis loss and lost motion."""
+"""Relative tolerance of hysteresis loss and lost motion [-]."""
 ROUNDS = 20
+"""Largest number of rounds of the scaling."""
 LARGEST = 3.0
-"""Largest factor of a correction; a loop of spring and elements needs no more."""
+"""Limit of both scale factors and of their inverses [-]; no loop needs more."""
 DAMPED = 0.7
-"""Exponent that damps a correction, since width and stiffness affect both readings."""
+"""Exponent that damps a correction [-]; width and stiffness affect both figures."""
 SAMPLES = 8
-"""Number of samples around a torque through which a line is fitted to read a branch. If
-they are not close, the branch is interpolated between the two nearest samples."""
+"""Number of samples around a torque to which a line is fitted to read a branch. If they
+are not close to it, the branch is interpolated between the two nearest samples."""
 COMPENSATED = 2.5
-"""Torsion up to which a change of stiffness is compensated in torque, as a multiple of
-the torsion of the lost motion."""
+"""Torsion within which a change of stiffness is compensated to keep the torque beyond,
+as a multiple of the torsion within which the stiffness is scaled [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,13 +42,13 @@ class LoopReadings:
     """Figures of a loop around zero torque."""
 
     hysteresis_loss: float
-    """Width at zero torque [rad]; NaN unless both branches reach zero torque."""
+    """Width of the loop at zero torque [rad]; NaN if a branch does not reach it."""
     lost_motion: float
-    """Lost motion [rad]; NaN unless both branches pass through zero torque."""
+    """Lost motion [rad]; NaN if a branch does not pass through zero torque."""
 
 
 def readings(loop: TorqueLoop, rated_torque: float) -> LoopReadings:
-    """Hysteresis loss and lost motion, with noise averaged over neighbouring samples.
+    """Hysteresis loss and lost motion, read from several samples to reduce noise.
 
     Args:
         loop: Measured or computed loop.
@@ -64,10 +65,11 @@ def readings(loop: TorqueLoop, rated_torque: float) -> LoopReadings:
 
 
 def _branch(loop: TorqueLoop, wanted: Array, *, rising: bool) -> Array:
-    """Torsion at torques around zero on one branch; NaN if no leg reaches them."""
+    """Torsion at torques around zero on one branch [rad]; NaN if no leg has them."""
     near = 2.0 * np.abs(wanted).max()
     legs = [leg for leg in reversed(loop.legs()) if leg[0] == rising]
-    # prefer a leg through zero, then one up to zero; a first loading from rest is none
+    # prefer a leg through zero, then one that only reaches zero; the first loading from
+    # rest begins at zero and is not used
     for least in (near, 0.0):
         for _, torque, torsion in legs:
             ways = -torque[0], torque[-1]
@@ -79,7 +81,7 @@ def _branch(loop: TorqueLoop, wanted: Array, *, rising: bool) -> Array:
 
 
 def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
-    """Torsion of a leg at a torque; NaN if the leg does not reach it."""
+    """Torsion of a leg at a torque [rad]; NaN if the leg does not reach it."""
     if not torque[0] <= at <= torque[-1]:
         return np.nan
     apart = np.abs(torque - at)
@@ -90,7 +92,7 @@ def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
 
 
 def _shown(drive: Potential, rated_torque: float) -> LoopReadings:
-    """Readings of the standard loop of a map, which has no noise."""
+    """Figures of the standard loop of a map, which has no noise."""
     loop = torque_loop(drive)
     return LoopReadings(
         hysteresis_loss=loop.hysteresis_loss(),
@@ -103,13 +105,13 @@ def match_loop(
     play: Callable[[TorsionFit], Potential],
     rated_torque: float,
 ) -> TorsionFit:
-    """The fit whose standard loop has the readings of the measured loop.
+    """The fit whose standard loop has the figures of the measured loop.
 
-    If no spring and elements achieve this, the closest ones are returned.
+    If no fit within :data:`CLOSE` is found, the closest one is returned.
 
     Args:
         fit: Fit by least squares alone.
-        play: Builds the map of a fit.
+        play: Function that builds the map of a fit.
         rated_torque: Rated torque that defines the lost motion [N·m].
     """
     wanted = readings(fit.record.loop, rated_torque)
@@ -141,18 +143,21 @@ def match_loop(
 
 
 def _next(factor: float, change: float) -> float:
-    """Factor of the next round, damped so that both readings converge."""
+    """Factor of the next round, damped so that both figures converge."""
     if not (np.isfinite(change) and change > 0.0):
         return factor
     return float(np.clip(factor * change**DAMPED, 1.0 / LARGEST, LARGEST))
 
 
 def _stiffened(fit: TorsionFit, factor: float, reach: float) -> TorsionFit:
-    """The fit with its stiffness scaled around zero torsion and its outer torque kept.
+    """The fit with its stiffness scaled around zero torsion.
+
+    The stiffness just outside compensates the change, so that the torque at larger
+    torsion is kept.
 
     Args:
         fit: Spring and elements.
-        factor: Factor of the stiffness.
+        factor: Factor of the stiffness [-].
         reach: Torsion on either side within which the stiffness is scaled [rad].
     """
     if factor == 1.0 or not reach > 0.0:

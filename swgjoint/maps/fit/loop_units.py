@@ -1,4 +1,4 @@
-"""Checks that a measured loop has the units of its column names."""
+"""Checks that units and direction of a measured loop are as its columns state."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from swgjoint.units import arcmin
 TORSION_AT_RATED = (0.3, 60.0)
 """Plausible torsion of a strain wave gear at rated torque [arcmin].
 
-In models/catalogue the torsion is 4.9 to 7.4 arcmin for the 22 sets of CSG with rating
-and stiffness (sizes 14 to 32). The range extends about ten times further on both sides;
-outside it the reader warns.
+The torsion is 4.9 to 7.4 arcmin for the 22 component sets of series CSG in
+models/catalogue (sizes 14 to 32). The range extends about ten times further on both
+sides; outside it the reader warns.
 """
 IMPOSSIBLE = (0.02, 1200.0)
-"""Torsion at rated torque outside of which a record is refused [arcmin]: no gear is so
-stiff, and 20 degrees are several teeth."""
+"""Torsion at rated torque outside of which a record is rejected [arcmin]: no gear is
+stiffer than the lower limit, and 1200 arcmin (20 degrees) are several teeth."""
 TORQUE = (0.005, 200.0)
-"""Accepted ratio of the largest torque of a loop to the rated torque. Lost motion is
-read at 0.04 and teeth ratchet below 20; a unit error of a factor of a thousand is far
-outside on both sides."""
+"""Accepted ratio of the largest torque of a loop to the rated torque [-]. Lost motion
+is read at a ratio of 0.04, and teeth ratchet below 20; a unit error by a factor of 1000
+is far outside on both sides."""
 
 
 def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list[str]:
-    """Refuse a loop whose units differ from its column names; warn about doubtful ones.
+    """Reject a loop whose units differ from its column names; warn about doubtful ones.
 
     Args:
         path: Path of the file, for messages.
@@ -39,7 +39,8 @@ def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list
         Warnings, one line each.
 
     Raises:
-        InputError: If torque or torsion are far from any drive of this rated torque.
+        InputError: If torque or torsion is far from that of any drive with this rated
+            torque.
     """
     largest = float(np.abs(loop.torque).max())
     times, (least, most) = largest / rated_torque, TORQUE
@@ -77,14 +78,14 @@ def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list
 
 
 def check_direction(path: str | Path, loop: TorqueLoop) -> None:
-    """Refuse a loop whose direction is reversed by more than its noise.
+    """Reject a loop that runs backwards, unless its width is only noise.
 
     Args:
         path: Path of the file, for messages.
         loop: The loop as read.
 
     Raises:
-        InputError: If the loop generates energy, as one in reversed time does.
+        InputError: If the loop generates energy, as a loop reversed in time does.
     """
     width = loop.hysteresis_loss()
     if not width < 0.0:
@@ -93,7 +94,7 @@ def check_direction(path: str | Path, loop: TorqueLoop) -> None:
     if not fit_torsion(backwards).hysteresis:
         return
     raise InputError(
-        f"{path}: the loop runs the wrong way round: its hysteresis loss is"
+        f"{path}: the loop runs in the wrong direction: its hysteresis loss is"
         f" {width / arcmin:.4g} arcmin, as if the drive generated energy; accepted:"
         " >= 0, with torque and torsion of the same sign, rows in order of time and"
         " simultaneous columns (reversed rows or a delayed torque reverse the sign)"
