@@ -25,8 +25,10 @@ from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
 
 LEG_STEPS = 2.0
-"""Smallest mean number of steps between reversals of the torque. Rows in random order
-have 1.5 (two of three random numbers are extremes; textbook), rows in order many."""
+"""Smallest accepted mean number of steps between reversals of the torque. It is 1.5 for
+rows in random order, because two thirds of random numbers are local extremes, and much
+larger for rows in order of time."""
+# accepted column names of each quantity, with the factor to SI
 TORQUE = {"torque_Nm": 1.0}
 TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}
 OUTPUT = {"output_deg": deg, "output_rad": 1.0}
@@ -38,15 +40,17 @@ _ERROR_FIGURES = (
     "ripple_pp_percent",
     "orders",
 )
+"""Keys of the spec sheet that need a record of the kinematic error."""
 
 Map = TypeVar("Map", bound=Potential)
 
 
 def read_loop(path: str | Path) -> TorqueLoop:
-    """Loop from a CSV file: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
+    """The loop in a CSV file: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
 
     Raises:
-        InputError: If the file is not a loop over both signs of the torque.
+        InputError: If the file cannot be read or is not a loop over both signs of the
+            torque, with rows in order of time.
     """
     data = read_columns(path, {"torque": TORQUE, "torsion": TORSION})
     torque, torsion = data["torque"], data["torsion"]
@@ -61,14 +65,14 @@ def read_loop(path: str | Path) -> TorqueLoop:
     legs = len(loop.turns())
     if torque.size - 1 < LEG_STEPS * legs:
         raise InputError(
-            f"{path}: torque_Nm turns {legs - 1} times in {torque.size} samples;"
+            f"{path}: torque_Nm reverses {legs - 1} times in {torque.size} samples;"
             " accepted: rows in order of time"
         )
     ends = loop.mid_line(np.array([0.9 * low, 0.9 * high]))
     if not ends[1] > ends[0]:
         raise InputError(
-            f"{path}: torsion does not grow with the torque; accepted: both of the same"
-            " sign"
+            f"{path}: torsion does not increase with the torque; accepted: both of the"
+            " same sign"
         )
     check_direction(path, loop)
     return loop
@@ -96,13 +100,14 @@ def map_from_measurement(
         teeth_flexspline: Number of teeth of the flexspline, z_fs.
         teeth_circular_spline: Number of teeth of the circular spline, z_cs.
         ratings: All catalogue torques, or only the rated torque [N·m].
-        kinematic_error: CSV file of the kinematic error over one output turn; the map
-            has no kinematic error if None.
+        kinematic_error: CSV file of the kinematic error over one output turn, with
+            ``output_deg`` or ``output_rad`` and ``error_arcmin`` or ``error_rad``. The
+            map has no kinematic error if None.
         layout: Which member is fixed.
-        orders: (p, q) of the kinematic error to fit.
+        orders: Pairs (p, q) of the kinematic error to fit.
         intervals: Number of equal intervals of the torsion curve.
         damping_ratio: Damping ratio of the map [-].
-        name: Name of the map; that of the file if None.
+        name: Name of the map; the name of the loop file without suffix if None.
 
     Raises:
         InputError: If a file or an option cannot be used.
@@ -146,7 +151,7 @@ def map_from_measurement(
 
 
 def _check_options(layout: str, teeth: tuple[int, int], intervals: int) -> None:
-    """Refuse a layout, numbers of teeth or intervals that are out of range."""
+    """Reject a layout, numbers of teeth or intervals out of range."""
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
     if not 0 < teeth[0] < teeth[1]:
@@ -155,13 +160,13 @@ def _check_options(layout: str, teeth: tuple[int, int], intervals: int) -> None:
             " spline"
         )
     if intervals < 1:
-        raise InputError(f"intervals {intervals}; accepted: 1 and more")
+        raise InputError(f"intervals {intervals}; accepted: >= 1")
 
 
 def _read_error(
     path: str | Path, orders: Sequence[tuple[int, int]], gear: dict[str, Any]
 ) -> ErrorFit:
-    """Harmonics of a record of the kinematic error in a CSV file."""
+    """Harmonics of the kinematic error in a CSV file."""
     record = read_columns(path, {"output": OUTPUT, "error": ERROR})
     largest = float(np.abs(record["error"]).max())
     if largest > np.pi:
@@ -209,7 +214,8 @@ def _fit_report(
     """Residuals of the fits, and the loop of the map compared with the measured one."""
     report: dict[str, Any] = {"torsion": torsion.report}
     if torsion.hysteresis:
-        # a loop other than Maxwell slip is fitted as a whole, not under every load
+        # elements reproduce other loops than Maxwell slip only on average, so that the
+        # width of the loop of the map may differ from the measured one
         width = torque_loop(drive).hysteresis_loss() / arcmin
         report["torsion"] = {**torsion.report, "hysteresis_loss_map_arcmin": width}
     if error is not None:
@@ -223,12 +229,12 @@ def _fit_report(
 
 
 def _missing(torsion: TorsionFit, error: ErrorFit | None) -> dict[str, str]:
-    """Reasons for figures that the measurement does not provide, by key."""
+    """Reasons why the measurement does not provide figures, by key of the figure."""
     missing = {}
     if not torsion.hysteresis:
         width = torsion.report["hysteresis_loss_arcmin"]
         missing["hysteresis_loss_arcmin"] = (
-            "the record has one direction of the torque only"
+            "the record contains only one direction of the torque"
             if width is None
             else f"the measured loop is {width:.4g} arcmin wide, no more than its noise"
         )

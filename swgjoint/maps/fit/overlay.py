@@ -2,8 +2,8 @@
 
 The map follows the torques of the record with a locked input, so that both loops have
 the same path and are read by the same rules. The zero of a torsion sensor is arbitrary.
-The measured loop is therefore shifted onto the prediction so that the mid-lines agree
-on average below T1, with both load directions.
+The measured loop is therefore shifted so that its mid-line agrees with that of the
+prediction on average between -T1 and T1.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 COMPARED = ("hysteresis_loss_arcmin", "lost_motion_arcmin")
-"""Figures read around zero torque from both loops."""
+"""Keys of the figures that are read around zero torque from both loops."""
 APART = 0.1
-"""Relative difference of such a figure above which a warning is given."""
+"""Relative difference of such a figure above which a warning is given [-]."""
 _GRID = 9
 """Number of torques from zero to T1 at which the zeros of the loops are compared."""
 
@@ -37,6 +37,7 @@ class Overlay:
     measured: TorqueLoop
     """Measured loop, with its zero shifted onto that of the prediction."""
     predicted: TorqueLoop
+    """Loop of the map along the torques of the record."""
     shift: float
     """Shift that was added to the measured torsion [rad]."""
     history: str
@@ -46,7 +47,7 @@ class Overlay:
     rated_torque: float
     """Rated torque that defines the lost motion [N·m]."""
     beyond_range: bool
-    """Whether the record exceeds the torque range of the map."""
+    """Whether the record exceeds the sampled torque range of the map."""
 
     @property
     def residual(self) -> Array:
@@ -56,8 +57,8 @@ class Overlay:
     def segments(self) -> list[dict[str, Any]]:
         """Residual and stiffness on 0..T1, T1..T2 and T2..Tmax, both signs together.
 
-        The stiffness of a segment is None if the record does not cover it or has no
-        samples in it. The residuals are None without samples.
+        The stiffness of a segment is None if the record does not cover the segment or
+        has no samples in it. The residuals are None if it has no samples in it.
         """
         size = np.abs(self.measured.torque)
         rows = []
@@ -82,7 +83,7 @@ class Overlay:
         return rows
 
     def _stiffness(self, loop: TorqueLoop, low: float, high: float) -> float | None:
-        """Chord of the mid-line; the last segment ends at the smaller of both peaks."""
+        """Chord of the mid-line [N·m/rad]; the last one ends at the smaller peak."""
         torque = self.measured.torque
         both = min(float(torque.max()), -float(torque.min()))
         if high == self.edges[2] and both > low:
@@ -93,7 +94,7 @@ class Overlay:
         return value if np.isfinite(value) else None
 
     def _sampled(self, low: float, high: float) -> bool:
-        """Whether every sign that reaches ``high`` has samples between two torques."""
+        """Whether each sign that reaches ``high`` has a sample in low..high."""
         sides = [sign * self.measured.torque for sign in (1.0, -1.0)]
         return all(
             bool(((side > low) & (side <= high)).any())
@@ -102,9 +103,9 @@ class Overlay:
         )
 
     def warnings(self) -> list[str]:
-        """One line for each figure that differs by more than :data:`APART`.
+        """One line for each of the figures that differs by more than :data:`APART`.
 
-        The loss of a prediction without hysteresis is not compared.
+        The hysteresis loss is not compared if the prediction has none.
         """
         predicted, measured = (
             readings(loop, self.rated_torque)
@@ -123,15 +124,17 @@ class Overlay:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """Figures of both loops and residuals, in total and by segment, as JSON values.
+        """Figures of both loops, and residuals in total and by segment; JSON values.
 
-        Figures around zero torque are None unless both signs have samples within T1.
+        Figures around zero torque are None unless each sign that reaches T1 has samples
+        between zero and T1.
         """
         rest = self.residual / arcmin
         pair = {"measured": self.measured, "predicted": self.predicted}
         about_zero = self._sampled(0.0, self.edges[0])
 
         def of_both(values: dict[str, float]) -> dict[str, float | None]:
+            """A figure of both loops [arcmin]; None where it is unknown."""
             return {
                 k: float(v) / arcmin if about_zero and np.isfinite(v) else None
                 for k, v in values.items()
@@ -165,13 +168,13 @@ class Overlay:
 def overlay(drive: Potential, measured: TorqueLoop, *, theta: float = 0.0) -> Overlay:
     """Compare a measured loop with the prediction of a map.
 
-    With hysteresis the prediction is computed twice: from rest, and after a first pass
-    along the path. The one with the smaller residual is returned.
+    If the map has hysteresis, the prediction is computed twice: from rest, and after a
+    first pass along the path. The one with the smaller residual is returned.
 
     Args:
         drive: The map.
-        measured: Torque and torsion with the same sign; the zero of the torsion is
-            arbitrary.
+        measured: Measured loop, whose torsion has the sign of the torque and an
+            arbitrary zero.
         theta: Angle at which the input is locked in the prediction [rad].
     """
     ratings = drive.ratings
@@ -203,7 +206,7 @@ def _played(
 ) -> tuple[Array, Array]:
     """Torsion of the map along a torque path, from rest and on a second pass [rad].
 
-    Between two reversals the path counts as monotone, even if samples jitter.
+    Between two reversals the path counts as monotone even if the torque is noisy.
     """
     free = float(output_angle(drive, theta, 0.0))
     sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))
@@ -220,7 +223,7 @@ def _played(
 
 
 def _width(loop: TorqueLoop) -> float:
-    """Hysteresis loss [rad]; zero if only the torque :data:`REST` causes it."""
+    """Hysteresis loss [rad]; zero if it results only from the torque :data:`REST`."""
     width, travel = loop.hysteresis_loss(), float(np.ptp(loop.torsion))
     return 0.0 if abs(width) < NO_WIDTH * travel else width
 
@@ -228,7 +231,8 @@ def _width(loop: TorqueLoop) -> float:
 def from_its_side(torque: Array, rest: float) -> Array:
     """Torque path whose zeros are replaced by a small torque of the preceding sign.
 
-    A free output stays where the last load left it.
+    The reason is that a free output stays where the last load left it. Zeros at the
+    start of the path remain zero.
 
     Args:
         torque: Torque along the path [N·m]. Shape (n,).
@@ -256,6 +260,7 @@ def _shift(measured: TorqueLoop, predicted: TorqueLoop, top: float) -> float:
 
 
 def _beyond(drive: Potential, measured: TorqueLoop) -> bool:
+    """Whether a record exceeds the torques of the map, including its hysteresis."""
     low, high = drive.torque_range
     slipping = sum(element.yield_torque for element in drive.hysteresis)
     reach = 1.0 + 1e-6

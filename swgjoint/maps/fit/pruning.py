@@ -1,4 +1,4 @@
-r"""Removal of the weakest harmonics of a map, with bounds of the effect.
+r"""Removal of the weakest harmonics of a map, with bounds on the effect.
 
 At given phases and inside the sampled torsion, a harmonic k with kinematic error
 :math:`e_k` and potential :math:`A_k, B_k` changes the results by at most
@@ -8,10 +8,10 @@ At given phases and inside the sampled torsion, a harmonic k with kinematic erro
     |\delta \partial_\Delta V| \le t_k = \max_\Delta |(A_k', B_k')|, \quad
     |\delta\psi|_T \le |e_k| + t_k / c,
 
-where the last bound applies at a given torque and input angle and c is the lowest
-stiffness at any phases: a torque change t changes the torsion by at most t/c. The sum
-of these bounds applies to several harmonics. Maxima are taken over Bernstein
-coefficients, which enclose a polynomial.
+where the last bound applies at a given torque and input angle, and c is the lowest
+stiffness at any phases: a torque change t changes the torsion by at most t/c. For
+several harmonics the bounds are added. Maxima are taken over the Bernstein coefficients
+of the polynomials, which enclose their values.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 def pruned_map(drive: Map, tolerance: float) -> Map:
     """A copy without the weakest harmonics; ``info["pruned"]`` states the bounds.
 
-    For a map that was pruned before, lists are joined and tolerances and bounds added:
-    the deviation of the last map from the first is at most the sum of both.
+    If the map was pruned before, the lists of harmonics are joined and the tolerances
+    and bounds are added, since the deviation from the original map is at most the sum.
 
     Args:
         drive: The map.
@@ -45,8 +45,8 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
             bounds does not exceed it.
 
     Raises:
-        InputError: If the tolerance is not positive, or if the harmonics of the
-            stiffness may exceed its mean: then no torque bounds an angle.
+        InputError: If the tolerance is not positive, or if the harmonics may reduce the
+            stiffness to zero, so that the angle has no bound.
     """
     if not 0.0 < tolerance < np.inf:
         raise InputError(f"tolerance {tolerance / arcmin:g} arcmin; accepted: > 0")
@@ -55,7 +55,7 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
     if lowest <= 0.0:
         raise InputError(
             f"map {drive.name!r}: its harmonics may reduce the stiffness to"
-            f" {lowest:.3g} N·m/rad, so that no bound of the angle exists; accepted:"
+            f" {lowest:.3g} N·m/rad, so that the angle has no bound; accepted:"
             " a map whose harmonics together change the stiffness by less than its mean"
             " at every torsion; use it without a tolerance, or at a level without"
             " harmonics (rigid, linear, native)"
@@ -72,7 +72,7 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
         "dropped": [[int(p), int(q)] for p, q in drive.orders[~keep]],
         "output_angle_bound_arcmin": float(angle[gone].sum()) / arcmin,
         "kinematic_error_bound_arcmin": of_error / arcmin,
-        # at given angles of input and output the torsion changes as well
+        # at given input and output angles the error also changes the torsion
         "torque_bound_Nm": of_torque + highest * of_error,
     }
     before = drive.info.get("pruned", {})
@@ -82,13 +82,16 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
 
 
 def torque_amplitudes(drive: Potential) -> Array:
-    """Largest torque of every harmonic inside the knots [N·m]. (n_harmonics,)."""
+    """Upper bound of the torque of each harmonic inside the knots [N·m].
+
+    Shape (n_harmonics,).
+    """
     points = _enclosing(drive, 1)
     return np.asarray(np.hypot(points[:, 0], points[:, 1]).max(axis=(1, 2)))
 
 
 def stiffness_range(drive: Potential) -> tuple[float, float]:
-    """Bounds of the stiffness inside the knots at any phases [N·m/rad]."""
+    """Lower and upper bound of the stiffness inside the knots [N·m/rad]."""
     points = _enclosing(drive, 2)
     swing = np.hypot(points[1:, 0], points[1:, 1]).max(axis=-1).sum(axis=0)
     mean = points[0, 0]  # (n_intervals, 3)
@@ -100,15 +103,14 @@ def stiffness_range(drive: Potential) -> tuple[float, float]:
 def _enclosing(drive: Potential, derivative: int) -> Array:
     """Bernstein coefficients of a derivative of A and B by the torsion.
 
-    Returns:
-        Shape (n_harmonics, 2, n_intervals, 5 - derivative).
+    Shape (n_harmonics, 2, n_intervals, 5 - derivative).
     """
     c = drive.potential
     for _ in range(derivative):
         c = c[..., 1:] * np.arange(1, c.shape[-1])
     degree = c.shape[-1] - 1
     c = c * np.diff(drive.torsion_knots)[:, None] ** np.arange(degree + 1)
-    # b_i = sum_j C(i, j) / C(n, j) c_j (textbook)
+    # b_i = sum_j C(i, j) / C(n, j) c_j for powers of the fraction of an interval
     to_points = [
         [comb(i, j) / comb(degree, j) for j in range(degree + 1)]
         for i in range(degree + 1)

@@ -1,9 +1,9 @@
 """Harmonics that manufacturing errors of the teeth add to a map.
 
 Along the motion the tooth phases of both members advance together: z_cs alpha and
-z_fs beta change by 2 pi per pitch. One record over the cycle of the teeth therefore
-contains all harmonics (p, q); harmonics that differ by a multiple of the tooth order
-coincide in it.
+z_fs beta both change by 2 pi per pitch. One record over the cycle of the teeth
+therefore contains all harmonics (p, q). Pairs (p, q) with the same number of waves in
+the cycle cannot be distinguished in it.
 """
 
 from __future__ import annotations
@@ -21,26 +21,30 @@ from swgjoint.typing import Array, Index
 
 KEEP_TORQUE = 0.05
 """A harmonic of a toleranced drive is kept if its input torque reaches this fraction of
-the largest one. Random tooth errors spread the torque over thousands of orders: at 1 %
-ten times as many would be kept, at orders too high for most simulation steps."""
+the largest one [-]. Random tooth errors spread the torque over thousands of orders. A
+value of 0.01 would keep ten times as many, with orders that the time steps of most
+simulations do not resolve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToleranceModes:
-    """Amplitudes over the cycle, with tooth errors minus without."""
+    """Harmonics over the tooth cycle: values with tooth errors minus those without."""
 
     waves: Index
     """Number of waves of each harmonic in the cycle. Shape (n,)."""
     orders: Index
     """Orders (p, q). Shape (n, 2)."""
     potential: Array
-    """Cosine and sine of V, V', V'' at the knots. Shape (n, 2, 3, n_knots)."""
+    """Cosine and sine amplitudes of V [J], V' [N·m] and V'' [N·m/rad] at the knots.
+
+    Shape (n, 2, 3, n_knots).
+    """
     error: Array
-    """Cosine and sine of e0 [rad]. Shape (n, 2)."""
+    """Cosine and sine amplitudes of e0 [rad]. Shape (n, 2)."""
 
 
 def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
-    """All harmonics of the record.
+    """All harmonics that tooth errors add over the cycle of the teeth.
 
     Args:
         samples: Samples with tolerances.
@@ -51,13 +55,14 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
     zero = int(np.flatnonzero(tolerances.torque == 0.0)[0])
 
     def tabulated(table: Array) -> Array:
+        """Curves at the knots and unloaded error by angle (n_angles, 3 n_knots + 1)."""
         error, energy, compliance = table
         torsion = error[zero] - error
         torque = np.broadcast_to(tolerances.torque[:, None], torsion.shape)
         curve = interpolate_on_knots(
             torsion, np.stack([energy, torque, 1.0 / compliance]), knots
         )
-        # (n_angles, 3 n_knots), the error at rest as one more column
+        # the unloaded error is the last column
         return np.concatenate(
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
@@ -79,9 +84,9 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
 def orders_of(waves: Index, samples: MapSamples) -> Index:
     """Orders (p, q) of harmonics from their number of waves in the cycle. Shape (n, 2).
 
-    The result is the nearest multiple of the tooth order of the perfect pattern plus a
-    low order of alpha and beta. Among the pairs that coincide along the motion, the one
-    with the smallest sum of magnitudes is taken.
+    Each result is the nearest multiple of the tooth order of the perfect pattern plus a
+    low order of alpha and beta. Among the low orders with the same number of waves, the
+    one with the smallest |p| + |q| is taken.
 
     Args:
         waves: Number of waves in the cycle. Shape (n,).
@@ -96,12 +101,12 @@ def orders_of(waves: Index, samples: MapSamples) -> Index:
     )
     tooth = np.round(waves / cycle).astype(np.int64)
     rest = waves - tooth * cycle
-    if cycle % z_fs:  # errors of the circular spline alone
+    if cycle % z_fs:  # only the circular spline has errors
         low = np.stack([rest, np.zeros_like(rest)], axis=-1)
-    elif cycle % z_cs:
+    elif cycle % z_cs:  # only the flexspline has errors
         low = np.stack([np.zeros_like(rest), rest], axis=-1)
     else:
-        # p a + q b = rest, with a and b without common factor
+        # p a + q b = rest, where a and b have no common factor
         a, b = cycle // z_cs, cycle // z_fs
         first = rest * pow(a, -1, b) % b if b > 1 else np.zeros_like(rest)
         p = first[:, None] + b * np.arange(-a - 1, a + 2)
@@ -116,16 +121,17 @@ def orders_of(waves: Index, samples: MapSamples) -> Index:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Combined:
-    """Harmonics of the perfect pattern and of the tooth errors that are kept."""
+    """Harmonics of the perfect pattern and those kept of the tooth errors."""
 
     orders: Index
     """Orders (p, q), the mean first. Shape (n, 2)."""
     potential: Array
-    """Cosine and sine of V, V', V'' at the knots. Shape (n, 2, 3, n_knots)."""
+    """Cosine and sine amplitudes of V, V', V'' at the knots, as in
+    :class:`ToleranceModes`. Shape (n, 2, 3, n_knots)."""
     error: Array
-    """Cosine and sine of e0 [rad]. Shape (n, 2)."""
+    """Cosine and sine amplitudes of e0 [rad]. Shape (n, 2)."""
     record: dict[str, Any]
-    """Figures on the kept and dropped harmonics, JSON values."""
+    """Figures of the kept and dropped harmonics; JSON values."""
 
 
 def combine_modes(
@@ -137,17 +143,17 @@ def combine_modes(
     coarse: NDArray[np.bool_],
     keep: float,
 ) -> Combined:
-    """Add the harmonics of the errors to those of the perfect pattern.
+    """Harmonics of a toleranced drive: the perfect pattern plus its tooth errors.
 
     Args:
         samples: Samples with tolerances.
         knots: Torsion of the knots [rad]. Shape (n_knots,).
         potential: Potential of the perfect pattern, as in :class:`Combined`.
         error: Kinematic error of the perfect pattern, as in :class:`Combined`.
-        coarse: Mask of the knots at which the errors are compared, including both ends.
-            Shape (n_knots,).
-        keep: A harmonic is kept if its e0 reaches this fraction of the largest one or
-            its input torque reaches :data:`KEEP_TORQUE`; zero keeps all.
+        coarse: Mask of the knots at which the errors are evaluated, including both
+            ends. Shape (n_knots,).
+        keep: A harmonic is kept if its e0 exceeds this fraction of the largest one [-],
+            or its input torque the fraction :data:`KEEP_TORQUE`; zero keeps all.
     """
     tolerances, count = samples.tolerances, len(potential)
     assert tolerances is not None
@@ -166,7 +172,7 @@ def combine_modes(
     orders = np.concatenate(
         [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
     )
-    # weighed at the coarse knots, as there are thousands before the selection
+    # compared at the coarse knots, as there are thousands before the selection
     weighed = np.concatenate([potential[..., coarse], modes.potential[others]])
     error = np.concatenate([error, modes.error[others]])
 
@@ -179,8 +185,8 @@ def combine_modes(
     middle = int(np.argmin(np.abs(knots[coarse])))
     if keep:
         large = ripple > KEEP_TORQUE * ripple.max(axis=0)
-        # only at rest do all positions share a solved torque; elsewhere interpolation
-        # leaves noise in the high orders of the pattern
+        # only at zero torsion do all positions have a solved torque; elsewhere the
+        # interpolation adds noise to the high orders of the pattern
         large[:count] = large[:count, middle][:, None]
         kept |= large.any(axis=1)
     kept[0] = True
@@ -190,7 +196,7 @@ def combine_modes(
     )
 
     def left(power: Array) -> float:
-        """Root mean square of the dropped harmonics relative to that of all."""
+        """Root mean square of the dropped harmonics relative to that of all [-]."""
         return float(np.sqrt(power[~kept].sum() / max(power.sum(), 1e-300)))
 
     return Combined(
