@@ -1,4 +1,4 @@
-"""A monotone torsion curve and hysteresis from a measured loop."""
+"""Fit of a monotone torsion curve and hysteresis to a measured loop."""
 
 from __future__ import annotations
 
@@ -14,31 +14,33 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 INTERVALS = 48
+"""Default number of equal intervals of the torsion curve."""
 SOFTEST = 0.02
-"""Smallest stiffness of the fit relative to the mean one; it keeps the curve
+"""Smallest stiffness of the fit relative to the mean one [-]; it keeps the curve
 monotone."""
 REACHES = 0.25 * 2.0 ** -np.arange(0.0, 8.5, 0.5)
-"""Yield torsions of the candidate elements, as fractions of the travel, from a quarter
-to 0.1 %. Above a quarter an element sticks too long to be distinguished from the
+"""Yield torsions of the candidate elements as fractions of the travel [-], from 25 % to
+0.1 %. Elements with larger fractions stick too long to be distinguished from the
 spring."""
 FAINT = 1e-3
-"""Hysteresis below this fraction of the largest torque is neglected."""
+"""Hysteresis below this fraction of the largest torque is neglected [-]. The same
+fraction of the total yield torque applies to single elements."""
 
-_SMOOTH = (
-    1e-4  # weight of the second difference of the stiffness: matters only without data
-)
+# weight of the second difference of the stiffness, which matters only without data
+_SMOOTH = 1e-4
 _SIGNIFICANT = 20.0  # threshold of an F test, far above the effect of noise
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopRecord:
-    """Samples and candidate elements that enter the least squares."""
+    """Samples and candidate elements that enter the least-squares fit."""
 
     loop: TorqueLoop
+    """The whole measured loop."""
     torque: Array
-    """Torque of the samples that count [N·m]. Shape (n,)."""
+    """Torque of the samples used in the fit [N·m]. Shape (n,)."""
     torsion: Array
-    """Torsion of the samples that count [rad]. Shape (n,)."""
+    """Torsion of the samples used in the fit [rad]. Shape (n,)."""
     knots: Array
     """Torsion of the knots [rad]. Shape (n_knots,)."""
     reaches: Array
@@ -56,13 +58,20 @@ class TorsionFit:
     stiffness: Array
     """Stiffness at the knots, positive [N·m/rad]. Shape (n_knots,)."""
     hysteresis: tuple[Jenkin, ...]
+    """Jenkin elements; empty if hysteresis is not significant."""
     report: dict[str, Any]
+    """Residuals and figures of the fit; JSON values."""
     record: LoopRecord
+    """Samples to which the spring was fitted."""
     yields: Array
     """Yield torques of the candidate elements [N·m]. Shape (n_elements,)."""
 
     def with_yields(self, yields: Array) -> TorsionFit:
-        """The fit whose spring follows the loop best with given yield torques [N·m]."""
+        """The least-squares fit of the spring for given yield torques.
+
+        Args:
+            yields: Yield torques of the candidate elements [N·m]. Shape (n_elements,).
+        """
         record = self.record
         rest = record.torque - record.signals @ yields
         solution = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
@@ -71,32 +80,37 @@ class TorsionFit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Solution:
+    """Solution of the bounded least-squares problem."""
+
     values: Array
-    """Torque at the first knot, stiffness at the knots, yield torques."""
+    """Torque at the first knot [N·m], stiffness at the knots [N·m/rad], yield torques
+    [N·m]."""
     error: Array
     """Torque of the model minus that of the samples [N·m]."""
     bounded: Array
-    """-1 for a value at its lower bound, zero for a free one."""
+    """-1 for each value at its lower bound, zero for the others."""
 
     @property
     def rms(self) -> float:
+        """Root mean square of the error [N·m]."""
         return float(np.sqrt(np.mean(self.error**2)))
 
 
 def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
-    """Fit a spring with piecewise linear, positive stiffness, and Jenkin elements.
+    """Fit of a spring with piecewise linear, positive stiffness, and Jenkin elements.
 
     The fit is a bounded linear least-squares problem in the torque of the samples: for
     a given yield torsion, the torque of an element along the record is its yield torque
-    times a known signal. Samples count once the torsion has moved by twice the largest
-    yield torsion, when the elements have forgotten the start of the record. Elements
-    are kept if they reduce the residual by more than noise could; a record with one
-    direction of the torque has none. A loop of another kind, such as one whose width in
-    torque is smallest in the middle, leaves a residual, which the report states.
+    times a known signal. Samples enter the fit once the torsion has travelled twice the
+    largest yield torsion, after which the start of the record no longer affects the
+    elements. Elements are kept if they reduce the residual by more than noise could. A
+    record with one direction of the torque has none. A loop of another kind, such as
+    one whose width in torque is smallest in the middle, leaves a residual, which the
+    report states.
 
     Args:
         loop: Measured loop with both signs of the torque.
-        intervals: Number of equal intervals of the torsion; fewer for few samples.
+        intervals: Number of equal intervals of the torsion; reduced if samples are few.
     """
     travel = np.maximum.accumulate(loop.torsion) - np.minimum.accumulate(loop.torsion)
     reaches = REACHES * travel[-1]
@@ -135,7 +149,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
 def _fit_of(
     record: LoopRecord, solution: _Solution, yields: Array, report: dict[str, Any]
 ) -> TorsionFit:
-    """Spring and elements of a solution, with a report of their residuals."""
+    """Spring and elements of a solution; the report is completed by their residuals."""
     loop, knots, x = record.loop, record.knots, record.torsion
     stiffness = solution.values[1 : knots.size + 1]
     elements = tuple(
@@ -183,14 +197,14 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
 
     count, elements = knots.size - 1, signals.shape[1]
     h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
-    # unknowns: torques relative to h secant, stiffness relative to the secant
+    # unknowns: torques relative to h * secant, stiffness relative to the secant
     basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h, signals])
     bend = np.zeros((max(0, count - 1), basis.shape[1]))
     for row in range(len(bend)):
         bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
     matrix = np.vstack([basis, _SMOOTH * np.sqrt(torque.size) * bend])
     wanted = np.concatenate([torque / (h * secant), np.zeros(len(bend))])
-    # R has the same least-squares solution with as many rows as unknowns
+    # R of the QR decomposition has the same solution but only as many rows as unknowns
     q, r = np.linalg.qr(matrix)
     lowest = np.r_[-np.inf, np.full(count + 1, SOFTEST), np.zeros(elements)]
     solution = lsq_linear(r, q.T @ wanted, bounds=(lowest, np.inf), method="bvls")
@@ -203,7 +217,7 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
 
 
 def _integrals(x: Array, knots: Array) -> Array:
-    """Integral of every hat function from the first knot to x. (n, n_knots)."""
+    """Integral of every hat function from the first knot to x [rad]. (n, n_knots)."""
     h = float(knots[1] - knots[0])
     s = np.clip((x[:, None] - knots[:-1]) / h, 0.0, 1.0)  # fraction of each interval
     table = np.zeros((x.size, knots.size))
@@ -213,7 +227,7 @@ def _integrals(x: Array, knots: Array) -> Array:
 
 
 def _inverse(torque: float, knots: Array, stiffness: Array, at: Array) -> float:
-    """Torsion at a torque inside the range, on the parabola of its interval."""
+    """Torsion at a torque inside the range [rad], on the parabola of its interval."""
     j = int(np.clip(np.searchsorted(at, torque) - 1, 0, knots.size - 2))
     bend = 0.5 * (stiffness[j + 1] - stiffness[j]) / (knots[j + 1] - knots[j])
     rest = torque - at[j]

@@ -10,8 +10,8 @@ from swgjoint.typing import Array
 def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     """Quintic Hermite interpolation of many curves, with a parabola beyond the ends.
 
-    Beyond the ends V'' is the mean of all curves, because the tangents of single curves
-    jump with the contacts of single teeth.
+    Beyond an end, V'' is the mean of all curves at that end, because the end stiffness
+    of a single curve jumps with the contacts of single teeth.
 
     Args:
         torsion: Torsion of the samples, increasing along the first axis [rad]. Shape
@@ -35,7 +35,7 @@ def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     h = x1 - x0
     (v0, v1), (s0, s1), (c0, c1) = (ends(values) for values in curve)
     s0, s1, c0, c1 = s0 * h, s1 * h, c0 * h**2, c1 * h**2
-    # difference of the end values from the parabola of the start
+    # difference between the end values and the parabola of the start
     dv, ds, dc = v1 - v0 - s0 - 0.5 * c0, s1 - s0 - c0, c1 - c0
     a3, a4, a5 = (
         10 * dv - 4 * ds + 0.5 * dc,

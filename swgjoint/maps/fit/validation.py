@@ -1,4 +1,4 @@
-"""Validation record of a map: its differences from equilibria unused in the fit.
+"""Validation record of a map: its differences from equilibria that the fit did not use.
 
 :mod:`swgjoint.maps.sheet.map_validity` reads the record.
 """
@@ -19,33 +19,38 @@ POSITIONS = 500
 """Number of positions in the cycle of a drive with tooth errors at which its map is
 evaluated."""
 GOLDEN = 0.618034
+"""Golden section, the step between positions as a fraction of the cycle [-]."""
 EXTREME = 2.5
-"""Ratio of the largest of many differences to their root mean square: sqrt(2 ln n) for
-n = 24 independent normal differences, about the number of positions in a pitch at which
-a map may deviate. With it, 14 of 22 records of six designs are within 0.7 to 1.5 times
-the largest difference at other equilibria; with the largest difference of the record
-itself, 12 are."""
+"""Assumed ratio of the largest of many differences to their root mean square [-].
+
+It is sqrt(2 ln n) for n = 24 independent normal differences, about the number of
+positions in a pitch at which a map may deviate. For 14 of 22 records of six designs,
+the estimate with this ratio is 0.7 to 1.5 times the largest difference at other
+equilibria. The largest difference of the record itself is within these limits for 12.
+"""
 
 
 def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
-    """Record of the differences between a map and its unseen equilibria.
+    """Record of the differences between a map and equilibria unused in its fit.
 
-    Differences of input torque and output error are relative to the peak to peak of the
-    finite elements at the same torque, taken over the samples and the unseen equilibria
-    together. With tooth errors the unseen equilibria are a few full solves of the
-    toleranced drive, and the peak to peak includes the map over the whole cycle.
+    Differences of input torque and output error are relative to their peak to peak in
+    the finite elements at the same torque, over the samples and the unused (unseen)
+    equilibria together. With tooth errors the unseen equilibria are a few full solves
+    of the toleranced drive, and the values of the map over the whole cycle replace the
+    samples.
 
-    ``largest`` is the largest observed difference, at a few angles of each torque.
+    ``largest`` is the largest difference observed at a few angles of each torque.
     ``expected`` estimates the largest difference at more angles: :data:`EXTREME` times
-    the root mean square at the worst torque, which varies less than the largest
-    difference. Neither covers the range between the torques of the record.
+    the root mean square at the worst torque, which scatters less than the largest
+    difference. Neither applies between the torques of the record.
 
     Args:
         drive: The map.
         samples: Samples of the fit, with unseen equilibria.
 
     Returns:
-        The record; None if there are no unseen equilibria inside the map.
+        The record; None without unseen equilibria within the torque range of the map
+        or without ripple in them.
     """
     toleranced = samples.tolerances
     solved = samples.unseen if toleranced is None else toleranced.solved
@@ -61,7 +66,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     rows = []
     low, high = drive.torque_range
     for torque in np.unique(solved.torque):
-        # without tooth errors the unloaded equilibria are unseen in their angles only
+        # without tooth errors, zero torque was sampled and only the angles are unseen
         if not low < torque < high or (torque == 0.0 and toleranced is None):
             continue
         at = solved.torque == torque
@@ -127,17 +132,17 @@ def _input_torque(drive: Potential, solved: FullSolves) -> Array:
 
 
 def _over(samples: MapSamples, key: str, torque: float) -> Array:
-    """Output error or input torque of all sampled angles at a torque (n_angles,)."""
+    """Output error or input torque at all sampled angles and one torque (n_angles,)."""
     table = getattr(samples, key)
     return np.array([np.interp(torque, samples.torque, row) for row in table.T])
 
 
 def _over_cycle(drive: Potential, samples: MapSamples, torque: float) -> list[Array]:
-    """Output error and input torque of the map over the cycle of the teeth."""
+    """Output error [rad] and input torque [N·m] of the map over the tooth cycle."""
     assert samples.tolerances is not None
     step = samples.input_angle[1] - samples.input_angle[0]
     cycle = step * samples.input_angle.size * samples.tolerances.pitches
-    # the golden section spreads the positions evenly over pitches and their phases
+    # steps of the golden section spread the positions evenly over pitches and phases
     theta = cycle * (GOLDEN * np.arange(POSITIONS) % 1.0)
     none = np.zeros(POSITIONS)
     there = FullSolves(
@@ -149,7 +154,11 @@ def _over_cycle(drive: Potential, samples: MapSamples, torque: float) -> list[Ar
 def _stiffness(
     drive: Potential, solved: FullSolves, offset: float, wrong: Array
 ) -> dict[str, float] | None:
-    """Largest relative difference of the torque over the torsion from rest."""
+    """Largest relative difference of the secant stiffness.
+
+    The secant starts at the unloaded equilibrium at the same angle. None if no angle has
+    both an unloaded and a loaded equilibrium.
+    """
     worst: dict[str, float] | None = None
     rest = {
         theta: k
@@ -166,7 +175,7 @@ def _stiffness(
             continue
         torsion = solved.output_error[rest[theta]] - solved.output_error[k]
         of_map = torsion - wrong[rest[theta]] + wrong[k]
-        # stiffness is T over torsion: the stiffness ratio is the inverse torsion ratio
+        # at one torque the stiffness ratio is the inverse of the torsion ratio
         part = float(abs(torsion / of_map - 1.0))
         if worst is None or part > worst["largest"]:
             worst = {"largest": part, "at_Nm": float(torque)}
