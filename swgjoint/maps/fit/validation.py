@@ -156,8 +156,8 @@ def _stiffness(
 ) -> dict[str, float] | None:
     """Largest relative difference of the secant stiffness.
 
-    The secant starts at the unloaded equilibrium at the same angle. None if no angle has
-    both an unloaded and a loaded equilibrium.
+    The secant starts at the unloaded equilibrium at the same angle. None if no angle
+    has both an unloaded and a loaded equilibrium.
     """
     worst: dict[str, float] | None = None
     rest = {

@@ -1,1 +1,1 @@
-"""Catalogue-style spec sheet of a map and the validity of its figures."""
+"""Catalogue-style spec sheet of a map, and the validity of its figures."""

@@ -1,15 +1,16 @@
-r"""Running tests of a catalogue: torques that friction demands of motor and load.
+r"""Running tests of a catalogue: the torques that friction requires of motor and load.
 
-At constant speed the potential returns the work that it takes, so over one period of
-the pattern the mean input torque is due to load and friction alone. In slow motion at
-the input angle theta and the output torque T,
+At constant speed the potential returns the work that it takes up, so the mean input
+torque over one period of the pattern is due to load and friction alone. In slow motion,
+at the input angle theta and with the torque T on the output,
 
 .. math::
     \tau(\theta) = \partial_\theta V + b_\theta F, \qquad
     -\partial_\psi V = T + b_\psi F,
 
-with the slipping friction F, the direction b of the relative rotation and the total
-derivatives :math:`\partial_\theta, \partial_\psi` of the potential.
+where F is the friction while the bristle slips, b the derivatives of the relative
+rotation, and :math:`\partial_\theta, \partial_\psi` are the total derivatives of the
+potential.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ RUNNING_SPEED = 2000.0 * rpm
 """Input speed at which catalogues state running torque and efficiency [rad/s]."""
 _ROUNDS = 4
 """Iterations between friction and the torque that it adds at the output; each one
-reduces the error by about a factor of the ratio."""
-_BALANCES = 30
+divides the error by about the ratio."""
+_BALANCES = 30  # largest number of iterations for the back-driving torque
 _SETTLED = 1e-9
 
 
 def _period(drive: Potential, at_most: int | None = None) -> Array:
-    """Input angles over one period of the pattern [rad]."""
+    """Input angles over one period of the pattern [rad]. Shape (n,)."""
     period, samples = period_of(drive)
     samples = min(samples, at_most or samples)
     return 2.0 * np.pi * float(period) * np.arange(samples) / samples
@@ -48,9 +49,10 @@ def running_torque(
     Args:
         drive: A map with friction.
         theta: Input angles [rad]. Shape (n,).
-        torque: T that the drive exerts on the output [N·m], broadcast with them.
-        speed: Input speed, >= 0 [rad/s]; at zero, static friction acts as the input is
-            about to move.
+        torque: Torque T that the drive exerts on the output [N·m], of a shape that
+            broadcasts to (n,).
+        speed: Input speed, >= 0 [rad/s]. At zero the input is about to move, and static
+            friction acts.
 
     Raises:
         ValueError: If the map has no friction.
@@ -75,7 +77,7 @@ def no_load_running_torque(drive: Potential, speed: float = RUNNING_SPEED) -> fl
 
     Args:
         drive: A map with friction.
-        speed: Input speed [rad/s].
+        speed: Input speed, >= 0 [rad/s].
     """
     return float(running_torque(drive, _period(drive), 0.0, speed).mean())
 
@@ -83,8 +85,8 @@ def no_load_running_torque(drive: Potential, speed: float = RUNNING_SPEED) -> fl
 def starting_torque(drive: Potential) -> float:
     """Torque on the input above which it keeps turning with a free output [N·m].
 
-    A slowly rising torque moves the input through positions of equilibrium. It turns
-    continuously once the torque exceeds the largest one of a period.
+    A slowly increasing torque moves the input through equilibrium positions. The input
+    turns continuously once the torque exceeds the largest value over one period.
     """
     return float(running_torque(drive, _period(drive), 0.0, 0.0).max())
 
@@ -92,14 +94,16 @@ def starting_torque(drive: Potential) -> float:
 def back_driving_torque(drive: Potential) -> float | None:
     """Torque on the output that turns the free input [N·m].
 
-    It is the largest load over one period at which the input needs no torque. None if
-    even the momentary peak torque does not turn the input.
+    At every position of a period, a load exists under which the input requires no
+    torque to turn. The back-driving torque is the largest of these loads. None if it
+    exceeds the momentary peak torque.
 
     Raises:
-        ComputationError: If the iteration for this load does not converge.
+        ComputationError: If the iteration for these loads does not converge.
+        ValueError: If the map has no friction.
     """
     theta, most = _period(drive), drive.ratings.momentary_peak
-    sign = -np.sign(drive.ratio)  # the load drives an input that turns forwards
+    sign = -np.sign(drive.ratio)  # the load turns the input forwards
     keeps = drive.friction.load if drive.friction else 0.0  # friction per |T/i|
     if keeps >= 1.0:
         return None
@@ -115,7 +119,7 @@ def back_driving_torque(drive: Potential) -> float | None:
             worst = float(load.max())
             return worst if worst <= most else None
     raise ComputationError(
-        f"map {drive.name!r}: found no load that back-drives its input; remove the"
+        f"map {drive.name!r}: found no load that back-drives the input; remove the"
         " strongest harmonics"
     )
 
@@ -132,8 +136,8 @@ def efficiency(
     Args:
         drive: A map with friction.
         torque: Load torque that opposes the motion of the output [N·m], > 0.
-        speed: Input speed [rad/s].
-        at_most: Largest number of samples of the period, for a rough value.
+        speed: Input speed, > 0 [rad/s].
+        at_most: Largest number of samples of the period, for an approximate value.
     """
     load = np.sign(drive.ratio) * torque
     taken = running_torque(drive, _period(drive, at_most), load, speed).mean()

@@ -23,15 +23,15 @@ from swgjoint.typing import Array
 POINTS = 80
 """Number of torques on each of the four legs of a computed loop."""
 LOST_MOTION_TORQUE = 0.04
-"""Fraction of the rated torque at which lost motion is read."""
+"""Fraction of the rated torque at which lost motion is read [-]."""
 _TURNS_AT = 0.02
-"""Fraction of its range by which a torque path must return to count as a reversal;
-smaller changes are noise."""
+"""Fraction of its range by which a torque path must return to count as a reversal [-];
+smaller changes count as noise."""
 REST = 1e-9
-"""Remaining torque at a zero of the path, as a fraction of the rated torque: a free
-output rests where the load has left it."""
+"""Remaining torque at a zero of the path as a fraction of the rated torque [-]. It
+represents a free output that rests where the last load has left it."""
 NO_WIDTH = 1e-7
-"""Ratio of width to travel below which a loop has no hysteresis [-]."""
+"""Ratio of width to travel below which a loop counts as free of hysteresis [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +52,7 @@ class TorqueLoop:
         object.__setattr__(self, "torsion", torsion)
 
     def turns(self) -> list[tuple[int, int]]:
-        """First and last sample of every part with one direction of the torque."""
+        """Indices of first and last sample of every part between torque reversals."""
         band = _TURNS_AT * float(np.ptp(self.torque))
         turns, extreme, rising = [0], 0, None
         for k, value in enumerate(self.torque):
@@ -69,10 +69,10 @@ class TorqueLoop:
         return list(pairwise(turns))
 
     def legs(self) -> list[tuple[bool, Array, Array]]:
-        """Parts with one direction of the torque: whether it rises, torque, torsion.
+        """Parts between torque reversals: whether the torque rises, torque, torsion.
 
-        The arrays are sorted by strictly increasing torque, also for a falling part;
-        samples of equal torque are averaged.
+        The arrays [N·m, rad] are in order of strictly increasing torque even for a
+        falling part; the torsion of samples of equal torque is averaged.
         """
         legs = []
         for a, b in self.turns():
@@ -84,10 +84,10 @@ class TorqueLoop:
         return legs
 
     def branch(self, torque: ArrayLike, *, rising: bool) -> Array:
-        """Torsion while the torque rises or falls [rad]; NaN where the loop has none.
+        """Torsion while the torque rises or falls [rad]; NaN outside the branch.
 
-        Later parts of the loop take precedence, so that a first loading from rest is
-        used only where no other part exists.
+        Later parts of the loop take precedence, so the first loading from rest is used
+        only at torques that no other part covers.
 
         Args:
             torque: Torques at which to read the branch, any shape [N·m].
@@ -102,9 +102,9 @@ class TorqueLoop:
         return values
 
     def mid_line(self, torque: ArrayLike) -> Array:
-        """Mean of both branches [rad], or the only branch that exists at a torque.
+        """Mean of both branches [rad], or the only branch that covers a torque.
 
-        NaN outside the torques of the loop.
+        NaN at torques outside the loop.
         """
         both = np.stack([self.branch(torque, rising=r) for r in (True, False)])
         known = ~np.isnan(both)
@@ -113,15 +113,15 @@ class TorqueLoop:
         return np.asarray(np.where(count, total / np.maximum(count, 1), np.nan))
 
     def hysteresis_loss(self) -> float:
-        """Full width of the loop at zero torque [rad]; NaN if a branch is absent."""
+        """Width of the loop at zero torque [rad]; NaN if a branch is missing there."""
         falling, rising = (self.branch(0.0, rising=r) for r in (False, True))
         return float(falling - rising)
 
     def stiffness(self, low: float, high: float) -> float:
-        """Slope of the mid-line over low..high and -high..-low [N·m/rad].
+        """Mean slope of the mid-line over low..high and -high..-low [N·m/rad].
 
-        This is the chord over both signs of the torque, or over one sign if only that
-        was measured; NaN if neither side covers the range.
+        It is the slope of the chord over both signs of the torque, or over one sign if
+        the loop covers only that one; NaN if it covers neither.
 
         Args:
             low: Lower torque of the chord [N·m].
@@ -135,7 +135,7 @@ class TorqueLoop:
         return float((high - low) * len(sides) / sum(sides))
 
     def lost_motion(self, rated_torque: float) -> float:
-        """Mid-line torsion at +4 % of rated torque minus at -4 % [rad]."""
+        """Torsion of the mid-line at +4 % minus at -4 % of rated torque [rad]."""
         at = LOST_MOTION_TORQUE * rated_torque
         return float(np.diff(self.mid_line([-at, at]))[0])
 
@@ -148,10 +148,10 @@ def largest_torque(ratings: Ratings | CatalogueRow) -> float:
 def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
     """The standard loop 0 -> Tmax -> 0 -> -Tmax -> 0 with the input locked.
 
-    The points include T1, T2 and the torques of the lost motion. Torsion is counted
-    from the unloaded position (e0), as an angle sensor at the output measures it. With
-    hysteresis the loop is run twice and the second pass is returned: it is closed and
-    does not contain the first loading from rest.
+    The points include T1, T2 and the torques of the lost motion. Torsion is measured
+    from the unloaded position (e0), as by an angle sensor at the output. With
+    hysteresis the loop is run twice and the second pass is returned, which is closed
+    and does not contain the first loading from rest.
 
     Args:
         drive: The map.
@@ -161,7 +161,8 @@ def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
     top = largest_torque(r)
     named = [r.T1, r.T2, LOST_MOTION_TORQUE * r.rated_torque]
     up = np.unique(np.concatenate([np.linspace(0.0, top, POINTS), named]))
-    # unloaded, the output rests on the side of the last load; it starts in the middle
+    # the loop starts in the middle of a clearance; later the unloaded output rests on
+    # the side of the last load
     side = REST * r.rated_torque
     legs = [
         up,

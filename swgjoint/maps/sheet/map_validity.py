@@ -1,12 +1,13 @@
 """Validity of the ripple of a map: its validation against unseen solves.
 
-A map of finite elements carries the record ``info["validation"]``. It compares the map
-with equilibria at torques and angles at which the map was not sampled. Differences of
-input torque and loaded output error are given relative to the peak to peak of the
-finite elements at the same torque. Above :data:`WARNING` the dependent figures are
-marked as uncertain; above :data:`LIMIT` the ripple is not valid.
+A finite-element map contains the record ``info["validation"]``, which compares the map
+with finite-element equilibria at torques and angles at which the map was not sampled
+("unseen solves"). Differences of input torque and loaded output error are relative to
+their peak to peak in the finite elements at the same torque. Above :data:`WARNING` the
+figures that depend on them are marked as uncertain; above :data:`LIMIT` the ripple is
+not valid.
 
-A record may come from a file of unknown origin. An invalid record is ignored with a
+A record may come from a file of unknown origin. An invalid record is ignored, with a
 reason, and the map counts as not validated.
 """
 
@@ -23,21 +24,25 @@ if TYPE_CHECKING:
     from swgjoint.maps.potential import Potential
 
 WARNING = 0.1
-"""Ratio of difference to peak to peak above which a figure is marked as uncertain."""
+"""Ratio of difference to peak to peak above which a figure is marked uncertain [-]."""
 LIMIT = 0.3
-"""Ratio of difference to peak to peak above which ripple figures are not valid."""
+"""Ratio of difference to peak to peak above which ripple figures are not valid [-]."""
 NOT_VALIDATED = "not validated against unseen solves"
+"""First words of the reason why a map has no usable record."""
 QUANTITIES = {
     "input_torque": "input torque",
     "output_error": "loaded output error",
 }
 """Names of the ripple quantities by key."""
 STIFFNESS = "secant_stiffness"
+"""Key of the secant stiffness in a record."""
 UNITS = {"input_torque": "Nm", "output_error": "rad"}
+"""Units of the ripple quantities, as in the keys of a record."""
 MAX_ROWS = 1000
-"""Largest number of rows of a record; a thorough one has a few tens."""
+"""Largest number of rows of a record; a detailed one has a few tens."""
 
 Rows = tuple[tuple[float, float, float], ...]
+"""Torque [N·m], largest difference [-], peak to peak of the solves [N·m] or [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,15 +52,15 @@ class Difference:
     quantity: str
     """Key of :data:`QUANTITIES` or :data:`STIFFNESS`."""
     largest: float
-    """Difference over the peak to peak of the solves at that torque [-]; relative
-    difference for a stiffness."""
+    """Difference over the peak to peak of the solves at that torque [-]; the relative
+    difference for the stiffness."""
     torque: float
     """Torque at which the difference occurs [N·m]."""
     rms: float | None = None
-    """Root mean square over the same peak to peak [-]; None if unknown."""
+    """Root mean square difference over the peak to peak [-]; None if unknown."""
     expected: float | None = None
-    """Estimate of the largest difference at more angles over the same peak to peak [-];
-    None if unknown."""
+    """Estimate of the largest difference at more angles over the peak to peak [-]; None
+    if unknown."""
     peak_to_peak: float | None = None
     """Peak to peak of the solves at that torque [N·m] or [rad]; None if unknown."""
     from_rows: tuple[float, ...] = ()
@@ -64,11 +69,11 @@ class Difference:
 
     @property
     def name(self) -> str:
-        """Name of the quantity, in words."""
+        """Name of the quantity for messages."""
         return QUANTITIES.get(self.quantity, self.quantity.replace("_", " "))
 
     def to_json(self) -> dict[str, Any]:
-        """Keys of the JSON output."""
+        """The difference as JSON values, without ``rms`` and ``expected``."""
         return {
             "quantity": self.quantity,
             "largest": self.largest,
@@ -108,19 +113,20 @@ class MapValidation:
     """The checked validation record of a map."""
 
     solves: int
+    """Number of unseen solves."""
     torques: tuple[float, ...]
     """Torques at which the map was not sampled, increasing [N·m]."""
     totals: dict[str, Difference]
     """Largest difference of each quantity, by key."""
     rows: dict[str, Rows]
-    """Rows by quantity: torque, increasing [N·m], largest difference [-], and peak to
-    peak of the solves [N·m] or [rad], NaN if unknown."""
+    """Rows of each ripple quantity, by key, at increasing torques. An unknown peak to
+    peak is NaN."""
     reason: str
-    """Why sampling ended before its goal; empty if it reached the goal."""
+    """Reason why sampling ended before its goal; empty if it reached the goal."""
 
     @property
     def worst(self) -> Difference:
-        """The larger of the differences of the two quantities of the ripple."""
+        """The larger of the largest differences of the two ripple quantities."""
         return max((self.totals[key] for key in QUANTITIES), key=lambda d: d.largest)
 
     def bad_torques(self, limit: float) -> tuple[float, ...]:
@@ -131,9 +137,10 @@ class MapValidation:
     def worst_between(self, low: float, high: float) -> dict[str, Difference]:
         """Largest differences over a range of torques.
 
-        Rows inside the range count directly. At the ends of the range the differences
-        are interpolated linearly between two rows; beyond the record they equal its
-        last row. A record of one sign also applies to the other sign.
+        Rows inside the range are used directly. At the ends of the range the
+        differences are interpolated linearly between two rows; beyond the record they
+        are those of its outermost row. A record of positive torques also applies to
+        negative ones.
 
         Args:
             low: Smallest torque [N·m].
@@ -167,7 +174,7 @@ class MapValidation:
 
 
 def percent(share: float) -> str:
-    """A fraction as a percentage with two significant digits."""
+    """A fraction as a percentage with two significant digits, an integer from 100 %."""
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"
 
@@ -189,14 +196,14 @@ def map_validation(drive: Potential) -> tuple[MapValidation | None, str | None]:
 
 
 def validation_json(drive: Potential) -> dict[str, Any]:
-    """``validation`` (None if unusable) and ``validation_reason`` of a map."""
+    """Entries ``validation`` (None if unusable) and ``validation_reason`` for a map."""
     checked, reason = map_validation(drive)
     record = None if checked is None else drive.info["validation"]
     return {"validation": record, "validation_reason": reason}
 
 
 def validation_lines(found: MapValidation) -> list[str]:
-    """Warnings about the figures of a map; empty if the map is accurate."""
+    """Warnings about the figures of a map; empty if the differences are small."""
     worst, lines = found.worst, []
     if worst.largest > LIMIT:
         lines.append(
@@ -218,7 +225,7 @@ def validation_lines(found: MapValidation) -> list[str]:
 
 
 def validation_summary(found: MapValidation) -> str:
-    """Number of solves and largest differences in one line."""
+    """One line with the number of solves and the largest differences."""
     parts = [
         f"{one.name} within {percent(one.largest)}"
         + _spread(one)
@@ -233,7 +240,7 @@ def validation_summary(found: MapValidation) -> str:
 
 
 def _spread(one: Difference) -> str:
-    """Root mean square and the estimate for more angles, if known, as text."""
+    """Root mean square and estimate for more angles in parentheses, if known."""
     parts = [] if one.rms is None else [f"rms {percent(one.rms)}"]
     if one.expected is not None:
         parts.append(f"expected at more angles {percent(one.expected)}")
@@ -241,7 +248,7 @@ def _spread(one: Difference) -> str:
 
 
 def _torques(found: MapValidation, limit: float) -> str:
-    """Torques above a limit as text, at least that of the worst row."""
+    """Up to six torques above a limit as text, or that of the largest difference."""
     torques = found.bad_torques(limit) or (found.worst.torque,)
     shown = ", ".join(f"{torque:.4g}" for torque in torques[:6])
     return f"{shown}{', ...' if len(torques) > 6 else ''} N·m"
@@ -262,11 +269,11 @@ def _no_record(drive: Potential) -> str:
 
 
 class _Fault(Exception):
-    """Place in the record and what is wrong with it."""
+    """Fault of a record: the key, its value and what is accepted."""
 
 
 def _read(record: Any) -> MapValidation:
-    """The record after checks; unknown keys are ignored."""
+    """The checked record; unknown keys are ignored."""
     content = _table(record, "")
     rows = content.get("rows")
     if not isinstance(rows, Sequence) or isinstance(rows, str | bytes):
@@ -291,7 +298,7 @@ def _read(record: Any) -> MapValidation:
         torque = _number(table, "torque_Nm", where)
         torques.add(torque)
         for key, of in by_quantity.items():
-            # without ripple in the solves there is no relative difference
+            # if the solves have no ripple, no relative difference exists
             if table.get(f"{key}_largest") is None:
                 continue
             value, height = _share(table, f"{key}_largest", where), nan
@@ -312,6 +319,7 @@ def _read(record: Any) -> MapValidation:
 
 
 def _total(content: Mapping[str, Any], key: str) -> Difference:
+    """Largest difference of a quantity over all torques."""
     where = f".{key}"
     table = _table(content.get(key), where)
     return Difference(
@@ -332,7 +340,7 @@ def _table(value: Any, where: str) -> Mapping[str, Any]:
 def _number(table: Mapping[str, Any], key: str, where: str) -> float:
     value = table.get(key)
     if isinstance(value, int | float) and not isinstance(value, bool):
-        # an integer of a file may be too large for a float
+        # an integer in a file may be too large for a float
         if abs(value) <= 1e12 and isfinite(value):
             return float(value)
     raise _Fault(f"{where}.{key} is {_short(value)}; accepted: a finite number")
@@ -356,7 +364,7 @@ def _text(value: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """A value of an untrusted file in a few characters."""
+    """A value of an untrusted file as a short text."""
     if isinstance(value, int) and abs(value) > 10**12:
         return "a very large integer"
     if isinstance(value, list | tuple | Mapping):

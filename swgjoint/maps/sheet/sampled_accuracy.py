@@ -1,4 +1,4 @@
-"""Transmission accuracy from errors at a few angles of an output turn."""
+"""Transmission accuracy, estimated from errors at a few angles of an output turn."""
 
 from __future__ import annotations
 
@@ -13,32 +13,35 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 ORDERS = tuple(pq for k in range(2, 13, 2) for pq in ((k, 0), (0, k)))
-"""Orders (p, q) of p alpha + q beta that are separated from the rest of the error. Two
-lobes cancel the odd orders of the errors of either member."""
+"""Orders (p, q) of p alpha + q beta that are fitted and separated from the rest of the
+error. They are even because two lobes cancel the odd orders of either member."""
 HIGHEST = 12
-"""Highest of these orders."""
+"""Largest of these orders."""
 REST = 2.0
-"""Largest contribution of the rest to either peak, in multiples of its rms. In trials
-with a rest of 30 orders, as strong as in ring computations, the middle of the bracket
-is 0.95 times the dense peak to peak, with a standard deviation of 0.07. The largest
-difference of the same samples is 0.77 times it."""
+"""Assumed contribution of the rest to each peak, in multiples of its rms [-].
+
+In trials the rest had 30 orders and was as strong as in thin-ring computations. The
+middle of the bracket was 0.95 times the peak to peak of a dense evaluation, with a
+standard deviation of 0.07; the peak to peak of the samples was 0.77 times it.
+"""
 
 
 def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
     """Peak to peak of the low orders over an output turn, and rms of the rest [rad].
 
     A few angles miss the peaks of an error that repeats only after an output turn. The
-    low orders are therefore fitted by least squares and evaluated densely. No order
-    dominates the rest, so its rms is returned.
+    low orders are therefore fitted by least squares and evaluated densely. The rest has
+    no dominant order and is described by its rms.
 
     Args:
         theta: Random input angles over one output turn [rad]. Shape (n,).
-        error: Error at these angles [rad]. Shape (n,).
+        error: Transmission error at these angles [rad]. Shape (n,).
         design: The drive.
     """
     n = np.array(ORDERS) @ np.array(angle_coefficients(design.drive.layout))
 
     def waves(theta: Array) -> Array:
+        """Constant, cosines and sines of the orders at input angles."""
         phases = np.stack([theta, theta / design.ratio], axis=-1) @ n.T.astype(float)
         ones = np.ones((theta.size, 1))
         return np.hstack([ones, np.cos(phases), np.sin(phases)])
@@ -55,11 +58,12 @@ def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
 def accuracy_bracket(found: Mapping[str, Any], design: Design) -> tuple[float, float]:
     """Lower and upper estimate of the peak to peak over an output turn [arcmin].
 
-    The lower one is the peak to peak of the low orders, or that of the samples if it is
-    larger. The upper one adds the largest contribution of the rest.
+    The lower estimate is the peak to peak of the low orders, or that of the samples if
+    the latter is larger. The upper one is the peak to peak of the low orders plus the
+    contribution of the rest, and at least the lower one.
 
     Args:
-        found: Samples with ``input_angles_rad`` and ``error_rad``.
+        found: Samples, with the keys ``input_angles_rad`` and ``error_rad``.
         design: The drive.
     """
     theta, error = (np.array(found[key]) for key in ("input_angles_rad", "error_rad"))

@@ -1,4 +1,4 @@
-"""Catalogue-style spec sheet of a map, measured by the standard procedures."""
+"""Catalogue-style spec sheet of a map, determined by the standard procedures."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RATING_KEYS = (
     "repeated_peak_Nm",
     "momentary_peak_Nm",
 )
-"""Figures from the ratings alone."""
+"""Keys of the figures that come from the ratings alone."""
 LOOP_KEYS = (
     "K1_Nm_rad",
     "K2_Nm_rad",
@@ -44,7 +44,7 @@ LOOP_KEYS = (
     "hysteresis_loss_arcmin",
     "lost_motion_arcmin",
 )
-"""Figures from the torque loop with the input locked."""
+"""Keys of the figures from the torque loop with the input locked."""
 TURN_KEYS = (
     "transmission_accuracy_arcmin",
     "transmission_accuracy_rated_arcmin",
@@ -52,14 +52,14 @@ TURN_KEYS = (
     "ripple_pp_percent",
     "orders",
 )
-"""Figures from one output turn."""
+"""Keys of the figures from one output turn."""
 _NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
 SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
-"""Figures of the 3D finite elements of a design, which no map contains."""
+"""Keys of figures from the 3D finite elements of a design, which no map contains."""
 RATCHETING_KEY = "ratcheting_torque_Nm"
-"""Figure of the 2D finite elements of a design."""
+"""Key of the figure from the 2D finite elements of a design."""
 SLOW_KEYS = ("no_load_running_torque_Nm", "starting_torque_Nm")
-"""Figures from tooth and bearing-race friction of a slowly turning design."""
+"""Keys of figures that tooth and race friction of a slowly turning design provide."""
 ABSENT_KEYS = {
     RATCHETING_KEY: "needs the 2D finite elements of a design, which take a minute or"
     " more: request it with --only",
@@ -70,16 +70,17 @@ ABSENT_KEYS = {
     "radial_stiffness_N_mm": "needs the finite elements of the flexspline; a map"
     " contains torque and torsion only",
 }
-"""Figures that no map provides, with the reason."""
+"""Keys of figures that no map provides, with the reason."""
 KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *LOSS_KEYS, *ABSENT_KEYS)
+"""All keys of the sheet, in its order."""
 
 _CURVE = 64
-"""Samples per period for a point of the efficiency curve."""
+"""Largest number of samples per period for a point of the efficiency curve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LossCurve:
-    """Efficiency over the load at several constant speeds."""
+    """Efficiency as a function of the load at several constant speeds."""
 
     load: Array
     """Output torque [N·m]. Shape (n,)."""
@@ -94,17 +95,18 @@ class SpecSheet:
     figures: dict[str, Any]
     """Value of every requested key; None if the source does not provide it."""
     missing: dict[str, str]
-    """Reason for every None."""
+    """Reason for each figure that is None, by key."""
     loop: TorqueLoop | None = None
+    """Torque loop; None if no requested key needs it."""
     turns: dict[str, Turn] = field(default_factory=dict)
     """Error [rad] for ``no_load`` and ``rated``, torque [N·m] for ``ripple``."""
     losses: LossCurve | None = None
-    """Efficiency over the load; None without friction or if it was not requested."""
+    """Efficiency curves; None without friction or if efficiency was not requested."""
     uncertain: dict[str, Difference] = field(default_factory=dict)
-    """Differences that make figures uncertain, by key; see :mod:`.map_validity`."""
+    """Difference from unseen solves that makes a figure uncertain, by its key."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Figures, then ``missing`` and ``uncertain``."""
+        """Figures by key, then ``missing`` and ``uncertain``, as JSON values."""
         uncertain = {key: one.to_json() for key, one in self.uncertain.items()}
         return {**self.figures, "missing": self.missing, "uncertain": uncertain}
 
@@ -112,8 +114,10 @@ class SpecSheet:
 def check_keys(only: Collection[str]) -> tuple[str, ...]:
     """The requested keys in the order of the sheet; all keys if empty.
 
+    ``wall_s``, which is not a figure, is accepted and not returned.
+
     Raises:
-        InputError: If the sheet lacks a key; the message has one line per unknown key.
+        InputError: If a key is unknown; the message has one line per unknown key.
     """
     wanted = set(only) - {"wall_s"}
     lines = []
@@ -128,12 +132,12 @@ def check_keys(only: Collection[str]) -> tuple[str, ...]:
 
 
 def needs_map(only: Collection[str]) -> bool:
-    """Whether any key is read from a map instead of the ratings alone."""
+    """Whether any key needs the torque loop or an output turn of a map."""
     return any(key in (*LOOP_KEYS, *TURN_KEYS) for key in check_keys(only))
 
 
 def needs_turn(only: Collection[str]) -> bool:
-    """Whether any key depends on more than one input angle."""
+    """Whether any key is a figure of an output turn."""
     return any(key in TURN_KEYS for key in check_keys(only))
 
 
@@ -145,24 +149,25 @@ def measure_spec(
     known: Mapping[str, float] | None = None,
     unknown: Mapping[str, str] | None = None,
 ) -> SpecSheet:
-    """Run the test procedures that the requested keys need, and no others.
+    """The requested figures; only the test procedures that they need are run.
 
     Stiffness, hysteresis loss and lost motion come from a torque loop to the repeated
     peak torque (at least 1.5 T2) with the input locked at zero. Transmission accuracy
     is the peak to peak of the transmission error over one output turn in one direction,
     without load and at rated torque. Ripple is the torque with the output held on its
-    ideal motion at rated torque, in percent of rated. Orders are per input turn, their
-    amplitudes zero to peak. For the losses see
-    :mod:`swgjoint.maps.sheet.friction_running`; running torque and efficiency apply to
-    2000 rpm of the input, efficiency to rated torque.
+    ideal motion at rated torque, in percent of rated torque. Orders are per input turn,
+    with zero-to-peak amplitudes. For the losses see
+    :mod:`swgjoint.maps.sheet.friction_running`; running torque and efficiency apply at
+    an input speed of 2000 rpm, efficiency at rated torque.
 
     Args:
         drive: The map; may be None if :func:`needs_map` is false.
-        ratings: Ratings; those of the map if None, required without a map.
+        ratings: Ratings; those of the map if None. Required without a map.
         only: Keys of the sheet; all if empty.
-        known: Values from other computations, for :data:`SOLID_KEYS` and
+        known: Figures from other computations, by key: those of :data:`SOLID_KEYS` and
             :data:`RATCHETING_KEY`.
-        unknown: Reasons why such values are missing, also for :data:`SLOW_KEYS`.
+        unknown: Reasons why such figures are missing, by key; also for those of
+            :data:`SLOW_KEYS`.
 
     Raises:
         InputError: If a key is unknown.
@@ -197,7 +202,7 @@ def measure_spec(
             _loss_figures(drive, keys, values, missing)
             if "efficiency_percent" in keys:
                 losses = _loss_curve(drive)
-        # the reason stated by the source is the most specific one
+        # a reason stated by the source of the map is more specific
         stated = drive.info.get("missing")
         if isinstance(stated, dict):
             missing |= {k: str(stated[k]) for k in missing if k in stated}
@@ -224,6 +229,7 @@ def _loop_figures(
     values: dict[str, Any],
     missing: dict[str, str],
 ) -> None:
+    """Add the figures of the torque loop, or the reasons why they are missing."""
     T3 = largest_torque(r)
     for k, (low, high) in enumerate(((0.0, r.T1), (r.T1, r.T2), (r.T2, T3)), 1):
         value = loop.stiffness(low, high)
@@ -243,6 +249,7 @@ def _loop_figures(
 
 
 def _turns(drive: Potential, keys: Collection[str]) -> dict[str, Turn]:
+    """Output turns that the keys need; empty if the map has no harmonics."""
     if len(drive.orders) == 1:
         return {}
     rated = drive.ratings.rated_torque
@@ -265,6 +272,7 @@ def _turn_figures(
     values: dict[str, Any],
     missing: dict[str, str],
 ) -> None:
+    """Add the figures of the output turns, or the reasons why they are missing."""
     if not turns:
         reason = "the map has no harmonics of the gear angles"
         missing |= dict.fromkeys(TURN_KEYS, reason)
@@ -303,6 +311,7 @@ def _loss_figures(
     values: dict[str, Any],
     missing: dict[str, str],
 ) -> None:
+    """Add the requested losses of a map with friction."""
     if "no_load_running_torque_Nm" in keys:
         values["no_load_running_torque_Nm"] = no_load_running_torque(drive)
     if "starting_torque_Nm" in keys:
@@ -318,6 +327,7 @@ def _loss_figures(
 
 
 def _loss_curve(drive: Potential) -> LossCurve:
+    """Efficiency up to repeated peak torque at a quarter and all of the test speed."""
     load = np.linspace(0.0, drive.ratings.repeated_peak, 25)
     return LossCurve(
         load=load[1:],
@@ -331,7 +341,11 @@ def _loss_curve(drive: Potential) -> LossCurve:
 
 
 def spec_sheet(drive: Potential, only: Collection[str] = ()) -> dict[str, Any]:
-    """Figures, ``missing``, ``uncertain``, ``validity``, ``validation``, ``wall_s``.
+    """The spec sheet of a map as JSON values: figures and records by key.
+
+    In addition to the figures it contains ``design`` (the name of the map),
+    ``missing``, ``uncertain``, ``validity``, ``validation``, ``validation_reason`` and
+    ``wall_s`` [s].
 
     Args:
         drive: The map.
@@ -351,9 +365,10 @@ def spec_sheet(drive: Potential, only: Collection[str] = ()) -> dict[str, Any]:
 def validity(drive: Potential) -> dict[str, Any]:
     """Level of the map, its torque range, and whether the loop exceeds this range.
 
-    ``kinematic_error``, ``hysteresis`` and ``friction`` state their sources. Figures of
-    an output turn (accuracy, ripple) exclude hysteresis and friction; the loop excludes
-    friction.
+    ``torque_range_Nm`` includes the yield torques of the hysteresis elements.
+    ``kinematic_error``, ``hysteresis`` and ``friction`` state the sources of these
+    parts of the map. Figures of an output turn (accuracy, ripple) exclude hysteresis
+    and friction; figures of the loop exclude friction.
     """
     low, high = drive.torque_range
     slipping = sum(element.yield_torque for element in drive.hysteresis)

@@ -1,4 +1,4 @@
-"""Figures of a spec sheet that are uncertain by the validation of the map."""
+"""Figures of a spec sheet that the validation of the map shows to be uncertain."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ if TYPE_CHECKING:
     from swgjoint.maps.potential import Potential
 
 RIPPLE_KEYS = ("ripple_rms_percent", "ripple_pp_percent")
+"""Keys of the figures that are removed if the ripple is not valid."""
 STIFFNESS_KEYS = ("K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad")
+"""Keys of the figures to which the difference of the secant stiffness applies."""
 
 
 def judge_figures(
     drive: Potential, values: dict[str, Any], missing: dict[str, str]
 ) -> dict[str, Difference]:
-    """Judge figures by the validation of the map at the torque where they are read.
+    """Differences from unseen solves that make figures uncertain, by key of the figure.
 
-    A ripple above :data:`~swgjoint.maps.sheet.map_validity.LIMIT` is removed from
-    ``values``, and ``missing`` gives the reason.
+    Ripple and transmission accuracy are judged at the torque at which they are read,
+    K1 to K3 by the largest difference of the secant stiffness at any torque. If the
+    difference at rated torque exceeds :data:`~swgjoint.maps.sheet.map_validity.LIMIT`,
+    the ripple figures are removed from ``values``, and ``missing`` gives the reason.
 
     Args:
         drive: The map.
         values: Figures by key, modified in place.
         missing: Reasons by key, modified in place.
-
-    Returns:
-        Differences that make figures uncertain, by key.
     """
     record, _ = map_validation(drive)
     if record is None:

@@ -1,4 +1,4 @@
-"""One output turn of a map: transmission error, accuracy, ripple, order spectrum."""
+"""One output turn of a map: transmission error, ripple and order spectrum."""
 
 from __future__ import annotations
 
@@ -16,37 +16,38 @@ from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 PER_WAVE = 16
-"""Samples per shortest strong wave. With a parabola through each extreme the
-peak-to-peak value is then accurate to 0.1 %."""
+"""Samples per shortest strong wave. With a parabola through each extreme, the peak to
+peak is then accurate to 0.1 %."""
 STRONG = 0.1
-"""A wave is strong if it reaches this fraction of the largest one. A weaker wave needs
-fewer samples, by the square root of its size, for the same peak-to-peak error."""
+"""A wave is strong if it reaches this fraction of the largest one [-]. For the same
+error of the peak to peak, weaker waves need fewer samples, in proportion to the square
+root of their size."""
 AT_LEAST_PER_WAVE = 4
-"""Samples per shortest wave of all, so that none is aliased."""
+"""Smallest number of samples per shortest wave, strong or not, to avoid aliasing."""
 AT_LEAST = 64
 """Smallest number of samples per period."""
 CHUNK = 4096
 """Number of positions evaluated at once."""
 MAX_SAMPLES = 10_000_000
+"""Largest number of samples per period."""
 LINES = 12
-"""Number of orders that a sheet lists."""
+"""Largest number of orders that a sheet lists for each signal."""
 FLOOR = 1e-3
-"""Lines below this fraction of the strongest one are omitted."""
+"""Lines below this fraction of the strongest one of a signal are omitted [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Turn:
-    """A periodic signal of the gear over its period, known for the whole output turn.
+    """A periodic signal of the gear, sampled over its period.
 
-    The period is one cycle of the pattern if the pattern depends on the input angle
-    alone; otherwise it is the number of turns after which all members return to their
-    initial position.
+    The period is one cycle of the pattern if the pattern depends only on the input
+    angle. Otherwise all members have returned to their initial positions after it.
     """
 
     period_turns: Fraction
     """Length of the period [input turns]."""
     turns: float
-    """Input turns of one output turn."""
+    """Input turns per output turn [-]."""
     signal: Array
     """Signal at equal steps over the period, its end excluded. Shape (n,)."""
 
@@ -66,7 +67,7 @@ class Turn:
         n = self.signal.size
         step = float(self.period_turns) / n
         turn = self.signal[: min(n, round(self.turns / step) + 1)]
-        # one more sample at each end, so that extremes at the ends have two neighbours
+        # with one more sample at each end, extremes at the ends have two neighbours
         closed = np.concatenate([self.signal[-1:], turn, [self.signal[turn.size % n]]])
         return _peak(closed) + _peak(-closed)
 
@@ -75,14 +76,14 @@ class Turn:
         return float(np.std(self.signal))
 
     def lines(self) -> tuple[Array, Array]:
-        """Orders per input turn and amplitudes (zero to peak), without the mean."""
+        """Orders per input turn and zero-to-peak amplitudes, without the mean."""
         amplitude = 2.0 * np.abs(np.fft.rfft(self.signal)) / self.signal.size
         order = np.arange(amplitude.size) / float(self.period_turns)
         return order[1:], amplitude[1:]
 
 
 def _peak(values: Array) -> float:
-    """Largest value, by the parabola through it and its neighbours."""
+    """Largest value, interpolated by a parabola through it and its neighbours."""
     k = int(np.argmax(values[1:-1])) + 1
     a, b, c = (float(v) for v in values[k - 1 : k + 2])
     bend = a - 2.0 * b + c
@@ -90,13 +91,13 @@ def _peak(values: Array) -> float:
 
 
 def period_of(drive: Potential) -> tuple[Fraction, int]:
-    """Period of a map's pattern [input turns] and the samples that resolve its orders.
+    """Period of the pattern of a map [input turns] and number of samples to resolve it.
 
     Raises:
         ComputationError: If more than :data:`MAX_SAMPLES` would be needed.
     """
     n_theta, n_psi = drive.angle_orders.T
-    # an exact ratio gives the input turns of whole output turns
+    # the exact ratio gives the input turns in which the output makes whole turns
     ratio = Fraction(drive.ratio).limit_denominator(drive.teeth_circular_spline)
     if not n_psi.any():
         period = Fraction(1, gcd(*(int(n) for n in n_theta)) or 1)
@@ -119,7 +120,7 @@ def period_of(drive: Potential) -> tuple[Fraction, int]:
 
 
 def _strengths(drive: Potential) -> Array:
-    """Error of each harmonic plus the torsion of its torque [rad]. (n_harmonics,)."""
+    """Error of each harmonic plus torsion due to its torque [rad]. (n_harmonics,)."""
     size = np.hypot(*drive.kinematic_error.T)
     torsions = [drive.mean_torsion(s * drive.ratings.rated_torque) for s in (-1, 0, 1)]
     torque = np.hypot(*np.moveaxis(drive.coefficients(torsions, 1), -1, 0))
@@ -130,6 +131,7 @@ def _strengths(drive: Potential) -> Array:
 
 
 def _input_angles(drive: Potential) -> tuple[Fraction, Array]:
+    """Period of the pattern [input turns] and the input angles that sample it [rad]."""
     period, samples = period_of(drive)
     return period, 2.0 * pi * float(period) * np.arange(samples) / samples
 
@@ -137,8 +139,8 @@ def _input_angles(drive: Potential) -> tuple[Fraction, Array]:
 def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
     """Transmission error psi - theta/i [rad] at constant output torque [N·m].
 
-    The motion is slow and in one direction. Without load this is the kinematic error,
-    shifted by the cogging of the unloaded drive.
+    The motion is slow and in one direction. Without load this is the kinematic error
+    plus the small torsion due to the cogging of the unloaded drive.
 
     Args:
         drive: The map.
@@ -153,8 +155,8 @@ def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
 def ripple_turn(drive: Potential, torque: float) -> Turn:
     """Output torque with the output held on its ideal motion [N·m].
 
-    psi = theta/i minus the mean torsion at the given torque: the output follows the
-    ratio exactly, like a stiff load that turns at constant speed.
+    The output angle is theta/i minus the mean torsion at the given torque: the output
+    follows the ratio exactly, as with a stiff load that turns at constant speed.
 
     Args:
         drive: The map.
@@ -169,7 +171,7 @@ def ripple_turn(drive: Potential, torque: float) -> Turn:
 
 
 def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
-    """A quantity at many input angles, evaluated in chunks."""
+    """A quantity at many input angles, evaluated in chunks; ``of`` returns it."""
     parts = [
         of(IdealMotion.from_map(drive, theta[k : k + CHUNK]))
         for k in range(0, theta.size, CHUNK)
@@ -178,14 +180,14 @@ def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -
 
 
 def strongest_orders(turns: dict[str, Turn]) -> list[dict[str, float]]:
-    """Spectral lines of several signals of one drive, strongest of the first one first.
+    """Spectral lines of several signals of one drive.
 
     Args:
         turns: Signals by key, in the units of the result.
 
     Returns:
-        At most :data:`LINES` lines per signal: ``order`` per input turn and the
-        amplitude (zero to peak) of every signal at that order.
+        At most :data:`LINES` lines per signal, the strongest of the first signal first:
+        ``order`` per input turn and the zero-to-peak amplitude of every signal there.
     """
     spectra = {key: turn.lines() for key, turn in turns.items()}
     lines: dict[int, None] = {}

@@ -1,4 +1,4 @@
-"""Entries of a result on the validation of its map."""
+"""Entries of a result that report the validation of its map."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ def validation_of_map(drive: Potential) -> dict[str, Any]:
 
 
 def validation_of_sheet(drive: Potential | None, keys: Sequence[str]) -> dict[str, Any]:
-    """The same entries for a spec sheet, with notes only if a key depends on ripple.
+    """The entries of :func:`validation_of_map` for a spec sheet.
+
+    An unusable record is always noted. Otherwise there are notes only if a key is a
+    figure of an output turn: the warnings or, without any, a summary of the validation.
 
     Args:
         drive: The map; None if no key needs one.

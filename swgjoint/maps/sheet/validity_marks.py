@@ -1,8 +1,8 @@
-"""Marks of figures that depend on a map which differs from unseen solves.
+"""Marks for figures that are uncertain because a map differs from unseen solves.
 
 The figures of a joint (see :func:`swgjoint.sim.figures.metrics.joint_metrics`) and the
-rows of a comparison contain the differences of the map under ``map_difference`` and
-``ripple_valid``.
+rows of a comparison contain the differences of the map as ``map_difference``, and
+whether they are acceptable as ``ripple_valid``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ UNCERTAIN, NOT_VALID = "~", "!"
 
 
 def mark(largest: float | None) -> str:
-    """Mark of a figure that depends on a quantity with this relative difference."""
+    """Mark of a figure that depends on a quantity with this relative difference [-]."""
     if largest is None or largest <= WARNING:
         return ""
     return UNCERTAIN if largest <= LIMIT else NOT_VALID
@@ -34,9 +34,9 @@ def mark(largest: float | None) -> str:
 def joint_doubt(
     joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> Difference | None:
-    """The largest difference of a joint's map if it exceeds :data:`WARNING`.
+    """The largest difference of the map of a joint if it exceeds :data:`WARNING`.
 
-    None also if the run does not report the ripple of the joint.
+    None if it does not, or if the run does not report the ripple of the joint.
 
     Args:
         joint: Figures of a joint from ``joint_metrics``.
@@ -53,10 +53,10 @@ def joint_doubt(
 
 
 def error_mark(joint: Mapping[str, Any], value: float) -> str:
-    """Mark of a peak to peak of the transmission error.
+    """Mark of a peak-to-peak transmission error.
 
-    The torsion under a varying load adds to this figure, so the difference is taken
-    relative to the displayed figure.
+    This figure includes the torsion under a varying load, so the difference of the map
+    is taken relative to the displayed value.
 
     Args:
         joint: Figures of a joint from ``joint_metrics``.
@@ -71,7 +71,13 @@ def error_mark(joint: Mapping[str, Any], value: float) -> str:
 
 
 def joints_judged(joints: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """``ripple_valid`` and ``map_difference`` of the worst of several joints."""
+    """``ripple_valid`` and ``map_difference`` of several joints, the worst of each.
+
+    Both are None if no run reports the ripple of a joint.
+
+    Args:
+        joints: Figures of joints from ``joint_metrics``.
+    """
     judged = [joint for joint in joints if joint["ripple_valid"] is not None]
     if not judged:
         return {"ripple_valid": None, "map_difference": None}
@@ -90,7 +96,7 @@ def joints_judged(joints: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
 def joint_mark(
     joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> str:
-    """Mark of a figure of a joint; empty if the figure is certain.
+    """Mark of a figure of a joint; empty if the figure is not uncertain.
 
     Args:
         joint: Figures of a joint from ``joint_metrics``.
@@ -106,7 +112,7 @@ def worst(marks: Collection[str]) -> str:
 
 
 def mark_legend(marks: Collection[str]) -> str:
-    """Legend of the marks that occur."""
+    """Legend of the given marks."""
     meaning = {
         UNCERTAIN: f"uncertain, the map differs by more than {percent(WARNING)}",
         NOT_VALID: f"not valid, the map differs by more than {percent(LIMIT)}",
