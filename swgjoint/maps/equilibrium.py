@@ -123,6 +123,7 @@ def _bisect(
     """Output angle by bisection to round-off, where stiffness vanishes or jumps."""
 
     def excess(psi: Array) -> Array:
+        """Torque of the drive minus the given torque [N·m]."""
         return _torque(drive, theta, psi, sliders)[0] - torque
 
     ends = []

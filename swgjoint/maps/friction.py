@@ -23,8 +23,8 @@ In the present model the power :math:`F\nu` is the rate of change of
 \eta\nu^2`. No term of this sum is negative, however f >= 0 varies. The slider, of speed
 :math:`\nu - \dot z`, moves only in the direction in which the bristle pulls it, also
 when a shrinking reach makes it slip. The damping sigma_1 acts only while the bristle
-sticks, so that :math:`\dot z = \nu`. The model is therefore unconditionally passive.
-Below f it is a spring without creep.
+sticks, so that :math:`\dot z = \nu`. The model is therefore unconditionally passive. At
+rest below f it is a spring without creep.
 
 Source:
     Dupont, Hayward, Armstrong, Altpeter (2002), "Single state elastoplastic friction

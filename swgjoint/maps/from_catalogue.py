@@ -46,6 +46,7 @@ CORNER |K'/K - 1|/4, which is less than 1 % for every shipped row."""
 LOBES = 2
 """Number of lobes, equal to the difference of the tooth counts."""
 SLOPES = ("K1", "K2", "K3")
+"""Keys of the slopes in the result of ``stiffness_of``."""
 CLOSE = 1e-4
 """Relative tolerance of the slopes and the hysteresis loss of the loop."""
 ROUNDS = 50

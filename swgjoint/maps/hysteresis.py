@@ -106,6 +106,7 @@ class Sliders:
         return np.asarray(0.5 * self._stretch(torsion) ** 2 @ self.stiffness)
 
     def _stretch(self, torsion: ArrayLike) -> Array:
+        """Stretch of each element after a monotone path to each torsion (..., n)."""
         x = np.asarray(torsion, float)[..., None]
         return np.asarray(np.clip(x - self.rest, -self.reach, self.reach))
 

@@ -32,6 +32,7 @@ class IdealMotion:
     """Polynomials of the torsion at n input angles, summed over the harmonics."""
 
     drive: Potential
+    """The full map."""
     theta: Array
     """Input angles [rad]. Shape (n,)."""
     error: Array
@@ -105,7 +106,8 @@ class IdealMotion:
             torque: Torque T on the output [N·m].
 
         Raises:
-            ComputationError: If the map reaches the torque at no output angle.
+            ValueError: If the mean torsion curve does not reach the torque.
+            ComputationError: If the map reaches it at no output angle.
         """
         drive = self.drive
         shift = self.error[0] - (drive.mean_torsion(torque) if torque else 0.0)

@@ -76,14 +76,15 @@ def sound_info(info: dict[str, Any], *, name: str) -> dict[str, Any]:
     ]
     if wrong:
         warnings.warn(
-            f"map {name[:60]!r}: info {', '.join(wrong)} ignored: its type differs from"
-            " that written by swgjoint; the drive itself is not affected",
+            f"map {name[:60]!r}: info {', '.join(wrong)} ignored: the type differs from"
+            " the one that swgjoint writes; the drive itself is not affected",
             stacklevel=2,
         )
     return {key: value for key, value in info.items() if key not in wrong}
 
 
 def _fits(kind: TypeAdapter[Any], value: Any) -> bool:
+    """Whether a value has the required type."""
     try:
         kind.validate_python(value)
     except ValidationError:

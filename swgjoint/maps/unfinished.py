@@ -64,6 +64,7 @@ class Unfinished:
         keep(self._path(name), arrays_file(arrays))
 
     def _path(self, name: str) -> Path:
+        """File of a part."""
         return self.folder / f"{name}.npz"
 
     def clear(self) -> None:

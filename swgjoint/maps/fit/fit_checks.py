@@ -104,10 +104,10 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
 
     Returns:
         ``input_torque_pp_Nm``: peak to peak of the simulated ripple, the largest of all
-        torques; ``input_torque_error_Nm``: largest deviation of the ripple of the map;
-        ``relative``: largest ratio of this deviation to the peak to peak at the same
-        torque; ``strain_energy_relative``: largest deviation of the energy gained from
-        the unloaded state, relative to the largest gain.
+        torques; ``input_torque_error_Nm``: largest deviation of the map from the
+        ripple; ``relative``: largest ratio of the deviation to the peak to peak at the
+        same torque; ``strain_energy_relative``: largest deviation of the energy gained
+        from the unloaded state, relative to the largest gain.
     """
     theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])

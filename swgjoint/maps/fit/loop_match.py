@@ -1,4 +1,4 @@
-"""Spring and elements whose loop has the hysteresis loss and lost motion measured.
+"""Spring and elements that reproduce a measured hysteresis loss and lost motion.
 
 A least-squares fit approximates a loop as a whole. Parallel elements have a constant
 width in torque, whereas a loop of constant width in torsion is wider in torque where

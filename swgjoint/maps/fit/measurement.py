@@ -25,9 +25,9 @@ from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
 
 LEG_STEPS = 2.0
-"""Smallest accepted mean number of steps between reversals of the torque. It is 1.5 for
-rows in random order, because two thirds of random numbers are local extremes, and much
-larger for rows in order of time."""
+"""Smallest accepted mean number of steps between reversals of the torque. The mean is
+1.5 for rows in random order, because two thirds of random numbers are local extremes,
+and much larger for rows in order of time."""
 # accepted column names of each quantity, with the factor to SI
 TORQUE = {"torque_Nm": 1.0}
 TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}

@@ -101,12 +101,12 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
 
     The fit is a bounded linear least-squares problem in the torque of the samples: for
     a given yield torsion, the torque of an element along the record is its yield torque
-    times a known signal. Samples enter the fit once the torsion has travelled twice the
-    largest yield torsion, after which the start of the record no longer affects the
-    elements. Elements are kept if they reduce the residual by more than noise could. A
-    record with one direction of the torque has none. A loop of another kind, such as
-    one whose width in torque is smallest in the middle, leaves a residual, which the
-    report states.
+    times a known signal. Samples enter the fit once the record has covered a torsion
+    range of twice the largest yield torsion, after which its start no longer affects
+    the elements. Elements are kept if they reduce the residual by more than noise
+    could. A record with one direction of the torque has none. A loop of another kind,
+    such as one whose width in torque is smallest in the middle, leaves a residual,
+    which the report states.
 
     Args:
         loop: Measured loop with both signs of the torque.

@@ -26,6 +26,7 @@ def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     at = (inside[:, None] >= torsion[None, 1:-1]).sum(axis=1)
 
     def ends(values: Array) -> tuple[Array, Array]:
+        """Values at both ends of the interval of each knot."""
         return (
             np.take_along_axis(values, at, axis=0),
             np.take_along_axis(values, at + 1, axis=0),

@@ -332,12 +332,14 @@ def _total(content: Mapping[str, Any], key: str) -> Difference:
 
 
 def _table(value: Any, where: str) -> Mapping[str, Any]:
+    """The value if it is a table."""
     if not isinstance(value, Mapping):
         raise _Fault(f"{where} is {_short(value)}; accepted: a table")
     return value
 
 
 def _number(table: Mapping[str, Any], key: str, where: str) -> float:
+    """A finite number of a table."""
     value = table.get(key)
     if isinstance(value, int | float) and not isinstance(value, bool):
         # an integer in a file may be too large for a float
@@ -347,6 +349,7 @@ def _number(table: Mapping[str, Any], key: str, where: str) -> float:
 
 
 def _share(table: Mapping[str, Any], key: str, where: str) -> float:
+    """A number of a table that is not negative."""
     value = _number(table, key, where)
     if value < 0.0:
         raise _Fault(f"{where}.{key} is {value:g}; accepted: >= 0")
@@ -354,10 +357,12 @@ def _share(table: Mapping[str, Any], key: str, where: str) -> float:
 
 
 def _known_share(table: Mapping[str, Any], key: str, where: str) -> float | None:
+    """A number of a table that is not negative; None if it is absent."""
     return None if table.get(key) is None else _share(table, key, where)
 
 
 def _text(value: Any) -> str:
+    """A reason as one line of limited length."""
     if not isinstance(value, str):
         raise _Fault(f".reason is {_short(value)}; accepted: a string")
     return " ".join(value.split())[:400]
