@@ -159,7 +159,7 @@ def with_stated_error(
     if wanted is None:
         wanted = drive.info["stated"]["transmission_accuracy_arcmin"]
     if wanted is None:
-        label = f"none: the tables state no transmission accuracy of {drive.name}"
+        label = f"none: the tables state no transmission accuracy for {drive.name}"
         return replace(drive, info={**drive.info, "kinematic_error": label})
     return with_assumed_error(drive, wanted * arcmin, seed=seed, joint=joint)
 
@@ -168,7 +168,7 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
     """The map of a row without kinematic error."""
     s = stiffness_of(row.size, row.ratio)
     stated = stated_figures(row)
-    origin = "" if row.series == "CSG" else f", as the tables have none of {row.series}"
+    origin = "" if row.series == "CSG" else f"; the tables have no {row.series} ratings"
     teeth = LOBES * row.ratio
     drive = cls(
         name=row.name,
@@ -298,8 +298,8 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
         )
 
     no_losses = (
-        "the map has no friction: the catalogue tables state losses for component sets"
-        " of ratio 100, sizes 14 to 25"
+        "the map has no friction: the catalogue tables state losses only for component"
+        " sets of ratio 100, sizes 14 to 25"
     )
     bound = f"{_NO_ERROR}; {stated_as('transmission_accuracy_arcmin')}"
     return {

@@ -131,8 +131,8 @@ def with_assumed_error(
         return drive
     if drive.kinematic_error[1:].any():
         raise InputError(
-            f"kinematic_error_arcmin {wanted:g} for map {drive.name!r}, which already"
-            " has one; accepted: 0, or leave it out"
+            f"kinematic_error_arcmin {wanted:g} for map {drive.name!r}, which has its"
+            " own error; accepted: 0 or no value"
         )
     rng = np.random.default_rng([seed, crc32(joint.encode())] if joint else seed)
     share = float(rng.uniform(*SHARE))

@@ -243,7 +243,7 @@ def _loop_figures(
         missing["hysteresis_loss_arcmin"] = (
             "the torque loop is conservative: the map has no hysteresis"
             if not drive.hysteresis
-            else "the hysteresis of the map does not slip within this loop"
+            else "the hysteresis elements of the map do not slip within this loop"
         )
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 
