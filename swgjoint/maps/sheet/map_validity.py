@@ -115,7 +115,7 @@ class MapValidation:
     solves: int
     """Number of unseen solves."""
     torques: tuple[float, ...]
-    """Torques at which the map was not sampled, increasing [N·m]."""
+    """Torques of the unseen solves, increasing [N·m]."""
     totals: dict[str, Difference]
     """Largest difference of each quantity, by key."""
     rows: dict[str, Rows]
