@@ -8,7 +8,7 @@ from swgjoint.drives.fidelity import default_model
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
-from swgjoint.fe.plane.friction_loop import friction_loops
+from swgjoint.fe.plane.figures.friction_loop import friction_loops
 from swgjoint.fe.rings import sampling as thin_ring
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS

@@ -247,7 +247,7 @@ class _Figures:
         """Add the ratcheting torque, or the lower bound at which the search ended."""
         if RATCHETING_KEY not in keys:
             return
-        from swgjoint.fe.plane.ratcheting import ratcheting_path
+        from swgjoint.fe.plane.figures.ratcheting import ratcheting_path
 
         path = recall(
             "figures",

@@ -14,8 +14,8 @@ from swgjoint.cli.main import main
 from swgjoint.drives import build_map as builder
 from swgjoint.drives.references import load_drive
 from swgjoint.errors import DesignError, Outcome
-from swgjoint.fe.plane import ratcheting
-from swgjoint.fe.plane.ratcheting import RatchetingPath
+from swgjoint.fe.plane.figures import ratcheting
+from swgjoint.fe.plane.figures.ratcheting import RatchetingPath
 from swgjoint.fe.rings import running as ring_running
 from swgjoint.fe.rings.running import RunningFriction
 from swgjoint.fe.solid.figures import spec_figures

@@ -13,10 +13,14 @@ from solved import kept
 import swgjoint.drives.build_map as building
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
-from swgjoint.fe.plane import friction_loop
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
-from swgjoint.fe.plane.friction_loop import FIRST_STEPS, friction_loops, loop_torques
+from swgjoint.fe.plane.figures import friction_loop
+from swgjoint.fe.plane.figures.friction_loop import (
+    FIRST_STEPS,
+    friction_loops,
+    loop_torques,
+)
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished

@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.plane.ratcheting import RatchetingPath, ratcheting_path
+from swgjoint.fe.plane.figures.ratcheting import RatchetingPath, ratcheting_path
 from swgjoint.gear.design.design import Design
 
 OVAL = {"circular_spline.outer_rim": "free", "mesh.refinement": 0.6}

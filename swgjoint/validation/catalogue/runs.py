@@ -107,7 +107,7 @@ def _path(task: CatalogueTask) -> Found:
 
 def _ratcheting(task: CatalogueTask) -> Found:
     """Ratcheting torque of the 2D model, with the mounting of the circular spline."""
-    from swgjoint.fe.plane.ratcheting import ratcheting_path
+    from swgjoint.fe.plane.figures.ratcheting import ratcheting_path
 
     return ratcheting_path(task.design).as_dict()
 
