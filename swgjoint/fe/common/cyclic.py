@@ -25,25 +25,37 @@ class Insides:
         Raises:
             SingularCyclicError: If an interior block is singular.
         """
-        n = blocks.shape[1]
+        n_sectors, n = blocks.shape[:2]
+        size = 2 * face
         self._face = face
-        self._inner = inner = slice(face, n - face)
-        self._outer = outer = np.r_[0:face, n - face : n]
+        self._inner = slice(face, n - face)
+        self._outer = np.r_[0:face, n - face : n]
+        self._inverse = np.empty((n_sectors, n - size, n - size))
+        self._reach = np.empty((n_sectors, n - size, size))
+        self.schur = np.empty((n_sectors, size, size))
+        """Schur complement of each sector on its two faces (N, 2 face, 2 face)."""
+        self.update(blocks, np.arange(n_sectors))
+
+    def update(self, blocks: Array, changed: Index) -> None:
+        """Eliminate the interior unknowns of some sectors anew, in place.
+
+        Args:
+            blocks: All sector matrices after the change (N, n, n).
+            changed: Sectors whose matrices changed (k,).
+
+        Raises:
+            SingularCyclicError: If an interior block is singular.
+        """
+        inner, outer = self._inner, self._outer
         try:
-            self._inverse = np.linalg.inv(blocks[:, inner, inner])
+            self._inverse[changed] = np.linalg.inv(blocks[changed, inner, inner])
         except np.linalg.LinAlgError as error:
             raise SingularCyclicError from error
         # sector by sector: products of all sectors at once would not fit in the cache
-        size = 2 * face
-        self._reach = np.empty((len(blocks), n - size, size))
-        self.schur = np.empty((len(blocks), size, size))
-        """Schur complement of each sector on its two faces (N, 2 face, 2 face)."""
-        for block, inverse, reach, schur in zip(
-            blocks, self._inverse, self._reach, self.schur, strict=True
-        ):
-            columns = block[:, outer]
-            np.matmul(inverse, columns[inner], out=reach)
-            np.subtract(columns[outer], columns[inner].T @ reach, out=schur)
+        for k in changed:
+            columns, reach = blocks[k][:, outer], self._reach[k]
+            np.matmul(self._inverse[k], columns[inner], out=reach)
+            np.subtract(columns[outer], columns[inner].T @ reach, out=self.schur[k])
 
     def face_loads(self, rhs: Array) -> Array:
         """Right-hand sides of the faces (N, face, k) from those of sectors (N, n, k).
@@ -92,10 +104,25 @@ class CyclicFactor:
         Raises:
             SingularCyclicError: If a pivot vanishes.
         """
-        n_sectors = len(blocks)
-        self._face, self._sectors = face, n_sectors
+        self._face, self._sectors = face, len(blocks)
         self._insides = Insides(blocks, face)
-        schur = self._insides.schur
+        self._factorise_faces()
+
+    def update(self, blocks: Array, changed: Index) -> None:
+        """Factorise the ring anew after a change of some sectors, in place.
+
+        Args:
+            blocks: All sector matrices after the change (N, n, n).
+            changed: Sectors whose matrices changed (k,).
+
+        Raises:
+            SingularCyclicError: If a pivot vanishes.
+        """
+        self._insides.update(blocks, changed)
+        self._factorise_faces()
+
+    def _factorise_faces(self) -> None:
+        n_sectors, face, schur = self._sectors, self._face, self._insides.schur
         order = np.empty(n_sectors, dtype=np.int64)
         order[0::2] = np.arange((n_sectors + 1) // 2)
         order[1::2] = n_sectors - 1 - np.arange(n_sectors // 2)

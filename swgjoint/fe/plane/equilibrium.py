@@ -20,12 +20,12 @@ from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised, linearise
 from swgjoint.fe.plane.newton_step import (
     Load,
+    NewtonProblem,
     NewtonStep,
-    solve_newton_step,
 )
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Mask
 
 CIRCULAR_SPLINE_RANGE = 0.2
 """Largest displacement of the circular spline for which its linear model is accepted,
@@ -88,15 +88,17 @@ class NewtonSolver:
                     contacts = linear.search.search(
                         linear.flank, reach, state.contacts, thorough=thorough
                     )
-                step = solve_newton_step(model, state, linear, load, contacts)
+                problem = NewtonProblem.from_candidates(
+                    model, state, linear, load, contacts
+                )
+                step = problem.solve()
                 for _ in range(self.exchanges):
-                    exchanged = _exchanged(state, linear, step, self.exchange_below)
-                    if exchanged is None:
+                    wrong = _stations_to_exchange(problem, step, self.exchange_below)
+                    if wrong is None:
                         break
-                    state, linear = exchanged
-                    step = solve_newton_step(
-                        model, state, linear, load, contacts, step.active
-                    )
+                    problem = problem.exchange(wrong)
+                    step = problem.solve(step.active)
+                state, linear = problem.state, problem.linear
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(
@@ -131,23 +133,22 @@ class NewtonSolver:
         return _finished(model, state, outcome, history, self.circular_spline_range)
 
 
-def _exchanged(
-    state: State, linear: Linearised, step: NewtonStep, below: float
-) -> tuple[State, Linearised] | None:
-    """Switch the contact state of the bore stations that a step closes or opens.
+def _stations_to_exchange(
+    problem: NewtonProblem, step: NewtonStep, below: float
+) -> Mask | None:
+    """Stations of the bore that a step closes or opens (N, q).
 
     Returns:
-        State and linearisation after the switch; None if no station switches, after too
-        large a step, or on a race, whose tangent depends on more than the stations.
+        None if no station switches, after too large a step, or on a race, whose
+        tangent depends on more than the stations.
     """
+    linear, state = problem.linear, problem.state
     if linear.race_rows is not None or not step.largest < below:
         return None
     bad = _wrong_stations(state, linear.gap_after(step.increment)) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():
         return None
-    return replace(state, touching=state.touching ^ bad), linear.exchange(
-        bad, state.touching
-    )
+    return np.asarray(bad)
 
 
 def _advance(

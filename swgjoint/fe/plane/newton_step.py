@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.common.friction import Sliding
-from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
+from swgjoint.fe.plane.force_lines import ForceLines
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.sector_model import SectorModel
@@ -89,26 +89,8 @@ class NewtonStep:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Condensed:
-    """The ring condensed to its n lines of force; n_dofs components per sector."""
-
-    lines: Contacts
-    """Lines of force."""
-    strips: Strips | None
-    """Indentation strips of the m candidates; None without indentation."""
-    rows: Array
-    """Derivatives of the gaps of the lines (n, n_dofs)."""
-    constraints: Array
-    """Directions of the anchor and gradient of the rotation (N, n_dofs, 2)."""
-    base: Array
-    """Displacement under the gradient without line forces (N, n_dofs) [m]."""
-    response: Array
-    """Displacement per line force, anchor force and multiplier (N, n_dofs, n + 2)."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _Solution:
-    """Unknowns of the condensed system, see :func:`solve_newton_step`."""
+    """Unknowns of the condensed system, see :class:`NewtonProblem`."""
 
     force: Array
     """Forces on the lines (n,) [N]."""
@@ -124,15 +106,9 @@ class _Solution:
     """Tangent compliance of the output, per torque of the model [rad/(N·m)]."""
 
 
-def solve_newton_step(
-    model: SectorModel,
-    state: State,
-    linear: Linearised,
-    load: Load,
-    contacts: Contacts,
-    pressing: Index | None = None,
-) -> NewtonStep:
-    """Condense a ring to its contact forces, solve for them and find the increment.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NewtonProblem:
+    """A ring linearised at a state and condensed to its contact forces.
 
     The condensed system g = q + M z has n + 3 unknowns z and as many rows:
 
@@ -154,134 +130,146 @@ def solve_newton_step(
     entries are k to k + 2. Without friction k = n = m. The last two unknowns are used
     only if the circular spline has a torque and if the rotation of the flexspline is
     prescribed, respectively.
-
-    Args:
-        model: The 2D model.
-        state: State at which the ring was linearised.
-        linear: The linearised ring.
-        load: Prescribed torque or rotation.
-        contacts: Candidates for tooth contact, m of them.
-        pressing: Candidates that carry force in the first guess; by default those on
-            flanks that carry force in the state, or else those that overlap.
-
-    Raises:
-        ActiveSetError: If no set of active contacts is found.
-        SingularCyclicError: If the tangent of the ring is singular.
     """
-    sliding = _friction_lines(model, state, contacts)
-    lines = contacts if sliding is None else sliding.lines
-    strips = _strips(model, state, contacts)
-    condensed = _condense(linear, lines, strips)
-    matrix = _condensed_matrix(model, linear, condensed)
-    offset = _condensed_offset(model, state, linear, load, condensed)
-    guess = _first_guess(state, contacts, offset, pressing)
-    solution = _solve_condensed(matrix, offset, sliding, guess, load)
-    return _substituted(model, state, linear, load, contacts, condensed, solution)
 
+    model: SectorModel
+    load: Load
+    """Prescribed torque or rotation."""
+    state: State
+    """State at which the ring was linearised."""
+    linear: Linearised
+    """The linearised ring."""
+    lines: ForceLines
+    factor: CyclicFactor
+    """Factors of the tangent."""
 
-def _friction_lines(
-    model: SectorModel, state: State, contacts: Contacts
-) -> Sliding | None:
-    """Normal and tangential lines of force; None without friction or candidates."""
-    if model.friction is None or not len(contacts):
-        return None
-    last = state.candidates or state.slip
-    return Sliding.from_trial(model.friction, contacts, state.slip, last)
+    @classmethod
+    def from_candidates(
+        cls,
+        model: SectorModel,
+        state: State,
+        linear: Linearised,
+        load: Load,
+        contacts: Contacts,
+    ) -> NewtonProblem:
+        """Condense a linearised ring.
 
+        Args:
+            model: The 2D model.
+            state: State at which the ring was linearised.
+            linear: The linearised ring.
+            load: Prescribed torque or rotation.
+            contacts: Candidates for tooth contact, m of them.
 
-def _strips(model: SectorModel, state: State, contacts: Contacts) -> Strips | None:
-    """Indentation strips of the candidates; None without indentation or candidates."""
-    if model.indentation is None or not len(contacts):
-        return None
-    held, force = state.contacts, state.tooth_force
-    return Strips.from_contacts(model.indentation, contacts, held, force)
-
-
-def _condense(linear: Linearised, lines: Contacts, strips: Strips | None) -> _Condensed:
-    """Solve the ring for its gradient and for unit loads on lines and constraints."""
-    n, rows = len(lines), linear.gap_gradient(lines)
-    levers = np.zeros((*linear.gradient.shape, n + 2))
-    levers[lines.sector, :, np.arange(n)] = rows
-    levers[:, :, n] = linear.anchor
-    levers[:, :, n + 1] = linear.rotation_gradient
-    columns = np.concatenate([-linear.gradient[:, :, None], levers], axis=2)
-    columns[linear.fixed] = 0.0
-    solved = CyclicFactor(linear.anchor_tangent(), linear.face_dofs).solve(columns)
-    return _Condensed(
-        lines=lines,
-        strips=strips,
-        rows=rows,
-        constraints=levers[:, :, n:],
-        base=solved[:, :, 0],
-        response=solved[:, :, 1:],
-    )
-
-
-def _condensed_matrix(
-    model: SectorModel, linear: Linearised, condensed: _Condensed
-) -> Array:
-    """Matrix M of the condensed system (n + 3, n + 3)."""
-    lines, strips, response = condensed.lines, condensed.strips, condensed.response
-    n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
-    # lines: compliance of the ring, of the loaded tooth, of the circular spline and
-    # of the indentation
-    driven = np.r_[0 : n + 1, n + 2]
-    matrix[np.ix_(np.arange(n), driven)] = np.einsum(
-        "kn,knl->kl", condensed.rows, response[lines.sector]
-    )
-    local = lines.weight @ model.element.flank_compliance
-    same = lines.sector[:, None] == lines.sector[None, :]
-    matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
-    circular_spline_compliance = model.circular_spline.compliance
-    if circular_spline_compliance is not None:
-        matrix[:n, :n] += circular_spline_compliance.contact_compliance(
-            lines.tooth, lines.circular_spline_weight, model.circular_spline_teeth
+        Raises:
+            SingularCyclicError: If the tangent of the ring is singular.
+        """
+        return cls(
+            model=model,
+            load=load,
+            state=state,
+            linear=linear,
+            lines=ForceLines.from_candidates(model, state, linear, contacts),
+            factor=CyclicFactor(linear.anchor_tangent(), linear.face_dofs),
         )
-    if strips is not None:
-        m = len(strips.strip)
-        matrix[:m, :m] += strips.compliance
-    # anchor and rotation of the flexspline
-    constrained = np.array([n, n + 2])
-    matrix[np.ix_(constrained, driven)] = np.einsum(
-        "snf,snl->fl", condensed.constraints, response
-    )
-    matrix[:n, constrained] = matrix[constrained, :n].T
-    matrix[n, n] -= 1.0 / linear.anchor_stiffness
-    # turning the circular spline towards the teeth closes the gap by the lever arm
-    arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
-    matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
-    return matrix
 
+    def exchange(self, stations: Mask) -> NewtonProblem:
+        """Invert the contact state of some bore stations of a rigid wave generator.
 
-def _condensed_offset(
-    model: SectorModel,
-    state: State,
-    linear: Linearised,
-    load: Load,
-    condensed: _Condensed,
-) -> Array:
-    """Offset q of the condensed system (n + 3,)."""
-    lines, strips, base = condensed.lines, condensed.strips, condensed.base
-    n, offset = len(lines), np.zeros(len(lines) + 3)
-    # gaps without the old tooth forces; the new forces bring their own share
-    local = lines.weight @ model.element.flank_compliance
-    old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
-    old += np.einsum(
-        "kb,kb->k",
-        lines.circular_spline_weight,
-        linear.circular_spline_elastic[lines.tooth],
-    )
-    moved = np.einsum("kn,kn->k", condensed.rows, base[lines.sector])
-    offset[:n] = lines.gap - old + moved
-    if strips is not None:
-        m = len(strips.strip)
-        offset[:m] += strips.offset
-    # anchor and rotation of the flexspline, torque on the circular spline
-    constrained = np.array([n, n + 2])
-    offset[constrained] = np.einsum("snf,sn->f", condensed.constraints, base)
-    offset[n + 1] = -(load.on_circular_spline or 0.0) / model.copies
-    offset[n + 2] += linear.rotation - (load.rotation or 0.0)
-    return offset
+        The factors are updated in place: this problem cannot be solved afterwards.
+
+        Args:
+            stations: Stations to switch (N, q).
+
+        Raises:
+            SingularCyclicError: If the tangent becomes singular.
+        """
+        touching = self.state.touching
+        linear = self.linear.exchange(stations, touching)
+        changed = np.flatnonzero(stations.any(axis=1))
+        self.factor.update(linear.anchor_tangent(), changed)
+        state = replace(self.state, touching=touching ^ stations)
+        return replace(self, state=state, linear=linear)
+
+    def solve(self, pressing: Index | None = None) -> NewtonStep:
+        """Solve for the contact forces and find the increment.
+
+        Args:
+            pressing: Candidates that carry force in the first guess; by default those
+                on flanks that carry force in the state, or else those that overlap.
+
+        Raises:
+            ActiveSetError: If no set of active contacts is found.
+        """
+        linear, lines = self.linear, self.lines
+        lines.loads[:, :, 0] = np.where(linear.fixed, 0.0, -linear.gradient)
+        solved = self.factor.solve(lines.loads)
+        base, response = solved[:, :, 0], solved[:, :, 1:]
+        matrix, offset = self._matrix(response), self._offset(base)
+        guess = _first_guess(self.state, lines.contacts, offset, pressing)
+        solution = _solve_condensed(matrix, offset, lines.sliding, guess, self.load)
+        loads = [*solution.force, solution.anchor, solution.multiplier]
+        return self._step(solution, base + response @ np.array(loads))
+
+    def _matrix(self, response: Array) -> Array:
+        """Matrix M (n + 3, n + 3) from displacements per load (N, n_dofs, n + 2)."""
+        lines, sector = self.lines.force, self.lines.force.sector
+        n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
+        driven = np.r_[0 : n + 1, n + 2]
+        matrix[np.ix_(np.arange(n), driven)] = np.einsum(
+            "kn,knl->kl", self.lines.rows, response[sector]
+        )
+        matrix[:n, :n] += self.lines.compliance
+        # anchor and rotation of the flexspline
+        constrained = np.array([n, n + 2])
+        matrix[np.ix_(constrained, driven)] = np.einsum(
+            "snf,snl->fl", self.lines.loads[:, :, n + 1 :], response
+        )
+        matrix[:n, constrained] = matrix[constrained, :n].T
+        matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
+        # turning the circular spline towards the teeth closes the gap by the lever arm
+        arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
+        matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
+        return matrix
+
+    def _offset(self, base: Array) -> Array:
+        """Offset q (n + 3,) from the displacement without line forces (N, n_dofs)."""
+        lines, load = self.lines, self.load
+        n, offset = len(lines.force), np.zeros(len(lines.force) + 3)
+        moved = np.einsum("kn,kn->k", lines.rows, base[lines.force.sector])
+        offset[:n] = lines.gap + moved
+        # anchor and rotation of the flexspline, torque on the circular spline
+        constrained = np.array([n, n + 2])
+        offset[constrained] = np.einsum("snf,sn->f", lines.loads[:, :, n + 1 :], base)
+        offset[n + 1] = -(load.on_circular_spline or 0.0) / self.model.copies
+        offset[n + 2] += self.linear.rotation - (load.rotation or 0.0)
+        return offset
+
+    def _step(self, solution: _Solution, increment: Array) -> NewtonStep:
+        """Displacements, torques and bore forces that follow from the unknowns."""
+        model, linear, load, lines = self.model, self.linear, self.load, self.lines
+        force, strips = solution.force, lines.strips
+        race_shift = increment[:, model.race_dofs[:-NODE]]
+        push = -model.stations.stiffness * linear.gap_after(increment)
+        holding = model.copies * solution.multiplier
+        on_flexspline = load.on_flexspline
+        return NewtonStep(
+            lines=lines.force,
+            line_force=force,
+            contacts=lines.contacts,
+            active=np.flatnonzero(solution.active),
+            torque=-holding if load.torque is None else load.torque,
+            holding_torque=holding if on_flexspline is None else -on_flexspline,
+            compliance=solution.compliance / model.copies,
+            circular_spline_turn=solution.circular_spline_turn,
+            increment=increment,
+            shift=linear.rotate_to_global(increment),
+            race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
+            pressure=np.where(self.state.touching, push, 0.0),
+            strip_error=0.0
+            if strips is None
+            else strips.error(force[: len(lines.contacts)]),
+        )
 
 
 def _first_guess(
@@ -336,39 +324,6 @@ def _solve_condensed(
         circular_spline_turn=float(circular_spline_turn),
         multiplier=float(multiplier),
         compliance=output_compliance(matrix, held, k, load),
-    )
-
-
-def _substituted(
-    model: SectorModel,
-    state: State,
-    linear: Linearised,
-    load: Load,
-    contacts: Contacts,
-    condensed: _Condensed,
-    solution: _Solution,
-) -> NewtonStep:
-    """Displacements, torques and bore forces that follow from the unknowns."""
-    force, strips = solution.force, condensed.strips
-    loads = np.concatenate([force, [solution.anchor, solution.multiplier]])
-    increment = condensed.base + condensed.response @ loads
-    race_shift = increment[:, model.race_dofs[:-NODE]]
-    push = -model.stations.stiffness * linear.gap_after(increment)
-    holding = model.copies * solution.multiplier
-    return NewtonStep(
-        lines=condensed.lines,
-        line_force=force,
-        contacts=contacts,
-        active=np.flatnonzero(solution.active),
-        torque=-holding if load.torque is None else load.torque,
-        holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
-        compliance=solution.compliance / model.copies,
-        circular_spline_turn=solution.circular_spline_turn,
-        increment=increment,
-        shift=linear.rotate_to_global(increment),
-        race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
-        pressure=np.where(state.touching, push, 0.0),
-        strip_error=0.0 if strips is None else strips.error(force[: len(contacts)]),
     )
 
 
