@@ -18,6 +18,7 @@ import swgjoint
 
 PACKAGE = Path(swgjoint.__file__).parent
 LEVELS = (
+    ("kernels",),
     ("gear",),
     ("maps",),
     ("fe", "joint", "identify"),

@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         _check("python", platform.python_version),
         *[_check(name, _version(name)) for name in required_packages()],
         _check("engine plugin", _plugin),
+        _check("compiled loops", _kernels, required=False),
         _check("bundled models", _models),
         _check("cache", _cache),
         *[
@@ -120,6 +121,15 @@ def _plugin() -> str:
         raise SwgError(f"cannot be imported: {exc}") from None
     plugin.load()
     return f"{plugin.NAME} loaded from {plugin.library()}"
+
+
+def _kernels() -> str:
+    from swgjoint.kernels import kernels
+
+    native = kernels()
+    if native is None:
+        raise SwgError("finite elements run in numpy, which is slower")
+    return f"finite elements run in {native.__file__}"
 
 
 def _models() -> str:

@@ -25,7 +25,7 @@ Found = TypeVar("Found")
 
 _log = logging.getLogger(__name__)
 
-_CODE = ("arrays.py", "units.py", "gear", "fe", "maps")
+_CODE = ("arrays.py", "units.py", "kernels", "gear", "fe", "maps")
 """Parts of this package whose code determines the content of a map."""
 _PACKAGES = ("numpy", "scipy", "scikit-fem")
 """Dependencies whose versions also determine the content of a map."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+import sysconfig
+from pathlib import Path
 
 import mujoco
 import pytest
@@ -41,8 +43,19 @@ def test_ok_is_about_required_parts(capsys):
     assert result["ok"] == all(required)
     assert status == (0 if result["ok"] else 1)
     assert {c["name"] for c in result["checks"] if not c["required"]} == {
-        f"extra {name}" for name in doctor.EXTRAS
+        "compiled loops",
+        *(f"extra {name}" for name in doctor.EXTRAS),
     }
+
+
+def test_compiled_loops_are_there(capsys, monkeypatch):
+    """They are built wherever Python has its headers, and numpy can replace them."""
+    _, result = run(capsys)
+    if (Path(sysconfig.get_path("include")) / "Python.h").exists():
+        assert by_name(result)["compiled loops"]["ok"]
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    status, result = run(capsys)
+    assert status == 0 and not by_name(result)["compiled loops"]["ok"]
 
 
 def test_plugin_that_does_not_load(capsys, monkeypatch):

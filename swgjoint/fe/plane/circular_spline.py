@@ -251,7 +251,7 @@ class CircularSpline:
         )
 
     @cached_property
-    def _stations_by_radius(self) -> tuple[Array, Array]:
+    def stations_by_radius(self) -> tuple[Array, Array]:
         """Arc lengths and radii [m] along the rigid flank, radii increasing."""
         stations = self.spline.x
         table = np.linspace(float(stations[0]), float(stations[-1]), 400)
@@ -262,7 +262,7 @@ class CircularSpline:
 
     def _station(self, foot: Array) -> Array:
         """Arc lengths [m] of points on the rigid flank, from their radii."""
-        table, radius = self._stations_by_radius
+        table, radius = self.stations_by_radius
         return np.interp(np.hypot(foot[:, 0], foot[:, 1]), radius, table)
 
 
@@ -287,7 +287,9 @@ class FlankSplines:
         cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
         return cls(
             breaks=np.asarray(spline.x),
-            coefficients=np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True),
+            coefficients=np.ascontiguousarray(
+                np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True)
+            ),
         )
 
     def evaluate_at(self, flank: Index, s: Array) -> tuple[Array, Array]:

@@ -10,15 +10,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
-from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.plane.circular_spline import CircularSpline, Feet, FlankSplines
+from swgjoint.fe.plane.circular_spline import (
+    BEYOND,
+    CORNER,
+    CircularSpline,
+    FlankSplines,
+)
+from swgjoint.fe.plane.compiled_search import CompiledSearch, Flanks, SeenFeet
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 SAMPLES_PER_NODE = 2
@@ -34,26 +37,6 @@ MERGE = 1e-6
 
 
 _MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's frame
-
-
-class Flanks(Protocol):
-    """Both flanks of the flexspline's teeth in one plane."""
-
-    @property
-    def profile(self) -> ToothProfile:
-        """Profile of the right flank."""
-
-    @property
-    def spline(self) -> CubicSpline:
-        """Weights of the flank nodes in the displacement at an arc length."""
-
-    @property
-    def flank_size(self) -> int:
-        """Number of nodes of one flank."""
-
-    @property
-    def flank_range(self) -> tuple[float, float]:
-        """Arc lengths between which a flank can touch [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,6 +71,20 @@ class ToothContact:
         shaped = shaped * _MIRROR[:, None, :]
         return FlankSplines.fit(
             circular_spline.spline, shaped.reshape(-1, *shaped.shape[2:])
+        )
+
+    @cached_property
+    def _compiled(self) -> CompiledSearch | None:
+        """The same search in compiled code; None without it or for other flanks."""
+        limits = dict(corner=CORNER, beyond=BEYOND, refined=REFINED)
+        return CompiledSearch.for_flanks(
+            self.element,
+            self.circular_spline,
+            self._circular_spline_flanks,
+            self.angle,
+            self.bearing,
+            teeth_in_model=len(self.circular_spline_flank),
+            limits={**limits, "refinements": REFINEMENTS},
         )
 
     def search(
@@ -197,7 +194,7 @@ class ToothContact:
         rigid: bool = False,
         start: Array | None = None,
         steps: int = 3,
-    ) -> _Seen:
+    ) -> SeenFeet:
         """Feet on the circular spline of points in the mirrored sector frames.
 
         Args:
@@ -209,6 +206,10 @@ class ToothContact:
             start: Arc lengths near the feet (n,) [m].
             steps: Newton steps to the foot.
         """
+        if self._compiled is not None:
+            return self._compiled.see(
+                points, outward, sector, side, rigid=rigid, start=start, steps=steps
+            )
         circular_spline = self.circular_spline
         teeth = circular_spline.profile.teeth
         pitch = 2.0 * pi / teeth
@@ -232,7 +233,7 @@ class ToothContact:
             start=start,
             steps=steps,
         )
-        return _Seen(
+        return SeenFeet(
             feet=feet,
             normal=rotate(feet.normal * _MIRROR[1], -turn),
             rest=rotate(feet.rest * _MIRROR[1], -turn),
@@ -269,6 +270,8 @@ class ToothContact:
         Returns:
             Arc lengths of the minima (n,) [m].
         """
+        if self._compiled is not None:
+            return self._compiled.refine(station, mirrored, sector, side, spacing)
         element = self.element
         low, high = element.flank_range
         low_s = np.maximum(station - spacing, low)
@@ -355,19 +358,6 @@ class ToothContact:
             slip=slip,
         )
         return contacts.chosen(np.flatnonzero(contacts.gap < reach))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Seen:
-    """Feet of points, with vectors transformed back to the mirrored sector frames."""
-
-    feet: Feet
-    normal: Array
-    """Normals of the circular spline (n, 2)."""
-    rest: Array
-    """Vectors from a corner to the point (n, 2) [m]."""
-    tooth: Index
-    """Teeth of the circular spline (n,)."""
 
 
 def _outward(tangent: Array) -> Array:

@@ -162,6 +162,29 @@ class ToothProfile:
             columns.append([*arc, sign, part.curvature])
         return np.array(columns).T
 
+    @cached_property
+    def pieces(self) -> Array | None:
+        """Arcs and lines from tip to root; None if there is a piece of another kind.
+
+        Columns: start x, y, end x, y, length, centre x, y, radius (zero for a line),
+        sign (-1 for a concave arc), angle of the start and of the end from the centre
+        (n_segments, 11) [m, rad].
+        """
+        rows = []
+        for part in self.segments:
+            if not isinstance(part, Segment):
+                return None
+            ends = [*part.start, *part.end, part.length, *part.centre, part.radius]
+            sign = 1.0 if part.convex else -1.0
+            rows.append([*ends, sign, part.angle_start, part.angle_end])
+        return np.array(rows)
+
+    @cached_property
+    def edges(self) -> Array:
+        """Edges of the chain: vertex [m], directions before and after it (n, 6)."""
+        rows = [np.concatenate(edge) for edge in self._edges]
+        return np.array(rows).reshape(len(rows), 6)
+
     def _at_once(
         self, along: Array, index: NDArray[np.int64]
     ) -> tuple[Array, Array, Array]:

@@ -1,0 +1,169 @@
+"""The search for tooth contact in compiled code, with its numpy interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from swgjoint.fe.plane.circular_spline import CircularSpline, Feet, FlankSplines
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.kernels import kernels
+from swgjoint.typing import Array, Index
+
+if TYPE_CHECKING:
+    from swgjoint.kernels.compiled import Search
+
+
+class Flanks(Protocol):
+    """Both flanks of the flexspline's teeth in one plane."""
+
+    @property
+    def profile(self) -> ToothProfile:
+        """Profile of the right flank."""
+
+    @property
+    def spline(self) -> CubicSpline:
+        """Weights of the flank nodes in the displacement at an arc length."""
+
+    @property
+    def flank_size(self) -> int:
+        """Number of nodes of one flank."""
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Arc lengths between which a flank can touch [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeenFeet:
+    """Feet of points, with vectors transformed back to the mirrored sector frames."""
+
+    feet: Feet
+    normal: Array
+    """Normals of the circular spline (n, 2)."""
+    rest: Array
+    """Vectors from a corner to the point (n, 2) [m]."""
+    tooth: Index
+    """Teeth of the circular spline (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CompiledSearch:
+    """Feet and minima of :class:`swgjoint.fe.plane.tooth_contact.ToothContact`."""
+
+    search: Search
+    rigid: bool
+    """Whether the circular spline is rigid."""
+
+    @classmethod
+    def for_flanks(
+        cls,
+        element: Flanks,
+        circular_spline: CircularSpline,
+        displaced: FlankSplines | None,
+        angle: Array,
+        bearing: Array,
+        *,
+        teeth_in_model: int,
+        limits: dict[str, float],
+    ) -> CompiledSearch | None:
+        """The compiled search; None without compiled loops.
+
+        None also for profiles with other pieces than circular arcs and lines.
+
+        Args:
+            element: Flanks of the flexspline.
+            circular_spline: Flanks of the circular spline.
+            displaced: Displacements of these; None if rigid.
+            angle: As in ``ToothContact`` (N,) [rad].
+            bearing: As in ``ToothContact`` (N,) [rad].
+            teeth_in_model: Number of teeth of the circular spline in the model.
+            limits: Limits of the search by name.
+        """
+        native = kernels()
+        profile, facing = element.profile, circular_spline.profile
+        if native is None or profile.pieces is None or facing.pieces is None:
+            return None
+        spline = element.spline
+        # any two points: rigid flanks need no arc lengths
+        stations, radii = np.arange(2.0), np.arange(2.0)
+        breaks, coefficients = np.zeros(1), np.zeros((0, 0, 4, 2))
+        if displaced is not None:
+            stations, radii = circular_spline.stations_by_radius
+            breaks, coefficients = displaced.breaks, displaced.coefficients
+        search: Search = native.Search(
+            native.Flank(profile.pieces, profile.edges, profile.side),
+            np.ascontiguousarray(spline.x),
+            np.ascontiguousarray(spline.c),
+            *element.flank_range,
+            native.Flank(facing.pieces, facing.edges, facing.side),
+            np.ascontiguousarray(radii),
+            np.ascontiguousarray(stations),
+            np.ascontiguousarray(breaks),
+            np.ascontiguousarray(coefficients),
+            facing.teeth,
+            teeth_in_model,
+            np.ascontiguousarray(angle),
+            np.ascontiguousarray(bearing),
+            native.Limits(**limits),
+        )
+        return cls(search=search, rigid=displaced is None)
+
+    def see(
+        self,
+        points: Array,
+        outward: Array,
+        sector: Index,
+        side: Index,
+        *,
+        rigid: bool,
+        start: Array | None,
+        steps: int,
+    ) -> SeenFeet:
+        """Feet of points, see ``ToothContact._feet`` for the arguments."""
+        n, rigid = len(points), rigid or self.rigid
+        real, corner = np.empty((n, 11)), np.empty(n, dtype=np.bool_)
+        tooth = np.empty(n, dtype=np.int64)
+        self.search.see(
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(outward),
+            np.ascontiguousarray(sector),
+            np.ascontiguousarray(side),
+            rigid,
+            start,
+            steps,
+            real,
+            corner,
+            tooth,
+        )
+        feet = Feet(
+            gap=real[:, 0],
+            normal=real[:, 7:9],
+            curvature=real[:, 5],
+            corner=corner,
+            rest=real[:, 9:],
+            station=None if rigid else real[:, 6],
+        )
+        return SeenFeet(feet=feet, normal=real[:, 1:3], rest=real[:, 3:5], tooth=tooth)
+
+    def refine(
+        self,
+        station: Array,
+        mirrored: Array,
+        sector: Index,
+        side: Index,
+        spacing: float,
+    ) -> Array:
+        """Arc lengths of the minima, see ``ToothContact._refine`` for the arguments."""
+        refined = np.array(station)
+        self.search.refine(
+            refined,
+            np.ascontiguousarray(mirrored),
+            np.ascontiguousarray(sector),
+            np.ascontiguousarray(side),
+            spacing,
+        )
+        return refined

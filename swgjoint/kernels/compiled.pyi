@@ -1,0 +1,50 @@
+from swgjoint.typing import Array, Index, Mask
+
+class Limits:
+    def __init__(
+        self, *, corner: float, beyond: float, refined: float, refinements: float
+    ) -> None: ...
+
+class Flank:
+    def __init__(self, pieces: Array, edges: Array, side: float) -> None: ...
+
+class Search:
+    def __init__(
+        self,
+        flexspline: Flank,
+        breaks: Array,
+        weights: Array,
+        low: float,
+        high: float,
+        circular_spline: Flank,
+        radii: Array,
+        stations: Array,
+        flank_breaks: Array,
+        flanks: Array,
+        teeth: int,
+        teeth_in_model: int,
+        angle: Array,
+        bearing: Array,
+        limits: Limits,
+    ) -> None: ...
+    def see(
+        self,
+        points: Array,
+        outward: Array,
+        sector: Index,
+        side: Index,
+        rigid: bool,
+        start: Array | None,
+        steps: int,
+        real: Array,
+        corner: Mask,
+        tooth: Index,
+    ) -> None: ...
+    def refine(
+        self,
+        station: Array,
+        mirrored: Array,
+        sector: Index,
+        side: Index,
+        spacing: float,
+    ) -> None: ...

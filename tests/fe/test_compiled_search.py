@@ -1,0 +1,142 @@
+"""Compiled search for tooth contact against the numpy code that it repeats."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.plane.compiled_search import CompiledSearch
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import sector_model
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.gear.design.design import Design
+from swgjoint.kernels import kernels
+
+pytestmark = pytest.mark.skipif(
+    kernels() is None, reason="the package was built without compiled loops"
+)
+CASES = {
+    "elastic": ("reference-2d", {}),
+    "parabolic": ("reference-2d-parabolic", {}),
+    "rigid circular spline": ("reference-2d", {"elastic_circular_spline": False}),
+    "asymmetric": ("reference-2d-asymmetric", {}),
+    "fixed flexspline": ("reference-2d-flexspline-fixed", {}),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def contact(request):
+    """Search of a loaded drive with its flanks, and the scale of its lobe."""
+    name, options = CASES[request.param]
+    design = Design.load(name).with_changes({"mesh.refinement": 0.5})
+    model = sector_model(design, half="auto", **options)
+    follow = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
+    state = follow.to_torque(follow.engage(follow.deflect()), 15.0)
+    assert state.outcome.ok
+    linear = linearise(model, state, state.torque)
+    return linear.search, linear.flank, state, model.lobe_height
+
+
+def both(monkeypatch, search):
+    """The same search compiled and in numpy."""
+    compiled = replace(search)
+    assert isinstance(compiled._compiled, CompiledSearch)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    reference = replace(search)
+    assert reference._compiled is None
+    return compiled, reference
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("thorough", [False, True])
+@pytest.mark.parametrize("reach", [0.02, 0.1])
+def test_candidates_are_those_of_numpy(contact, monkeypatch, thorough, reach):
+    """The same points to a picometre, with the same weights, gaps and normals."""
+    search, flank, state, height = contact
+    found, wanted = (
+        one.search(flank, reach * height, state.contacts, thorough=thorough)
+        for one in both(monkeypatch, search)
+    )
+    assert len(wanted) > 5
+    for field in fields(wanted):
+        ours, theirs = getattr(found, field.name), getattr(wanted, field.name)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.fe
+def test_feet_of_any_point_are_those_of_numpy(contact, monkeypatch):
+    """Also beyond the ends of the flank, at corners, and far from any flank."""
+    search, _, _, height = contact
+    rng = np.random.default_rng(7)
+    n = 4000
+    low, high = search.element.flank_range
+    points, outward, _ = search.element.profile.evaluate(rng.uniform(low, high, n))
+    points = points + height * rng.normal(0.0, 0.5, (n, 2))
+    sector = rng.integers(0, len(search.angle), n)
+    side = rng.integers(0, 2, n)
+    corners = 0
+    for rigid in (False, True):
+        found, wanted = (
+            one._feet(points, outward, sector, side, rigid=rigid)
+            for one in both(monkeypatch, search)
+        )
+        monkeypatch.delenv("SWGJOINT_KERNELS")
+        assert np.array_equal(found.tooth, wanted.tooth)
+        assert np.array_equal(found.feet.corner, wanted.feet.corner)
+        corners += int(wanted.feet.corner.sum())
+        for ours, theirs in (
+            (found.feet.gap, wanted.feet.gap),
+            (found.feet.normal, wanted.feet.normal),
+            (found.feet.curvature * height, wanted.feet.curvature * height),
+            (found.feet.rest, wanted.feet.rest),
+            (found.normal, wanted.normal),
+            (found.rest, wanted.rest),
+        ):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+        assert (found.feet.station is None) == (wanted.feet.station is None)
+    elastic = search.circular_spline.flank_dofs > 0
+    assert (corners > 100) == elastic
+
+
+def test_other_curves_are_left_to_numpy():
+    """A profile with an involute has no table of arcs and lines."""
+    design = Design.load("reference-2d-involute").with_changes({"mesh.refinement": 0.5})
+    model = sector_model(design, half=True)
+    search = linearise(model, model.initial_guess(), None).search
+    assert search.element.profile.pieces is None
+    assert search._compiled is None
+
+
+def test_arrays_that_do_not_fit_are_refused(contact):
+    """Nothing is read or written beyond an array, whatever the caller passes."""
+    search = contact[0]._compiled.search
+    points, index = np.zeros((3, 2)), np.zeros(3, dtype=np.int64)
+    real, corner = np.zeros((3, 11)), np.zeros(3, dtype=bool)
+
+    def see(**other):
+        given = dict(points=points, outward=points, sector=index, side=index)
+        given |= dict(rigid=True, start=None, steps=3)
+        search.see(
+            **(given | dict(real=real, corner=corner, tooth=index.copy()) | other)
+        )
+
+    see()
+    for wrong in (
+        dict(points=np.zeros((3, 3))),
+        dict(outward=np.zeros((2, 2))),
+        dict(sector=np.full(3, 10**6)),
+        dict(sector=np.full(3, -1)),
+        dict(side=np.full(3, 2)),
+        dict(real=np.zeros((3, 8))),
+        dict(corner=np.zeros(2, dtype=bool)),
+        dict(start=np.zeros(2)),
+    ):
+        with pytest.raises(ValueError):
+            see(**wrong)
+    for wrong in (dict(points=points.astype(np.float32)), dict(real=real[:, ::2])):
+        with pytest.raises(TypeError):
+            see(**wrong)
+    with pytest.raises(ValueError):
+        search.refine(np.zeros(3), np.zeros((3, 2, 2)), index, index, 1e-5)
