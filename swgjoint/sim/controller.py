@@ -23,8 +23,9 @@ class KnownJoints:
     """Nominal data of the driven joints; the true data may differ."""
 
     names: tuple[str, ...]
+    """Joint names, in the order of the last axis of all arrays."""
     drives: tuple[DriveMap, ...]
-    """Drive maps of all joints, with ratio, layout and ratings."""
+    """Drive maps of all joints, which include ratio, layout and ratings."""
     rotor_inertia: Array
     """Inertia of motor rotor and wave generator about the motor axis [kg·m²]. Shape
     (n_joints,)."""
@@ -64,16 +65,21 @@ class KnownArm(Protocol):
         """
 
     def inertia(self, position: Array) -> Array:
-        """Inertia about every joint, the others locked [kg·m²]. Shapes (n_joints,)."""
+        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,).
+
+        Args:
+            position: Joint angles [rad]. Shape (n_joints,).
+        """
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingAge:
     """Age of the sensor readings when the controller receives them [s].
 
-    The ages are nominal data: the stated delays of the sensors. Before the motion the
-    sensors read its first sample. A motor speed that is a difference of two angles is
-    half a control period older than ``motor``.
+    The ages are nominal data, namely the delays that the scene states for its sensors.
+    Until a delay has elapsed, the sensor returns the first sample of the motion. A
+    motor speed computed as a difference of two angle readings is half a control period
+    older than ``motor``.
     """
 
     motor: float = 0.0
@@ -97,18 +103,20 @@ class Task:
     acceleration: Array
     """Commanded link accelerations [rad/s²]. Shape (n, ..., n_joints)."""
     link_torque: Array
-    """Drive torques that this motion requires: inertia and weight of the known arm,
-    and the known load [N·m]. Shape (n, ..., n_joints)."""
+    """Drive torques that this motion requires in the controller's model: inertia and
+    weight of the arm, and the load [N·m]. Shape (n, ..., n_joints)."""
     joints: KnownJoints
+    """Nominal data of the driven joints."""
     reading_age: ReadingAge = ReadingAge()
+    """Age of the sensor readings."""
 
     def as_read(
         self, values: NDArray[Number], sensor: Literal["motor", "link", "torque"]
     ) -> NDArray[Number]:
-        """Readings that a sensor would give at the instants if it measured ``values``.
+        """Readings that a sensor would return for exact values at the instants.
 
         Each reading is the value one reading age earlier, interpolated linearly between
-        instants. Readings from before the motion equal the first value.
+        instants. Readings taken before the motion equal the first value.
 
         Args:
             values: Exact values at the instants. Shape (n, ...).
@@ -129,16 +137,16 @@ class Task:
         return np.asarray((1.0 - part) * values[at] + part * before)
 
     def periods_old(self, sensor: Literal["motor", "link", "torque"]) -> int:
-        """Age of the readings of a sensor in control periods, rounded."""
+        """Age of the readings of a sensor, rounded to whole control periods."""
         age: float = getattr(self.reading_age, sensor)
         return round(age / self.period)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """Sensor readings available at one instant; shapes (..., n_joints).
+    """Sensor readings available at one instant. Shapes (..., n_joints).
 
-    They were taken :attr:`Task.reading_age` earlier.
+    The sensors took them :attr:`Task.reading_age` earlier.
     """
 
     motor_angle: Array
@@ -152,7 +160,7 @@ class Measured:
 
 
 class Controller(Protocol):
-    """Computes motor torques from sensor readings once per control period."""
+    """Control law that turns sensor readings into motor torques every control period."""
 
     def start(self, task: Task) -> None:
         """Reset the controller and prepare it for a motion."""

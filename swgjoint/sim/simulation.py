@@ -25,7 +25,7 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
 from swgjoint.typing import Array
 
-_CHUNK = 1000  # engine steps between two progress reports
+_CHUNK = 1000  # approximate number of engine steps between two progress reports
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -47,16 +47,20 @@ def simulate_scene(
     Args:
         scene: The scene, or the path or bundled name of a scene file.
         overrides: Changes of the scene, see :meth:`Scene.load_file`.
-        drives: Maps that replace drive references of the scene.
-        controller: External controller; None runs the scene's own.
+        drives: Maps by drive reference, used instead of loading or building them.
+        controller: External controller; None runs the scene's own controller.
         known_drives: Drive maps in the controller's model, by joint.
-        known_arm: Arm in the controller's model; None for the scene's own.
-        name: Name of the run; None for the name of the scene.
-        progress: Called with the steps done, and while maps are built.
+        known_arm: Arm in the controller's model; None uses the arm of the scene.
+        name: Name of the run; None uses the name of the scene.
+        progress: Called with the number of completed steps, and while maps are built.
+
+    Returns:
+        The recorded run.
 
     Raises:
-        InputError: If the scene or the arguments do not fit.
-        ComputationError: If the motion diverges or the start has no equilibrium.
+        InputError: If the scene or an argument is not valid.
+        ComputationError: If the motion diverges, the start has no equilibrium, or a
+            joint needs more sub-steps than the scene accepts.
     """
     assembly, loop = prepare_scene(
         scene,
@@ -87,18 +91,20 @@ def prepare_scene(
     Args:
         scene: The scene, or the path or bundled name of a scene file.
         overrides: Changes of the scene, see :meth:`Scene.load_file`.
-        drives: Maps that replace drive references of the scene.
-        controller: External controller; None runs the scene's own.
+        drives: Maps by drive reference, used instead of loading or building them.
+        controller: External controller; None runs the scene's own controller.
         known_drives: Drive maps in the controller's model, by joint.
-        known_arm: Arm in the controller's model; None for the scene's own.
+        known_arm: Arm in the controller's model; None uses the arm of the scene.
         progress: Called while maps are built.
 
     Returns:
-        The compiled scene, and the loop of the external controller or None.
+        The compiled scene, and the loop of the external controller, or None without
+        one.
 
     Raises:
-        InputError: If the scene does not fit, or if ``known_drives`` or ``known_arm``
+        InputError: If the scene is not valid, or if ``known_drives`` or ``known_arm``
             is given without a controller.
+        ComputationError: If a joint needs more sub-steps than the scene accepts.
     """
     if not isinstance(scene, Scene):
         scene = Scene.load_file(scene, overrides)
@@ -117,15 +123,16 @@ def prepare_scene(
         )
     elif known_drives or known_arm is not None:
         argument = "known_drives" if known_drives else "known_arm"
-        raise InputError(f"{argument} without controller; accepted: both or none")
+        raise InputError(f"{argument} without a controller; accepted: with controller")
     return assembly, loop
 
 
 @contextmanager
 def _without_log_file() -> Iterator[None]:
-    """Keep the engine's warnings on the console, out of the working folder.
+    """Prevent the engine from writing warnings to ``MUJOCO_LOG.TXT``.
 
-    A run reports what they mean; the engine's ``MUJOCO_LOG.TXT`` would remain there.
+    The file would remain in the working folder, although the run reports the causes of
+    these warnings itself. They still appear on the console.
     """
     config = mujoco.MjLogConfig.get()
     before, config.logto_file = config.logto_file, False
@@ -145,15 +152,20 @@ def simulate(
     loop: Loop | None = None,
     progress: Progress = silent,
 ) -> Run:
-    """Run an assembled scene; see :func:`swgjoint.run_scene`.
+    """Run an assembled scene and record it; see :func:`swgjoint.run_scene`.
 
     Args:
         assembly: The compiled scene.
         name: Name of the run.
-        loop: Loop of an external controller; None runs the scene's own.
-        progress: Called with the steps done.
+        loop: Loop of an external controller; None runs the scene's own controller.
+        progress: Called with the number of completed steps.
+
+    Returns:
+        The recorded run.
 
     Raises:
+        InputError: If bodies are in contact at the start, so that no drive can hold
+            them.
         ComputationError: If the motion diverges or the start has no equilibrium.
     """
     model, path = assembly.model, assembly.trajectory
@@ -176,7 +188,7 @@ def simulate(
         wall = time.perf_counter() - begin
         return _recorded(assembly, name, states, rates, wall, wanted=wanted)
 
-    # the engine's own rollout: no Python between two steps, every state recorded
+    # the engine's rollout runs without Python between steps and records every state
     steps, parts = len(inputs), assembly.sub_steps
     states = np.empty((steps // parts + 1, state.size))
     states[0] = state
@@ -204,20 +216,20 @@ def simulate(
 
 
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
-    """Stop a run that diverged; the engine would continue from a reset state."""
+    """Raise an error if a run diverged, because the engine would reset and continue."""
     nq, nv = assembly.model.nq, assembly.model.nv
     if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
         raise ComputationError(
             f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
             " command of a motor or a disturbance exceeded 1e10, which the engine does"
-            " not apply; use lower gains of the controller"
+            " not apply; use lower controller gains"
         )
     if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
         raise ComputationError(
             f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
             " engine could not solve for the accelerations: the masses of the arm"
-            " differ too much, or its inertia is close to singular; see mjWARN_INERTIA"
-            " in MuJoCo's manual"
+            " differ too much, or its inertia matrix is close to singular; see"
+            " mjWARN_INERTIA in the MuJoCo documentation"
         )
     bad = any(
         data.warning[kind].number
@@ -253,10 +265,10 @@ def _recorded(
         whole: The scene as it was run.
         name: Name of the run.
         states: Full engine states, one per step of the scene. Shape (n, n_state).
-        rates: Link speeds at every engine step [rad/s].
+        rates: Link speeds at every engine step [rad/s]. Shape (n_steps + 1, n_joints).
         wall: Wall time of all steps [s].
-        wanted: Motor torque that a sampled loop requested at every engine step [N·m];
-            None for the engine's own loops.
+        wanted: Motor torque that a sampled loop requested at every engine step [N·m],
+            shape (n_steps + 1, n_joints); None for the engine's own loops.
     """
     assembly, ratio = whole.without_sub_steps(), whole.ratio
     model, path = assembly.model, assembly.trajectory
@@ -286,9 +298,9 @@ def _recorded(
         axis=-1,
     ).mean(axis=0)
     wanted = commanded.mean(axis=0)
-    # without a rotor the output torque is the motor torque minus the torque that
-    # accelerates the rotor inertia; the integrator's own acceleration is the velocity
-    # difference of the step that led to the state
+    # without a rotor the output torque is the motor torque, minus the torque that
+    # accelerates the rotor inertia, times the ratio; the acceleration consistent with
+    # the integrator is the velocity difference of the step that led to the state
     ideal = ratio * (rates - whole.prescribed_rate)
     slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
     output = ratio * (motor - assembly.rotor_inertia * slowing)
@@ -332,10 +344,10 @@ def _recorded(
 
 
 def _integrals(assembly: Assembly, states: Array) -> Array:
-    """Integral of the error in the engine's loops [rad·s]. Shape (n, n_joints).
+    """Integral of the angle error in the engine's loops [rad·s]. Shape (n, n_joints).
 
-    Under ``discrete`` it is the integral that acted in the step to the state: the
-    engine integrates after it has computed the forces.
+    With the integrator ``discrete`` it is the integral that acted in the step to the
+    state, because the engine updates the integral after it has computed the forces.
     """
     model = assembly.model
     integral = np.zeros((len(states), len(assembly.joints)))

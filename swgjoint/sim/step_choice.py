@@ -14,22 +14,24 @@ from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.scene.scene import Scene
 
 STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
-"""Candidate time steps [s]."""
+"""Candidate time steps, longest first [s]."""
 PHASE_STEP = 0.25
-"""Largest phase advance of the highest relevant order per step [rad]. It is half the
-phase that a step can resolve, so that the amplitude is accurate to a few percent."""
+"""Largest phase advance of the highest relevant order per step [rad]. It is half of
+:data:`swgjoint.sim.figures.verdict.PHASE_STEP`, so that the amplitude of this order is
+accurate to a few percent."""
 TOOTH_ORDERS = 2
-"""Multiple of the tooth order that is resolved for a design without a map."""
+"""Highest resolved multiple of the tooth order for a design that has no map yet."""
 
 
 def resolving_step(scene: Scene, arm: RigidArm) -> float:
     """Largest of :data:`STEPS` that resolves the torque ripple of every drive [s].
 
-    If none does, the smallest step is returned, and the run marks the orders that it
-    leaves out.
+    If none does, the function returns the smallest step, and the run reports the orders
+    that it leaves out.
 
     Args:
-        scene: Scene of the arm; its own step is ignored.
+        scene: Scene of the arm. Its own step only sets the time grid on which the top
+            speeds of the joints are determined.
         arm: The arm.
     """
     speed = trajectory_of(scene, arm).top_speed
@@ -50,9 +52,10 @@ def needed_order(source: DriveMap | Design) -> float:
 
     An order contributes if its torque, as :mod:`swgjoint.sim.figures.ripple_validity`
     estimates it, is at least
-    :data:`~swgjoint.sim.figures.ripple_validity.SHARE` of the largest. The estimate
-    exceeds the ripple of low orders, so a share of the sum would be a poor criterion.
-    For a design, whose map is not computed yet, it is the second tooth order.
+    :data:`~swgjoint.sim.figures.ripple_validity.SHARE` of the largest such torque. The
+    estimate is too large for low orders and would dominate a sum, so the criterion is
+    relative to the largest torque instead. For a design, whose map is not computed yet,
+    the result is :data:`TOOTH_ORDERS` times the tooth order.
 
     Args:
         source: Map or design of the drive.

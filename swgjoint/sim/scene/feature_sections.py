@@ -1,4 +1,4 @@
-"""Optional tables of a scene file: sensors, payload, disturbances."""
+"""Optional tables of a scene file: sensors, payload and disturbances."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ class Sensor(Section):
     """An angle sensor that the controller reads."""
 
     counts_per_turn: Annotated[int, Field(ge=4, le=2**32)] | None = None
-    """Resolution; None reads the exact angle. With a resolution, the speed is the
-    change of the reading over a control period."""
+    """Resolution of the reading; if omitted, the angle is not quantised. With a
+    resolution, the motor speed is computed as the change of the reading over a control
+    period, divided by that period."""
     delay_s: Seconds = 0.0
-    """Age of a reading when the controller uses it. The controller knows the age: it
-    compares a reading with the command of the instant at which it was taken. A multiple
-    of ``step_s``."""
+    """Age of a reading when the controller uses it, a multiple of ``step_s``. The
+    controller knows this age and compares a reading with the command at the instant at
+    which it was taken."""
     noise_arcsec: Annotated[float, Field(ge=0, le=1e5)] = 0.0
     """Standard deviation of the normally distributed noise of every reading, before
-    quantisation. With noise, the speed is the change of the reading over a control
-    period."""
+    quantisation. With noise, the motor speed is computed from readings in the same way
+    as with a resolution."""
 
 
 class TorqueSensor(Section):
-    """Torque sensor at the output of every drive, for a controller of ``run_scene``."""
+    """Torque sensor at the output of every drive, read by external controllers only."""
 
     delay_s: Seconds = 0.0
     """Age of a reading when the controller uses it; a multiple of ``step_s``."""
@@ -41,19 +42,24 @@ class TorqueSensor(Section):
 
 
 class SensorsSection(Section):
-    """Sensors of every joint; without one the reading is exact and has no delay."""
+    """Sensors, the same for every joint."""
 
     motor: Sensor | None = None
+    """Encoder of the motor; if omitted, its readings are exact and have no delay."""
     link: Sensor | None = None
+    """Encoder of the link, for ``controller.feedback = "link"``; if omitted, its
+    readings are exact and have no delay."""
     torque: TorqueSensor | None = None
+    """Torque sensor, for an external controller; if omitted, it gets no torques."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """Seed of the noise."""
+    """Seed of the noise of all sensors."""
 
 
 class Payload(Section):
-    """A body at the tool site, in the axes of that site."""
+    """A body fixed to the tool site."""
 
     mass_kg: Annotated[float, Field(gt=0, le=1_000)]
+    """Mass of the body."""
     centre_mm: Vector = (
         0.0,
         0.0,
@@ -65,8 +71,8 @@ class Payload(Section):
         0.0,
         0.0,
     )
-    """Moments of inertia about the axes through the centre of mass; zero for a point
-    mass."""
+    """Moments of inertia about the axes of the tool site, moved to the centre of mass;
+    zero for a point mass."""
     known: bool = True
     """Whether the controller's model of the arm includes the payload."""
 
@@ -93,10 +99,13 @@ class JointPulse(Section):
 
     kind: Literal["joint_pulse"] = "joint_pulse"
     joint: str
+    """Name of the joint."""
     torque_Nm: Torque
     """Torque on the link, positive along the joint axis."""
     start_s: Seconds
+    """Start time of the pulse."""
     duration_s: Positive
+    """Duration of the pulse."""
 
 
 class JointSine(Section):
@@ -104,12 +113,15 @@ class JointSine(Section):
 
     kind: Literal["joint_sine"] = "joint_sine"
     joint: str
+    """Name of the joint."""
     torque_Nm: Torque
-    """Amplitude of the torque on the link."""
+    """Amplitude of the torque on the link; the phase is zero at ``start_s``."""
     frequency_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    """Frequency of the torque."""
     start_s: Seconds = 0.0
+    """Start time of the torque."""
     duration_s: Positive | None = None
-    """Duration; None lasts until the end of the run."""
+    """Duration of the torque; if omitted, it lasts until the end of the run."""
 
 
 class ToolForce(Section):
@@ -119,7 +131,9 @@ class ToolForce(Section):
     force_N: Vector
     """Force vector in the world frame."""
     start_s: Seconds
+    """Start time of the pulse."""
     duration_s: Positive
+    """Duration of the pulse."""
 
     @model_validator(mode="after")
     def _is_bounded(self) -> Self:
@@ -132,14 +146,14 @@ Disturbance = Annotated[JointPulse | JointSine | ToolForce, Field(discriminator=
 
 
 def too_fast(frequency: float, step: float) -> list[str]:
-    """Fault of a frequency that the time step cannot resolve.
+    """Messages about a frequency that the time step cannot resolve.
 
     Args:
         frequency: Frequency of a sine [Hz].
         step: Time step of the scene [s].
 
     Returns:
-        One message, or none if the step resolves the frequency.
+        One message; an empty list if the step resolves the frequency.
     """
     highest = 0.1 / step
     if frequency <= highest * (1.0 + 1e-9):
@@ -153,15 +167,15 @@ def too_fast(frequency: float, step: float) -> list[str]:
 def misfits(
     disturbance: JointPulse | JointSine | ToolForce, *, run: float, step: float
 ) -> list[tuple[str, str]]:
-    """Faults of a disturbance that would have no effect or a wrong one.
+    """Faults of a disturbance that the time grid of the run cannot represent.
 
     Args:
         disturbance: The table of the disturbance.
-        run: Duration of the run [s].
+        run: Duration of the run in whole steps [s].
         step: Time step of the scene [s].
 
     Returns:
-        Keys of the table, each with its message.
+        Pairs of a key of the table and its message.
     """
     faults = []
     if isinstance(disturbance, JointSine):
@@ -170,7 +184,7 @@ def misfits(
     length, start = disturbance.duration_s, disturbance.start_s
     if length is not None and length < step * (1.0 - 1e-9):
         faults.append(("duration_s", f"{length:g} s; accepted: >= step_s, {step:g} s"))
-    # the value in the middle of a step acts
+    # the disturbance of a step is its value at the middle of the step
     if start > run - 0.5 * step:
         faults.append(
             ("start_s", f"{start:g} s; accepted: before the run ends, at {run:g} s")

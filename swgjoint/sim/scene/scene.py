@@ -37,41 +37,54 @@ from swgjoint.toml_file import MAX_DEPTH, parse_toml, parse_value, read_toml
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
-"""Largest number of recorded steps of a run; memory limits the sub-steps."""
+"""Largest number of recorded steps of a run. Only the available memory limits the
+number of sub-steps."""
 
 
 class Scene(Section):
     """One scene; its attributes have the names and units of the keys of the file."""
 
     name: str
+    """Name of the scene, and of its runs by default."""
     description: str = ""
+    """Description in one sentence, as shown by ``swgjoint list scenes``."""
     arm: str
-    """Path or bundled name of an MJCF file."""
+    """Path of an MJCF or URDF file, or name of a bundled arm."""
     tool_site: str = "tool"
-    """Site at the tool position; optional for the arm."""
+    """Name of the site, or of the body, at the tool position. An arm need not have the
+    default site."""
     driven: Annotated[tuple[str, ...], Several] = ()
     """Names or patterns (``*``, ``?``) of the hinges that have drives; all if empty.
     The other hinges are held at ``trajectory.start_deg`` or ``pose``."""
     pose: str | None = None
-    """Keyframe of the arm's file at which joints without a drive are held; None holds
-    them at the reference position."""
+    """Keyframe of the arm's file at which joints without a drive are held; if omitted,
+    they are held at the reference position."""
     balance_inertia: bool = False
-    """Whether inertias that no rigid body can have are repaired."""
+    """Whether to repair inertias that no rigid body can have: their mean replaces the
+    three principal moments."""
     defaults: JointSection = JointSection()
     """Settings of all joints, which ``joints`` overrides."""
     joints: dict[str, JointSection] = Field(default_factory=dict)
+    """Settings of single joints, by joint name."""
     trajectory: TrajectorySection
+    """Commanded motion; ``kind`` selects the keys."""
     controller: ControllerSection = ControllerSection()
+    """Position control of the motors."""
     load: dict[str, LoadSection] = Field(default_factory=dict)
-    """Constant torque that the load exerts against a joint."""
+    """Constant torque that the load exerts against a joint, by joint name."""
     sensors: SensorsSection | None = None
-    """Sensors of the controller; None reads every angle exactly and without delay."""
+    """Sensors of the controller; if omitted, the controller reads every angle exactly
+    and without delay."""
     payload: Payload | None = None
+    """Body that the arm carries at its tool."""
     disturbance: list[Disturbance] = Field(default_factory=list)
-    """Torques and forces that the controller does not know."""
+    """Torques and forces that the controller does not know in advance."""
     simulation: Simulation
+    """Duration and time stepping."""
     recording: Recording = Recording()
+    """Contents and layout of the recording for the viewer."""
     metrics: Metrics = Metrics()
+    """Reference values for the figures of a run."""
 
     _where: str = PrivateAttr(default="scene")
 
@@ -88,7 +101,7 @@ class Scene(Section):
 
     @property
     def where(self) -> str:
-        """Name of this scene in messages: its file or ``scene``."""
+        """Name of this scene in messages: by default its file or ``scene``."""
         return self._where
 
     @model_validator(mode="after")
@@ -239,16 +252,23 @@ class Scene(Section):
         return scene
 
     def with_changes(self, overrides: Mapping[str, Any] | Iterable[str]) -> Self:
-        """A checked copy with new values for some dotted keys."""
+        """A checked copy with new values for some keys.
+
+        Args:
+            overrides: Dotted keys with new values, see :meth:`load_file`.
+
+        Raises:
+            InputError: If the changed scene has faults; one line per fault.
+        """
         data = self.model_dump(exclude_unset=True)
         return self.from_data(data, where=self.where, overrides=overrides)
 
     def with_drive(self, drive: str) -> Self:
-        """A copy in which every joint has this drive, at its default fidelity."""
+        """A copy in which every joint has this drive, a design at default fidelity."""
         return self._with_all(drive=drive, linear=None, model=None)
 
     def with_model(self, model: str) -> Self:
-        """A copy whose drives, all designs, get a map of this fidelity."""
+        """A copy whose drives, which must all be designs, get maps of this fidelity."""
         return self._with_all(model=model)
 
     def with_level(self, level: Level) -> Self:
@@ -260,7 +280,12 @@ class Scene(Section):
         return self._with_all(friction=friction)
 
     def with_kinematic_error(self, arcmin: float | None) -> Self:
-        """A copy with this error in every joint [arcmin]; None for the stated error."""
+        """A copy with this peak-to-peak kinematic error in every joint.
+
+        Args:
+            arcmin: Assumed error [arcmin]; None uses the transmission accuracy that the
+                catalogue states, if it states one.
+        """
         return self._with_all(kinematic_error_arcmin=arcmin)
 
     def _with_all(self, **values: Any) -> Self:
@@ -305,7 +330,7 @@ def _merged(
         if isinstance(overrides, Mapping)
         else [parse_override(text) for text in overrides or ()]
     )
-    # a new kind of motion first: it drops the keys that only the old kind has
+    # apply a new kind of motion first, because it drops the keys of the old kind
     for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
         if key == "trajectory.kind":
             _switch_motion(merged.get("trajectory"), value)
@@ -322,7 +347,7 @@ def _merged(
 
 
 def _switch_motion(table: Any, kind: Any) -> None:
-    """Drop the keys of a motion that the new kind does not have."""
+    """Drop the keys of a motion that a new kind of motion does not have."""
     if not isinstance(table, dict) or table.get("kind") == kind:
         return
     model = MOTIONS.get(kind) if isinstance(kind, str) else None
@@ -332,7 +357,7 @@ def _switch_motion(table: Any, kind: Any) -> None:
 
 
 def _make_room(table: dict[str, Any], key: str) -> None:
-    """Drop the alternative key: a named and a linear drive exclude each other."""
+    """Drop ``linear`` if ``drive`` is set and vice versa; they exclude each other."""
     table.pop({"drive": "linear", "linear": "drive"}.get(key, ""), None)
 
 
@@ -350,11 +375,11 @@ def parse_override(text: str) -> tuple[str, Any]:
             f"override {shorten(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
             " parts"
         )
-    return key, parse_value(value, where=key)  # a bare word: a name or a path
+    return key, parse_value(value, where=key)  # a bare word is a name or a path
 
 
 def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
-    """Resolve paths in a scene file relative to that file; names stay unchanged."""
+    """Resolve paths in a scene file relative to its folder; keep names unchanged."""
 
     def anchor(table: Any, key: str) -> None:
         value = table.get(key) if isinstance(table, dict) else None

@@ -1,4 +1,4 @@
-"""Tables of a scene file, with the names of their keys."""
+"""Basic tables of a scene file; their attributes have the names of the keys."""
 
 from __future__ import annotations
 
@@ -29,19 +29,21 @@ Several = Field(strict=False)
 
 
 class ControllerSection(Section):
-    r"""Position control of every motor on its own encoder.
+    r"""Position control of every motor, by default on its own encoder.
 
-    ``pd`` and, with the integral of the error, ``pid``:
+    The kinds ``pd``, with :math:`k_i = 0`, and ``pid`` use the law
 
     .. math:: \tau = k_p e + k_d \dot e + k_i \int e\,dt + \tau_\text{ff}, \quad
         e = i q_r - \theta.
 
-    The gains are either stated, or follow from a natural frequency and a damping ratio
-    of the rigid drive, :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with
-    :math:`J = J_m + J_l(q_0)/i^2`. The integral gain is :math:`k_i = k_p/T_i`.
+    The gains are either stated, or follow from the natural frequency and the damping
+    ratio of the loop with a rigid drive: :math:`k_p = J\omega^2` and
+    :math:`k_d = 2\zeta J\omega` with :math:`J = J_m + J_l(q_0)/i^2`. The integral gain
+    is :math:`k_i = k_p/T_i`.
 
-    ``computed_torque`` is the inverse dynamics of the rigid arm (M, h) with its rotors
-    (J) at the measured motion, which is the motor motion divided by the ratio:
+    The kind ``computed_torque`` uses the inverse dynamics of the rigid arm, with inertia
+    matrix M and bias torques h, and of its rotors, with inertias J. They are evaluated
+    at the measured motion, which is the motor motion divided by the ratio:
 
     .. math:: \tau = \left(M a + h\right)/i + i J a, \quad
         a = \ddot q_r + 2\zeta\omega(\dot q_r - \dot\theta/i)
@@ -49,26 +51,33 @@ class ControllerSection(Section):
     """
 
     kind: ControlKind = "pd"
+    """Control law: ``pd``, ``pid`` or ``computed_torque``."""
     natural_frequency_Hz: Annotated[float, Field(gt=0, le=1_000)] | None = None
+    """Natural frequency of the loop with a rigid drive; 8 Hz if omitted."""
     damping_ratio: Annotated[float, Field(gt=0, le=10)] | None = None
+    """Damping ratio of the loop with a rigid drive; 1 if omitted."""
     stiffness_Nm_rad: Annotated[float, Field(gt=0)] | None = None
-    """Motor torque per motor angle."""
+    """Proportional gain: motor torque per motor angle error."""
     damping_Nms_rad: Annotated[float, Field(ge=0)] | None = None
+    """Derivative gain [N·m·s/rad]: motor torque per motor speed error."""
     integral_time_s: Positive | None = None
-    """Integral time of ``pid``; None is 4 divided by the loop's natural frequency in
-    rad/s."""
+    """Integral time of ``pid``; if omitted, 4 divided by the natural frequency of the
+    loop in rad/s."""
     integral_limit_Nm: Positive | None = None
-    """Largest motor torque of the integral term; None is the rated torque over the
-    ratio."""
+    """Largest motor torque of the integral term; if omitted, the rated torque of the
+    drive divided by its ratio."""
     feedforward: FeedForward = "gravity"
-    """Motor torques for the rigid arm on the reference motion and for the load."""
+    """Feed-forward motor torque. ``gravity`` carries the weight of the rigid arm on the
+    reference motion and the load; ``gravity_inertia`` also accelerates arm and rotors;
+    ``none`` is zero."""
     control_period_s: Positive | None = None
-    """Control period, a multiple of ``step_s``: the loop is evaluated once per period
-    and its torque held. None: ``pd`` and ``pid`` act within every engine step, and a
-    loop that must be sampled (computed torque, sensors, link feedback) once per step.
-    """
+    """Control period, a multiple of ``step_s``. The loop is evaluated once per period
+    and its torque is held in between. If omitted, ``pd`` and ``pid`` act within every
+    engine step, and loops that must be sampled (computed torque, sensors, link
+    feedback) are evaluated once per step."""
     feedback: Literal["motor", "link"] = "motor"
-    """Side at which the position error is measured; the speed is that of the motor."""
+    """Side of the drive whose angle the loop controls; the speed is always that of the
+    motor."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -105,8 +114,10 @@ class LoadSection(Section):
     """Constant torque of the load against a joint, which the drive must balance."""
 
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    """Load torque; positive if it acts against the positive direction of the joint."""
     rated_fraction: Annotated[float, Field(ge=-5, le=5)] | None = None
-    """Load torque as a fraction of the drive's rated torque."""
+    """Load torque as a fraction of the drive's rated torque, with the same sign
+    convention."""
 
     @model_validator(mode="after")
     def _one_value(self) -> Self:
@@ -119,41 +130,45 @@ class Simulation(Section):
     """Duration and time stepping."""
 
     duration_s: Annotated[float, Field(gt=0, le=10_000)]
+    """Simulated time."""
     step_s: Annotated[float, Field(ge=1e-6, le=0.02)] = 0.001
+    """Time step, which is also the interval between recorded samples."""
     integrator: Integrator = "discrete"
+    """Integrator of the engine."""
     max_sub_steps: Annotated[int, Field(ge=1, le=1_000)] = MAX_SUB_STEPS
-    """Largest number of equal sub-steps of a step, used if the integration of a joint
-    requires them; 1 rejects such a scene. Recorded samples and kept harmonics depend on
-    ``step_s`` only."""
+    """Largest accepted number of equal sub-steps per step. The run uses sub-steps if
+    the stable integration of a joint requires them; with 1, such a scene is rejected.
+    Recorded samples and kept harmonics depend on ``step_s`` only."""
 
 
 class Recording(Section):
     """Contents and layout of the recording.
 
-    The signals of every joint are kept at every step, whether they are plotted or not.
+    The recording contains the signals of every joint at every step, whether they are
+    plotted or not.
     """
 
     pose_rate_Hz: Annotated[float, Field(gt=0, le=10_000)] = 50.0
     """Rate of the body poses that the viewer shows."""
     joints: Annotated[tuple[str, ...], Several] = ()
-    """Joints that have a tab, in this order; if empty all joints, most loaded first.
-    The viewer draws the drive of the first joint whose map has fields."""
+    """Joints that have a tab, in this order; if empty, all joints, the most loaded one
+    first. The viewer draws the drive of the first joint whose map has fields."""
     plots: Annotated[tuple[Signal, ...], Several] = (
         "torsion_arcmin",
         "transmission_error_arcmin",
         "output_torque_Nm",
         "torque_deviation_Nm",
     )
-    """Signals that every tab plots over time."""
+    """Signals that every tab plots against time."""
 
 
 class Metrics(Section):
     """Reference values for the figures of a run."""
 
     settle_band_mm: Positive = 0.1
-    """Half width of the settling band about the last tool position."""
+    """Half width of the settling band about the final tool position."""
     settle_band_arcmin: Positive = 1.0
-    """Half width of the settling band about the last angle of every joint."""
+    """Half width of the settling band about the final angle of every joint."""
     contacts_expected: bool = False
-    """Whether bodies may touch in this scene; if not, a run with contacts is not valid.
-    """
+    """Whether bodies may touch in this scene. If not, a run with contacts is reported
+    as not valid."""

@@ -1,4 +1,4 @@
-"""Task of a scene for an external controller."""
+"""The task of a scene: what an external controller knows before the motion starts."""
 
 from __future__ import annotations
 
@@ -21,17 +21,21 @@ def task_of(
 ) -> Task:
     """The commanded motion at the control instants, and nominal data of the joints.
 
-    The link torque is that of the controller's model of the arm, with weight, inertia
-    and the constant load. By default the nominal drives are the simulated ones
-    (:attr:`~swgjoint.sim.figures.transmission.Transmission.told`), without effects that
-    their level lacks or the scene disables, and without unresolved orders.
+    The link torque comes from the controller's model of the arm. It includes weight,
+    inertia and the constant load. By default the nominal drives are the simulated ones,
+    see :attr:`~swgjoint.sim.figures.transmission.Transmission.told`. They lack the
+    effects that their level does not model or the scene disables, and the orders that
+    the step cannot resolve.
 
     Args:
         assembly: The compiled scene.
         known_drives: Drive maps in the controller's model, by joint; other joints use
             the default.
-        known_arm: Arm in the controller's model; None for that of the scene, without a
-            payload that is not known.
+        known_arm: Arm in the controller's model; None uses the arm of the scene,
+            without its payload if the payload is not known.
+
+    Returns:
+        The task with all arrays sampled once per control period.
 
     Raises:
         InputError: If ``known_drives`` names an unknown joint, or if ``known_arm`` has
@@ -78,7 +82,7 @@ def task_of(
 
 
 def _reading_age(assembly: Assembly) -> ReadingAge:
-    """Stated delays of the scene's sensors."""
+    """Delays that the scene states for its sensors; zero without sensors."""
     sensors = assembly.scene.sensors
     if sensors is None:
         return ReadingAge()

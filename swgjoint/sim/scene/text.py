@@ -1,4 +1,4 @@
-"""Text of a scene file from a scene."""
+"""Conversion of a scene to the text of a scene file."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from swgjoint.toml_text import toml_text
 
 
 def scene_toml(scene: Scene) -> str:
-    """Keys that a scene sets, as TOML that :meth:`Scene.load_file` reads in any folder.
+    """TOML text with the keys that a scene sets.
 
-    Paths of files are absolute.
+    File paths in it are absolute, so :meth:`Scene.load_file` can read it from any
+    folder.
     """
     data = scene.model_dump(exclude_unset=True, exclude_none=True)
     named = (data, data["trajectory"], data.get("defaults", {}))

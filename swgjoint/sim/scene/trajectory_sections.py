@@ -1,4 +1,4 @@
-"""The table ``[trajectory]`` of a scene file, one class per kind of motion."""
+"""The table ``[trajectory]`` of a scene file, with one class per kind of motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class MotionSection(Section):
     """Keys that all motions share."""
 
     start_deg: dict[str, Degrees] = Field(default_factory=dict)
-    """Joint angles at the first instant; zero for joints that are not named."""
+    """Joint angles at the start of the run; zero for joints that are not named."""
 
     @property
     def shortest_s(self) -> float:
@@ -29,24 +29,26 @@ class MotionSection(Section):
 
     @property
     def named_joints(self) -> dict[str, set[str]]:
-        """Joints that each key names."""
+        """Names of joints that each key contains."""
         return {"start_deg": set(self.start_deg)}
 
 
 class SweepSection(MotionSection):
-    """All joints together from start to end: rest, ramp, constant speed, ramp, rest."""
+    """All joints move together: rest, ramp, constant speed, ramp, rest."""
 
     kind: Literal["sweep"] = "sweep"
     hold_s: Seconds = 0.2
+    """Rest before and after the motion."""
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 1.0
+    """Duration of each ramp."""
     settle_s: Seconds = 0.0
-    """Initial time of the constant-speed part that the metrics leave out."""
+    """Initial part of the constant-speed motion that the metrics leave out."""
     end_deg: dict[str, Degrees] = Field(default_factory=dict)
     """Joint angles at the end; joints that are not named stay at rest."""
 
     @property
     def shortest_s(self) -> float:
-        """Duration without a constant-speed part [s]."""
+        """Total time of rests, ramps and settling [s]."""
         return 2.0 * (self.hold_s + self.ramp_s) + self.settle_s
 
     @property
@@ -60,8 +62,9 @@ class ConstantSpeed(MotionSection):
 
     kind: Literal["constant_speed"] = "constant_speed"
     settle_s: Seconds = 0.0
-    """Initial time that the metrics leave out."""
+    """Initial part of the run that the metrics leave out."""
     speed_deg_s: dict[str, Degrees]
+    """Joint speeds; joints that are not named stay at rest."""
 
     @property
     def shortest_s(self) -> float:
@@ -78,12 +81,13 @@ class ConstantSpeed(MotionSection):
 
 
 class StepSection(MotionSection):
-    """Joint angles jump once; the rest of the run is the controller's step response."""
+    """The commanded joint angles jump once, and the run records the step response."""
 
     kind: Literal["step"] = "step"
     at_s: Annotated[float, Field(gt=0, le=10_000)] = 0.2
+    """Time of the jump."""
     step_deg: dict[str, Degrees]
-    """Height of the step of each joint."""
+    """Height of the jump of each joint; zero for joints that are not named."""
 
     @property
     def shortest_s(self) -> float:
@@ -97,26 +101,32 @@ class StepSection(MotionSection):
 
 
 class Trapezoid(MotionSection):
-    """Point to point at constant acceleration, speed and deceleration, then rest.
+    """Point-to-point motion: constant acceleration, speed and deceleration, then rest.
 
-    All joints start and stop together; the slowest joint reaches a limit.
+    All joints start and stop together. The joint with the longest travel determines the
+    duration: it reaches the acceleration limit and, if it travels far enough, the speed
+    limit.
     """
 
     kind: Literal["trapezoid"] = "trapezoid"
     hold_s: Seconds = 0.2
-    """Rest before the motion; after the motion the arm rests until the end."""
+    """Rest before the motion; after the motion the arm rests until the end of the run.
+    """
     end_deg: dict[str, Degrees]
+    """Joint angles at the end; joints that are not named stay at rest."""
     max_speed_deg_s: Annotated[float, Field(gt=0, le=3_600)]
+    """Speed limit of every joint."""
     max_acceleration_deg_s2: Annotated[float, Field(gt=0, le=1e6)]
+    """Acceleration limit of every joint."""
 
     @property
     def shortest_s(self) -> float:
-        """Time of rest and motion [s]."""
+        """Total time of the first rest and the motion [s]."""
         return self.hold_s + self.move_s
 
     @property
     def move_s(self) -> float:
-        """Time of the motion without rest [s]."""
+        """Duration of the motion without rests [s]."""
         way = max(
             (abs(end - self.start_deg.get(j, 0.0)) for j, end in self.end_deg.items()),
             default=0.0,
@@ -133,21 +143,25 @@ class Trapezoid(MotionSection):
 
 
 class ChirpSection(MotionSection):
-    """One joint oscillates about its start at increasing or decreasing frequency."""
+    """One joint oscillates about its start at linearly changing frequency."""
 
     kind: Literal["chirp"] = "chirp"
     joint: str
+    """Name of the joint; all other joints rest."""
     amplitude_deg: Annotated[float, Field(gt=0, le=360)]
+    """Amplitude of the joint angle."""
     from_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    """Frequency at the start of the oscillation."""
     to_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    """Frequency at the end of the oscillation."""
     hold_s: Seconds = 0.2
     """Rest before and after the oscillation."""
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
-    """Time in which the amplitude grows, and in which it decays."""
+    """Time in which the amplitude grows, and time in which it decays."""
 
     @property
     def shortest_s(self) -> float:
-        """Duration without a part at full amplitude [s]."""
+        """Total time of rests and ramps, without full amplitude [s]."""
         return 2.0 * (self.hold_s + self.ramp_s)
 
     @property
@@ -157,13 +171,15 @@ class ChirpSection(MotionSection):
 
 
 class FromFile(MotionSection):
-    """A smooth motion through all joint angles of a CSV file."""
+    """A smooth motion through all points of a CSV file."""
 
     kind: Literal["csv"] = "csv"
     file: str
-    """Columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``."""
+    """Path of the CSV file. Its columns are ``time_s`` and, for each joint that moves,
+    ``<joint>_deg`` or ``<joint>_rad``."""
     hold_s: Seconds = 0.2
-    """Rest before the motion; after the last point the arm rests until the end."""
+    """Rest before the motion; after the last point the arm rests until the end of the
+    run."""
 
     @property
     def shortest_s(self) -> float:
@@ -175,7 +191,8 @@ class ToolMotion(MotionSection):
     """A motion of the tool site; the joint angles follow by inverse kinematics."""
 
     orientation: Literal["hold", "free"] | None = None
-    """Whether the tool keeps its orientation; None holds it for six or more joints."""
+    """Whether the tool keeps its orientation (``hold``) or not (``free``); if omitted,
+    it keeps it on arms with six or more driven joints."""
 
 
 class LineSection(ToolMotion):
@@ -183,15 +200,18 @@ class LineSection(ToolMotion):
 
     kind: Literal["line"] = "line"
     displacement_mm: Vector
-    """Displacement from the tool at ``start_deg`` to the far end, in the world."""
+    """Vector from the tool position at ``start_deg`` to the far end of the line, in the
+    world frame."""
     cycles: Cycles = 1
+    """Number of cycles back and forth."""
     hold_s: Seconds = 0.2
     """Rest at the start and at every turning point."""
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.2
+    """Duration of each acceleration and of each deceleration."""
 
     @property
     def shortest_s(self) -> float:
-        """Duration without a part at constant speed [s]."""
+        """Total time of rests and ramps [s]."""
         return self.hold_s + 2 * self.cycles * (self.hold_s + 2.0 * self.ramp_s)
 
     @model_validator(mode="after")
@@ -206,18 +226,22 @@ class Circle(ToolMotion):
 
     kind: Literal["circle"] = "circle"
     radius_mm: Annotated[float, Field(gt=0, le=10_000)]
+    """Radius of the circle."""
     normal: Vector = (0.0, 0.0, 1.0)
-    """Axis of the circle in the world frame; the tool turns about it right-handed."""
+    """Axis of the circle in the world frame; the tool moves about it right-handed."""
     towards: Vector = (1.0, 0.0, 0.0)
-    """Direction from the tool at ``start_deg`` to the centre, projected perpendicular
-    to ``normal``."""
+    """Direction from the tool position at ``start_deg`` to the centre, in the world
+    frame; only its component perpendicular to ``normal`` is used."""
     cycles: Cycles = 1
+    """Number of turns."""
     hold_s: Seconds = 0.2
+    """Rest before and after the motion."""
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
+    """Duration of the acceleration and of the deceleration."""
 
     @property
     def shortest_s(self) -> float:
-        """Duration without a part at constant speed [s]."""
+        """Total time of rests and ramps [s]."""
         return 2.0 * (self.hold_s + self.ramp_s)
 
     @model_validator(mode="after")
@@ -237,12 +261,14 @@ class Iso9283(ToolMotion):
 
     kind: Literal["iso9283"] = "iso9283"
     edge_mm: Annotated[float, Field(gt=0, le=10_000)] = 250.0
-    """Edge of the cube; the standard lists 250, 400, 630 and 1000 mm. The centre P1 is
-    the tool at ``start_deg``, and the edges are parallel to the world axes."""
+    """Edge length of the cube; the standard lists 250, 400, 630 and 1000 mm. The centre
+    P1 is the tool position at ``start_deg``, and the edges are parallel to the world
+    axes."""
     plane: Plane = "+x"
     """Horizontal direction in which the diagonal plane rises; the four directions are
     the four planes of the standard."""
     cycles: Cycles = 30
+    """Number of cycles through the five poses."""
     hold_s: Seconds = 0.2
     """Rest at P1 before the first cycle."""
     rest_s: Annotated[float, Field(gt=0, le=10_000)] = 0.4
@@ -250,7 +276,7 @@ class Iso9283(ToolMotion):
 
     @property
     def shortest_s(self) -> float:
-        """Time of all rests [s]."""
+        """Total time of all rests [s]."""
         return self.hold_s + 5 * self.cycles * self.rest_s
 
 
@@ -280,4 +306,4 @@ MOTIONS: dict[str, type[MotionSection]] = {
         Iso9283,
     )
 }
-"""Classes of the kinds of motion by name."""
+"""Class of every kind of motion, by the value of ``kind``."""
