@@ -1,4 +1,4 @@
-"""Steps from a scene to its compiled model."""
+"""Single steps of the way from a scene to its compiled model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def motor_loops(
     *,
     sampled: bool,
 ) -> Loops:
-    """Gains and limits of all motors.
+    """Control loops and limits of all motors.
 
     Args:
         scene: The scene.
@@ -55,14 +55,14 @@ def motor_loops(
 
 
 def site_of_force(scene: Scene, arm: RigidArm) -> str:
-    """Name of the tool site, at which tool forces act.
+    """Name of the tool site, on which tool forces act.
 
     Args:
         scene: The scene.
         arm: Its arm.
 
     Raises:
-        InputError: If the scene has a tool force and the arm has no tool site.
+        InputError: If the scene has a tool force but the arm has no tool site.
     """
     if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
         raise InputError(
@@ -82,17 +82,17 @@ def joints_in_contact(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_
     model = arm.model
     collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
     low, high = model.jnt_range.T
-    path, slack = trajectory.position, 1e-3  # drives yield by arc minutes [rad]
+    path, slack = trajectory.position, 1e-3  # torsion of the drives: arc minutes [rad]
     beyond = (path <= low + slack) | (path >= high - slack)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
 
 
 def interpolate_samples(values: Array, n: int) -> Array:
-    """Linear interpolation to n samples per interval.
+    """Refine samples by linear interpolation, n intervals for each one.
 
     Args:
         values: Samples at the ends of all intervals. Shape (m, n_joints).
-        n: Intervals that replace each interval.
+        n: Number of intervals that replace each interval.
 
     Returns:
         Interpolated samples. Shape (n (m - 1) + 1, n_joints).
@@ -117,13 +117,15 @@ def prescribed_errors(
         position: Commanded link angles [rad]. Shape (n, n_joints).
         transmissions: Compiled drives, one per joint.
         step: Interval between two samples [s].
-        discrete: Whether the integrator is ``discrete``, whose positions change by the
-            velocity at the end of a step.
+        discrete: Whether the integrator is ``discrete``, which advances positions by
+            the velocity at the end of a step. The rate is then a backward difference,
+            otherwise a central one.
 
     Returns:
-        Error [rad] and rate [rad/s]. Shapes (n, n_joints).
+        Error [rad] and rate [rad/s] at every joint; zero at other levels. Shapes
+        (n, n_joints).
     """
-    # one extrapolated sample in front gives the rate at the first sample
+    # the rate at the first sample needs one extrapolated sample before it
     path = np.vstack([2.0 * position[:1] - position[1:2], position])
     error = np.column_stack(
         [
@@ -131,7 +133,6 @@ def prescribed_errors(
             for j, t in enumerate(transmissions)
         ]
     )
-    # the discrete integrator advances positions by the velocity at the end of a step
     rate = np.diff(error, axis=0) / step
     if not discrete:
         rate = np.gradient(error, step, axis=0)[1:]
@@ -141,14 +142,15 @@ def prescribed_errors(
 def complete_sections(
     scene: Scene, joints: tuple[str, ...]
 ) -> tuple[JointSection, ...]:
-    """Settings of all joints; every missing key is reported in one error.
+    """Settings of all joints, checked for missing keys.
 
     Args:
         scene: The scene.
         joints: Names of all driven joints.
 
     Raises:
-        InputError: If a joint has no drive or no rotor inertia.
+        InputError: If a joint has no drive or no rotor inertia; one line per missing
+            key.
     """
     sections = tuple(scene.joint_settings(name) for name in joints)
     lines = []
@@ -174,7 +176,7 @@ def load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
     Args:
         scene: The scene, with its table ``[load]``.
         joint: Name of the joint.
-        drive: Drive of the joint, whose rated torque a relative load refers to.
+        drive: Drive of the joint; its rated torque scales a relative load.
     """
     load = scene.load.get(joint)
     if load is None:

@@ -160,7 +160,7 @@ class Measured:
 
 
 class Controller(Protocol):
-    """Control law that turns sensor readings into motor torques every control period."""
+    """Control law: motor torques from sensor readings, once per control period."""
 
     def start(self, task: Task) -> None:
         """Reset the controller and prepare it for a motion."""

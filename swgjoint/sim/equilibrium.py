@@ -18,29 +18,30 @@ if TYPE_CHECKING:
 
 
 RTOL = 1e-9
-"""Largest torque residual of an accepted equilibrium, relative to the rated torque. The
-recording resolves 1e-6 of the rated torque."""
+"""Largest accepted torque residual of an equilibrium, relative to the rated torque. The
+recording only resolves 1e-6 of the rated torque."""
 
 
 def start_state(assembly: Assembly) -> tuple[Array, Array]:
     """Positions and velocities at the first instant, free of start-up ringing.
 
     Every link starts at the angle at which its drive carries weight and load. If a
-    joint starts at rest, its motor starts at the angle at which motor torque, control
-    loop and cogging balance; the loop acts on the angle that it reads, that of the
-    motor or of the link. The gains of computed torque depend on the pose, so with an
-    unknown payload such a joint starts only near its equilibrium.
+    joint starts at rest, its motor starts at the angle at which feed-forward torque,
+    control loop and drive balance. The loop acts on the angle that it reads, which is
+    that of the motor or of the link. The gains of computed torque depend on the pose,
+    so with an unknown payload such a joint starts close to its equilibrium but not
+    exactly in it.
 
-    If a joint starts in motion, its motor starts on the reference at uniform speed. Its
-    link moves at the rate of the equilibrium along the motion, because with kinematic
-    error the link speed varies while the motor speed is uniform.
+    If a joint starts in motion, its motor starts on the reference with the reference
+    speed. The link starts with the rate at which its equilibrium angle moves, because
+    kinematic error makes the link speed vary even at uniform motor speed.
 
     Returns:
         qpos and qvel of the compiled model.
 
     Raises:
-        InputError: If bodies are in contact there, so that no drive can hold them.
-        ComputationError: If a drive has no equilibrium.
+        InputError: If a drive has no equilibrium because bodies are in contact.
+        ComputationError: If a drive has no equilibrium for another reason.
     """
     path, h = assembly.trajectory, assembly.step
     try:
@@ -50,9 +51,9 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
         if not touching:
             raise
         raise InputError(
-            f"{assembly.scene.where}: trajectory.start_deg: bodies press each other"
-            f" where the arm starts: {touching}; accepted: a pose without contact, or"
-            f" an <exclude> of the pair in {assembly.arm.path}"
+            f"{assembly.scene.where}: trajectory.start_deg: bodies penetrate each other"
+            f" at the start: {touching}; accepted: a pose without contact, or an"
+            f" <exclude> of the pair in {assembly.arm.path}"
         ) from exc
     link_rate = path.velocity[0].copy()
     if link_rate.any():
@@ -60,7 +61,8 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
         (_, before), (_, after) = _balance(assembly, -0.1), _balance(assembly, 0.1)
         moving = link_rate != 0.0
         link_rate[moving] = ((after - before) / (0.2 * h))[moving]
-    # a prescribed error adds its rate, differenced like the integrator's velocities
+    # a prescribed error adds its rate, computed with the difference scheme of the
+    # integrator
     stiff = assembly.motor_position < 0
     link_rate[stiff] = (path.velocity[0] + assembly.prescribed_rate[0])[stiff]
     model = assembly.model
@@ -76,9 +78,10 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
 def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
     """Put a simulation into its initial state, including the state of the plugin.
 
-    The plugin predicts a step from the accelerations that all forces except the drive's
-    caused in the previous step. In equilibrium they cancel those of the drive. Without
-    them the plugin would predict the first step as if the load were released.
+    The plugin predicts a step from the accelerations that all forces except those of
+    the drive caused in the previous step. In equilibrium, these accelerations cancel
+    those of the drive, so their initial values follow from the drive torques. With
+    zeros instead, the plugin would predict the first step as if the load were released.
 
     Args:
         assembly: The compiled scene.
@@ -107,7 +110,7 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
             float(on_input),
             float(on_output),
         ]
-        # only the spring carries the load at the start: hysteresis starts relaxed
+        # hysteresis starts relaxed, so only the elastic law carries the initial load
         torsion = float(transmission.law.torsion(theta, psi))
         elements = len(transmission.attached.elements)
         data.plugin_state[first + 2 : first + 2 + elements] = torsion
@@ -117,9 +120,14 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
 def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
     """Motor and link angles in equilibrium, ``shift`` steps after the start.
 
-    The weight torques depend on the sag of all joints, and the drives are stiff. So the
-    solution repeats with the weight torques of the last pose. Each pass reduces the
-    error by the ratio of weight gradient to torsional stiffness, 1e-2 or less.
+    The weight torques depend on the sag of all joints. A fixed-point iteration solves
+    the joints one by one with the weight torques of the previous pose. Because the
+    drives are stiff, each pass reduces the error by the ratio of the gradient of the
+    weight torque to the torsional stiffness, which is 1e-2 or less.
+
+    Args:
+        assembly: The compiled scene.
+        shift: Time after the start in engine steps, between -1 and 1.
 
     Returns:
         Motor and link angles [rad]. Shapes (n_joints,).
@@ -150,7 +158,7 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
                     guess=float(psi[j]) if turn else None,
                 )
             else:
-                # link feedback: the motor reference is advanced by the torsion
+                # link feedback advances the motor reference by the torsion
                 ahead = theta[j] - ratio[j] * psi[j] if by_link else 0.0
                 theta[j], psi[j] = joint_equilibrium(
                     transmission,
@@ -178,7 +186,8 @@ def link_equilibrium(
         transmission: A drive with a torque law between motor and link.
         theta: Motor angle [rad].
         output_torque: Torque that the drive exerts on the link [N·m].
-        guess: Link angle near the solution [rad]; None starts from the mean curve.
+        guess: Link angle near the solution [rad]; None starts from the mean torsion
+            curve.
 
     Raises:
         ComputationError: If the iteration does not converge.
@@ -193,7 +202,7 @@ def link_equilibrium(
         value = float(law.forces(theta, psi)[1]) - output_torque
         if abs(value) <= RTOL * rated:
             return psi
-        # the output torque falls with the link angle, by about the stiffness
+        # the slope of output torque over link angle is about minus the stiffness
         rise = law.forces(theta, psi + 1e-8)[1] - law.forces(theta, psi - 1e-8)[1]
         slope = min(float(rise) / 2e-8, -softest)
         psi -= value / slope
@@ -211,30 +220,33 @@ def joint_equilibrium(
 ) -> tuple[float, float]:
     r"""Motor and link angle at which one drive rests under a torque.
 
-    They minimise :math:`V(\theta, \psi) + T\psi - \tau\theta
-    + \tfrac12 k_p (\theta - \theta_r)^2` over both angles. With cogging there may be
-    several minima; the result is the one that a descent from the reference reaches.
+    The angles minimise :math:`V(\theta, \psi) + T\psi - \tau\theta
+    + \tfrac12 k_p (\theta - \theta_r)^2` with the elastic energy V, the output torque
+    T, the feed-forward torque :math:`\tau` and the loop stiffness :math:`k_p`. With
+    cogging there may be several minima; the result is the minimum that a descent from
+    the initial guess reaches.
 
     Args:
         transmission: A drive with a torque law between motor and link.
         output_torque: Torque that the drive exerts on the link [N·m].
         motor_reference: Commanded motor angle [rad].
-        motor_torque: Feed-forward torque of the motor at that angle [N·m].
-        stiffness: Stiffness of the motor's position loop [N·m/rad].
-        guess: Motor and link angle near the solution, for example those of a similar
-            torque [rad]; None starts from the reference.
+        motor_torque: Feed-forward torque of the motor [N·m].
+        stiffness: Proportional gain of the motor's position loop [N·m/rad].
+        guess: Motor and link angle near the solution [rad], for example those at a
+            similar torque; None starts from the motor reference.
 
     Returns:
         Motor and link angle [rad].
 
     Raises:
-        ComputationError: If the descent does not settle.
+        ComputationError: If the descent does not converge.
     """
     law, rated = transmission.law, transmission.drive.ratings.rated_torque
     assert law is not None
-    # unknowns x = (motor angle)/i and link angle: both curvatures are of the order of K
+    # the unknowns x are motor angle over ratio and link angle; the curvature is then of
+    # the order of the torsional stiffness in both
     scale = np.array([law.ratio, 1.0])
-    # no step skips a tooth
+    # limit the steps, so that the descent does not skip a minimum of the cogging energy
     longest = 0.1 / max(float(np.abs(law.angle_orders[:, 0]).max()), 1.0)
 
     def energy(x: Array) -> float:
@@ -257,7 +269,7 @@ def joint_equilibrium(
         held = link_equilibrium(transmission, motor_reference, output_torque)
         guess = motor_reference, held
     x = np.array(guess) / scale
-    step = 1e-9  # differences of the gradient: 1e-9 rad against 1e-3 rad of torsion
+    step = 1e-9  # for differences of the gradient [rad]; the torsion is about 1e-3 rad
     for _ in range(500):
         value = gradient(x)
         if np.abs(value).max() <= RTOL * rated:
@@ -269,13 +281,14 @@ def joint_equilibrium(
                 for unit in np.eye(2)
             ]
         )
-        # a Newton step with |curvature| also descends where the energy is not convex
+        # with the absolute curvatures, a Newton step descends even where the energy is
+        # not convex
         size, axes = np.linalg.eigh(0.5 * (bend + bend.T))
         size = np.maximum(np.abs(size), 1e-9 * np.abs(size).max())
         move = -axes @ ((axes.T @ value) / size)
         move *= min(1.0, longest / max(abs(law.ratio * move[0]), 1e-300))
         here, share = energy(x), 1.0
-        # round-off of the energy must not stop the last steps
+        # a tolerance, so that round-off of the energy does not stop the last steps
         slack = 1e-13 * (abs(here) + rated)
         while energy(x + share * move) > here + slack and share > 1e-6:
             share *= 0.5

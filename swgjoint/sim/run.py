@@ -1,4 +1,4 @@
-"""Recorded run of a scene: all states, and the figures computed from them."""
+"""Recorded run of a scene: its states, its signals, and the figures of both."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """A recorded run; arrays hold all n states, the first included.
+    """A recorded run; arrays contain all n recorded states, including the first.
 
-    Angles and torques refer to the output side unless their name says motor. Joints
-    follow ``joints``. Torques and torsions are the drive's law at the recorded state;
-    the motor torque is the mean over the step that led to it.
+    Angles and torques refer to the output side unless their name contains ``motor``.
+    The joint axis has the order of ``joints``. Torques and torsions result from the law
+    of the drive at the recorded state. The motor torque is the mean over the step that
+    led to the state.
     """
 
     name: str
+    """Name of the run."""
     assembly: Assembly
+    """The scene as it was compiled."""
     joints: tuple[str, ...]
+    """Names of the driven joints."""
     time: Array
     """Times of the recorded states [s]. Shape (n,)."""
     position: Array
@@ -35,8 +39,8 @@ class Run:
     velocity: Array
     """Link speeds [rad/s]. Shape (n, n_joints)."""
     motor_position: Array
-    """Motor angles [rad]; without a rotor those that follow from the link angles by the
-    ideal gear or the gear with prescribed error. Shape (n, n_joints)."""
+    """Motor angles [rad]. At levels without a rotor they follow from the link angles
+    and the prescribed error. Shape (n, n_joints)."""
     motor_velocity: Array
     """Motor speeds [rad/s]. Shape (n, n_joints)."""
     reference: Array
@@ -48,9 +52,9 @@ class Run:
     output_torque: Array
     """Torque of the drives on the links [N·m]. Shape (n, n_joints)."""
     motor_torque: Array
-    """Motor torques within their limits [N·m]. Shape (n, n_joints)."""
+    """Motor torques after limitation [N·m]. Shape (n, n_joints)."""
     wanted_torque: Array
-    """Motor torques that the controller commanded, before limits [N·m]. Shape
+    """Motor torques that the controller commanded, before limitation [N·m]. Shape
     (n, n_joints)."""
     slipping_torque: Array
     """Hysteresis torque along the torsion [N·m]; zero if the drive has none. Shape
@@ -65,7 +69,7 @@ class Run:
     wall: float
     """Wall time of all steps [s]."""
     recording: Path | None = None
-    """Recording for the viewer that was written with the run; None without one."""
+    """File of the recording for the viewer; None if none was written."""
 
     @property
     def steps_per_second(self) -> float:
@@ -74,7 +78,7 @@ class Run:
 
     @property
     def steady(self) -> slice:
-        """Samples of the constant-speed part."""
+        """Samples that the figures use, see :class:`Trajectory`."""
         return self.assembly.trajectory.steady
 
     @property
@@ -83,11 +87,11 @@ class Run:
         return contents(self.assembly)
 
     def tool_error(self, other: Run | None = None) -> Array:
-        """Distance of the tool from that of another run [m]. Shape (n,).
+        """Distance between the tool and a reference at every instant [m]. Shape (n,).
 
         Args:
-            other: A run of the same motion, usually of the rigid arm; None compares
-                with the commanded path.
+            other: Run of the same motion that provides the reference, usually that of
+                the rigid arm; None uses the commanded path.
         """
         reference = self.tool_reference if other is None else other.tool_position
         return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))

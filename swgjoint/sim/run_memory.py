@@ -6,18 +6,21 @@ from swgjoint.memory import require_memory
 from swgjoint.sim.scene.scene import Scene
 
 BYTES = 8
+"""Size of a floating-point number [B]."""
 STEP, STEP_AND_JOINT = 75, 32
-"""Numbers in memory per recorded step, and per recorded step and joint, while the
-signals and figures of a run are computed. Measured per step: 102 for one joint, 250 for
-six joints with 28 harmonics each. A recording is written in parts and adds none."""
+"""Floating-point numbers in memory per recorded step, and per recorded step and joint,
+while the signals and figures of a run are computed. Measurements gave 102 per step for
+one joint and 250 per step for six joints with 28 harmonics each. A recording is written
+in parts and needs no additional memory per step."""
 SUB_STEP_AND_JOINT = 12
-"""Numbers per joint and additional engine step: motion, torques, inputs, speeds."""
+"""Floating-point numbers per joint and additional engine step: motion, torques, inputs
+and speeds."""
 VIEWER = 0.15e9
-"""Memory of the library that writes recordings [B]."""
+"""Memory that the library for writing recordings uses [B]."""
 
 
 def required_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> float:
-    """Estimated memory of a run, beyond that of a process that has read its scene [B].
+    """Estimated memory of a run, in addition to that of the process before it [B].
 
     Args:
         scene: The scene, which states duration and step.
@@ -39,8 +42,8 @@ def require_run_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> None
         sub_steps: Engine steps per step of the scene.
 
     Raises:
-        ComputationError: If memory is short; the message states required and free
-            memory.
+        ComputationError: If the memory is not sufficient; the message states required
+            and free memory.
     """
     section = scene.simulation
     cut = f" in {sub_steps} sub-steps each" if sub_steps > 1 else ""

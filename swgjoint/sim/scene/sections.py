@@ -41,9 +41,9 @@ class ControllerSection(Section):
     :math:`k_d = 2\zeta J\omega` with :math:`J = J_m + J_l(q_0)/i^2`. The integral gain
     is :math:`k_i = k_p/T_i`.
 
-    The kind ``computed_torque`` uses the inverse dynamics of the rigid arm, with inertia
-    matrix M and bias torques h, and of its rotors, with inertias J. They are evaluated
-    at the measured motion, which is the motor motion divided by the ratio:
+    The kind ``computed_torque`` uses the inverse dynamics of the rigid arm, with
+    inertia matrix M and bias torques h, and of its rotors, with inertias J. They are
+    evaluated at the measured motion, which is the motor motion divided by the ratio:
 
     .. math:: \tau = \left(M a + h\right)/i + i J a, \quad
         a = \ddot q_r + 2\zeta\omega(\dot q_r - \dot\theta/i)
