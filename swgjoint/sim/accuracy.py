@@ -1,6 +1,7 @@
-"""Run, error and cost of one scene at one level, integrator and time step.
+"""Outcome, error and cost of running a scene at one level, integrator and time step.
 
-Euler and implicitfast, which scenes do not offer, use the model of an RK4 scene.
+Scenes do not offer the integrators Euler and implicitfast. For these, the model is
+compiled as for RK4 and its integrator is then replaced.
 """
 
 from __future__ import annotations
@@ -25,17 +26,18 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin, mm
 
 SCENE_INTEGRATORS = ("discrete", "RK4")
+"""Integrators that a scene file can name."""
 RECORD = 1e-3
-"""Interval between the samples that runs with smaller steps keep [s]."""
+"""Interval between recorded samples of runs with smaller steps [s]."""
 TIMED_STEPS = 400
-"""Engine steps per timing."""
+"""Number of engine steps per timing."""
 QUANTITIES = {
     "link_angle": "arcmin",
     "tool_position": "mm",
     "torsion": "arcmin",
     "ripple_spectrum": "%",
 }
-"""Error quantities and the units of their errors."""
+"""Quantities that are compared with a reference run, with the unit of their errors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +45,15 @@ class Setting:
     """Level, integrator and time step of a simulation."""
 
     level: str
+    """Level of detail of all joints."""
     integrator: str
+    """Name of the engine's integrator, for example ``discrete`` or ``implicitfast``."""
     step: float
     """Time step of the scene [s]."""
 
     @property
     def name(self) -> str:
-        """Integrator and step."""
+        """Integrator and step as text, for example ``RK4, 0.5 ms``."""
         return f"{self.integrator}, {1e3 * self.step:g} ms"
 
 
@@ -58,22 +62,25 @@ class SettingOutcome:
     """Result of running a scene at one setting."""
 
     run: Run | None
+    """The run; None if the setting was refused or the run diverged."""
     assembly: Assembly | None
-    """Compiled scene; None if the setting was refused."""
+    """The compiled scene; None if the setting was refused."""
     outcome: str
     """``ok``, ``sub_stepped``, ``refused`` or ``diverged``."""
     reason: str | None = None
+    """Error message, or bounds that require sub-steps; None if the outcome is ``ok``.
+    """
 
 
 def assemble_setting(
     scene: Scene, setting: Setting, drives: Mapping[str, DriveMap] | None = None
 ) -> Assembly:
-    """Compile a scene at a setting; explicit integrators get no sub-steps.
+    """Compile a scene at a setting, with sub-steps only if it is ``discrete``.
 
     Args:
         scene: The scene.
         setting: Level, integrator and time step.
-        drives: Maps that replace drive references of the scene.
+        drives: Maps by drive reference, used instead of loading or building them.
 
     Raises:
         SwgError: If the setting is refused, see
@@ -107,8 +114,8 @@ def attempt(
     Args:
         scene: The scene.
         setting: Level, integrator and time step.
-        drives: Maps that replace drive references of the scene.
-        midway: Whether inputs are those of the middle of each step, see
+        drives: Maps by drive reference, used instead of loading or building them.
+        midway: Whether the inputs of a step are those at its middle, see
             :func:`hold_midway`.
     """
     try:
@@ -125,7 +132,7 @@ def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcom
 
     Args:
         whole: The compiled scene.
-        midway: Whether inputs are those of the middle of each step, see
+        midway: Whether the inputs of a step are those at its middle, see
             :func:`hold_midway`.
     """
     kept = thin_samples(hold_midway(whole) if midway else whole)
@@ -145,10 +152,10 @@ def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcom
 
 
 def thin_samples(whole: Assembly) -> Assembly:
-    """Copy of which a run keeps samples every :data:`RECORD` instead of every step.
+    """Copy whose runs record one sample per :data:`RECORD` instead of one per step.
 
-    A scene with a sampled loop, which counts the steps of the scene, is returned
-    unchanged.
+    The scene is returned unchanged if its steps do not fit into intervals of
+    :data:`RECORD`, or if it has a sampled loop, which counts the steps of the scene.
     """
     step = whole.scene.simulation.step_s
     n = round(RECORD / step)
@@ -160,12 +167,12 @@ def thin_samples(whole: Assembly) -> Assembly:
 
 
 def hold_midway(whole: Assembly) -> Assembly:
-    """Copy with the inputs of the middle of each step, for reference solutions.
+    """Copy whose inputs during a step are those at its middle, for reference solutions.
 
-    Explicit integrators hold the inputs of the start of a step throughout the step. The
-    inputs are half a step late on average, an error of first order in the step whatever
-    the order of the integrator. A scene with a sampled loop, which has its own
-    instants, is returned unchanged.
+    Explicit integrators hold the inputs at the start of a step throughout the step. The
+    inputs are therefore half a step late on average, which is an error of first order
+    in the step, whatever the order of the integrator. A scene with a sampled loop is
+    returned unchanged, because its law needs the reference at the control instants.
     """
     if whole.loops.sampled:
         return whole
@@ -188,20 +195,23 @@ def hold_midway(whole: Assembly) -> Assembly:
 
 
 def errors(run: Run, reference: Run) -> dict[str, float]:
-    r"""Errors of a run under the keys of :data:`QUANTITIES`.
+    r"""Errors of a run relative to a reference, under the keys of :data:`QUANTITIES`.
 
-    Angles: root mean square over the motion, largest over the joints. Tool: root mean
-    square of the distance. Torque ripple over the constant-speed part: difference of
-    the amplitude spectra up to the highest line of the reference,
-    :math:`\sqrt{\sum (A_k - A_k^{ref})^2/2}`, divided by the rated torque, largest
-    over the joints.
+    - ``link_angle`` and ``torsion``: root mean square over the run, of the joint with
+      the largest value.
+    - ``tool_position``: root mean square of the distance of the tool.
+    - ``ripple_spectrum``: difference of the amplitude spectra of the torque ripple up
+      to the highest line of the reference, :math:`\sqrt{\sum (A_k - A_k^{ref})^2/2}`,
+      divided by the rated torque, of the joint with the largest value. The spectra
+      cover the part of the motion that the metrics use.
 
     Args:
         run: The run.
         reference: Reference run of the same motion.
 
     Returns:
-        Errors in the units of :data:`QUANTITIES`; no ``tool_position`` without a tool.
+        Errors in the units of :data:`QUANTITIES`, without ``tool_position`` if the arm
+        has no tool site.
 
     Raises:
         ValueError: If the two runs have no samples at the same times.
@@ -261,7 +271,10 @@ def _ripple_error(run: Run, reference: Run) -> float:
 
 
 def _lines(ripple: Array) -> Array:
-    """Amplitudes at whole cycles per record [N·m]; the last sample is dropped."""
+    """Amplitudes at whole numbers of cycles per record [N·m].
+
+    The last sample is dropped, because the spectrum assumes a periodic record.
+    """
     n = ripple.size - 1
     return np.asarray(2.0 * np.abs(np.fft.rfft(ripple[:-1]))[1:] / max(n, 1))
 
@@ -271,11 +284,13 @@ class Stepper:
     """A compiled scene in its initial state, ready for timing."""
 
     assembly: Assembly
+    """The compiled scene."""
     data: mujoco.MjData
+    """Engine data, which advances with every timing."""
 
     @classmethod
     def from_assembly(cls, whole: Assembly) -> Stepper:
-        """Set the initial state and hold the inputs of the first step."""
+        """Set the initial state of a scene, and the inputs of its first step."""
         data = mujoco.MjData(whole.model)
         set_start(whole, data)
         if whole.model.nu:
@@ -290,12 +305,12 @@ class Stepper:
 
 
 def relative_speed(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
-    """Engine steps per CPU second, relative to another scene; median of pairs.
+    """Engine steps per CPU second of a scene, divided by those of another scene.
 
     Args:
         own: The scene.
         rigid: The scene to compare with, usually the rigid arm.
-        pairs: Number of paired timings.
+        pairs: Number of timings of each scene; the result is the median of the ratios.
     """
     own.seconds(), rigid.seconds()
     ratios = [rigid.seconds() / own.seconds() for _ in range(pairs)]
@@ -308,13 +323,13 @@ def relative_cost(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
     Args:
         own: The scene.
         rigid: The same scene with rigid joints.
-        pairs: Number of paired timings.
+        pairs: Number of timings, see :func:`relative_speed`.
     """
     return cost_at(own.assembly, relative_speed(own, rigid, pairs=pairs))
 
 
 def cost_at(whole: Assembly, speed: float) -> float:
-    """CPU time per simulated time, relative to the rigid arm at 1 ms steps.
+    """CPU time per simulated time, relative to that of the rigid arm at 1 ms steps.
 
     Args:
         whole: The scene at its setting.
@@ -328,7 +343,7 @@ def rigid_arm(scene: Scene, drives: Mapping[str, DriveMap] | None = None) -> Ste
 
     Args:
         scene: The scene.
-        drives: Maps that replace drive references of the scene.
+        drives: Maps by drive reference, used instead of loading or building them.
     """
     step = scene.simulation.step_s
     setting = Setting(level="rigid", integrator="discrete", step=step)

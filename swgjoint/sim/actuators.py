@@ -1,4 +1,4 @@
-"""Engine actuators for motors with loops and limits, loads and disturbances."""
+"""Engine actuators for motors with control loops, for loads and for disturbances."""
 
 from __future__ import annotations
 
@@ -29,29 +29,33 @@ SETPOINTS = int(
     | mujoco.mjtCtrlInput.mjINPUT_VEL
     | mujoco.mjtCtrlInput.mjINPUT_FF
 )
+"""Inputs of a motor whose loop runs in the engine: angle, speed and torque."""
 TORQUE = int(mujoco.mjtCtrlInput.mjINPUT_FF)
+"""Input of a motor whose loop runs outside the engine: torque."""
 WORLD_SITE = "disturbance_frame"
+"""Name of the site at the world frame in which tool forces are defined."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loops:
-    """Control loops and limits of all motors; arrays of shape (n_joints,)."""
+    """Control loops and limits of all motors. All arrays have shape (n_joints,)."""
 
     stiffness: Array
     """Gain on the motor angle [N·m/rad]."""
     damping: Array
     """Gain on the motor speed [N·m·s/rad]."""
     integral: Array
-    """Gain on the integral of the angle error [N·m/(rad·s)]; zero without integral."""
+    """Gain on the integral of the angle error [N·m/(rad·s)]; zero without an integral
+    term."""
     integral_limit: Array
     """Largest torque of the integral term [N·m]."""
     limits: tuple[MotorLimits | None, ...]
-    """Limits of each motor; None if it has none."""
+    """Limits of each motor; None for a motor without limits."""
     sampled: bool
     """Whether the loop runs outside the engine, so that motors take torques only."""
 
     def setpoints(self, j: int) -> bool:
-        """Whether motor j takes angle, speed and torque, instead of torque alone."""
+        """Whether motor j has inputs for angle, speed and torque, or torque alone."""
         limits = self.limits[j]
         line = limits is not None and limits.stall_torque_Nm is not None
         return not self.sampled and (line or bool(self.integral[j]))
@@ -66,18 +70,17 @@ def add_actuators(
     *,
     tool_site: str = "tool",
 ) -> None:
-    """Add a motor with its control loop to every joint, and loads and disturbances.
+    """Add a motor with its control loop to every joint, then loads and disturbances.
 
-    The order of the actuators is: all motors, all loads that are not zero, all
-    disturbances.
+    The order of the actuators is: all motors, all non-zero loads, all disturbances.
 
-    The loop is the actuator's own law, because MuJoCo then solves it within the step: a
-    light rotor in a stiff loop stays stable where a loop evaluated once per step would
-    not. Without integral and torque-speed line the law is affine, torque = control -
-    kp angle - kd speed. With an integral it is the engine's ``pid``, with a
-    torque-speed line the engine's ``dcmotor``, whose voltage limit is that line.
-    Without a rotor the motor acts on the joint through the gear, so angle and speed of
-    the actuator are still those of the motor.
+    The loop is the actuator's own law, because MuJoCo then solves it within the step. A
+    light rotor in a stiff loop thus stays stable, which it would not if the loop were
+    evaluated once per step. Without an integral term and a torque-speed line, the law
+    is affine: torque = control - kp angle - kd speed. With an integral term it is the
+    engine's ``pid``. With a torque-speed line it is the engine's ``dcmotor``, whose
+    voltage limit represents that line. Without a rotor, the motor acts on the joint
+    through the gear, so the actuator still has the angle and the speed of the motor.
 
     Args:
         spec: Model with attached drives; changed in place.
@@ -88,7 +91,7 @@ def add_actuators(
         tool_site: Site on which tool forces act.
     """
     for actuator in list(spec.actuators):
-        spec.delete(actuator)  # actuators of the arm's file would act in addition
+        spec.delete(actuator)  # actuators from the file would act in addition
     for j, t in enumerate(transmissions):
         rigid = t.law is None
         motor = spec.add_actuator(
@@ -120,17 +123,17 @@ def add_actuators(
 
 
 def _set_law(motor: Any, loops: Loops, j: int) -> None:
-    """Set gains and limits of motor j."""
+    """Set the control law and the limits of motor j."""
     limits = loops.limits[j]
     kp, kd, ki = (x[j] for x in (loops.stiffness, loops.damping, loops.integral))
     largest = loops.integral_limit[j] / ki if ki else 0.0
     torque = None if limits is None else limits.torque
     if ki and not loops.sampled:
-        # the engine's own clamp stops the integral one step after the limit
+        # clamp the state as well: the engine's own clamp acts one step after the limit
         motor.actlimited = mujoco.mjtLimited.mjLIMITED_TRUE
         motor.actrange = [-largest, largest]
     if limits is not None and limits.stall_torque_Nm is not None:
-        # voltage in units that make the motor constant 1
+        # choose the unit of voltage so that the motor constant is 1
         top = (limits.no_load_speed_rpm or 0.0) * rpm
         gains = [0.0] * 3 if loops.sampled else [kp, ki, kd]
         motor.set_to_dcmotor(
@@ -155,14 +158,14 @@ def _set_law(motor: Any, loops: Loops, j: int) -> None:
 
 
 def control_inputs(assembly: Assembly) -> Array:
-    """Inputs of motors, loads and disturbances at every step.
+    """Inputs of motors, loads and disturbances at every engine step.
 
-    The integrator ``discrete`` evaluates the loop at the end of a step and takes the
-    reference of that instant; other integrators evaluate the loop at the start. At
-    level ``kinematic`` the angle in the loop differs from the motor angle by the
-    prescribed error, and the motor input includes the torque that accelerates the rotor
-    inertia along this error; see :mod:`swgjoint.joint.prescribed`. Motors of a sampled
-    loop receive only this torque.
+    The integrator ``discrete`` evaluates the loop at the end of a step and uses the
+    reference at that instant; other integrators evaluate the loop at the start. At
+    level ``kinematic`` the prescribed error is added to the reference, and the motor
+    input includes the torque that accelerates the rotor inertia along this error; see
+    :mod:`swgjoint.joint.prescribed`. For sampled loops the inputs contain only this
+    torque, to which the loop adds its own.
 
     Returns:
         Actuator inputs. Shape (n_steps, n_inputs).
@@ -203,7 +206,7 @@ def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
         time: Instants [s]. Shape (n,).
 
     Returns:
-        Torque on the joint [N·m], or fraction of the tool force (0 or 1). Shape (n,).
+        Torque on the joint [N·m], or factor on the tool force (0 or 1). Shape (n,).
     """
     length = disturbance.duration_s
     end = np.inf if length is None else disturbance.start_s + length
@@ -222,7 +225,7 @@ def limit_torque(command: Array, speed: Array, limits: MotorLimits | None) -> Ar
     Args:
         command: Commanded torque [N·m]. Shape (..., n).
         speed: Motor speed [rad/s]. Shape (n,).
-        limits: Limits of the motor; None applies no limits.
+        limits: Limits of the motor; None for an unlimited motor.
 
     Returns:
         Limited torque [N·m]. Shape of ``command``.
@@ -242,11 +245,11 @@ def wanted_torque(
 ) -> Array:
     """Torque that the engine's loops commanded in the step to each state [N·m].
 
-    The torque of a state is that of the step that led to it, at the start and at the
-    end of that step. The integrator ``discrete`` applies only the torque at the end, so
-    both are equal. Other integrators hold the reference while the motor turns. They are
-    evaluated with the mean motor speed of the step: a stiff loop makes a light rotor
-    oscillate within every step, which the speeds at its ends do not show.
+    For each state, the function returns the torque at the start and at the end of the
+    step that led to it. The integrator ``discrete`` applies only the torque at the end,
+    so both are equal. Other integrators hold the reference while the motor turns. For
+    them the mean motor speed of the step is used, because a stiff loop makes a light
+    rotor oscillate within every step, which the speeds at its ends do not show.
 
     Args:
         assembly: The scene as it was run.
@@ -255,7 +258,8 @@ def wanted_torque(
         integral: Integral of the angle error [rad·s]. Shape (n, n_joints).
 
     Returns:
-        Torque at the start and at the end of the step [N·m]. Shape (2, n, n_joints).
+        Torque before limitation, at the start and at the end of the step [N·m]. Shape
+        (2, n, n_joints). The first state has the torque of the second.
     """
     path, ratio, loops = assembly.trajectory, assembly.ratio, assembly.loops
     parts = assembly.sub_steps

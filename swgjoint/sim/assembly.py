@@ -1,4 +1,4 @@
-"""From a scene to a compiled model: arm, drives, motors, loads."""
+"""Assembly of a scene into a compiled model: arm, drives, motors and loads."""
 
 from __future__ import annotations
 
@@ -44,41 +44,48 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assembly:
-    """A scene ready to run; joint axes follow ``joints``, n counts the samples."""
+    """A scene that is ready to run; n counts its engine steps and the start."""
 
     scene: Scene
+    """The scene as it was read."""
     sub_steps: int
     """Engine steps per step of the scene."""
     outside: dict[str, str]
-    """Joints whose stability region the scene's own step would leave, each with the
-    bound that it exceeds."""
+    """Joints that the scene's own step would leave outside their stability region, each
+    with the exceeded bounds."""
     arm: RigidArm
+    """The arm with its payload."""
     known_arm: RigidArm
     """The controller's model of the arm, which lacks a payload that is not known."""
     model: mujoco.MjModel
+    """The compiled model with drives, motors, loads and disturbances."""
     joints: tuple[str, ...]
+    """Names of the driven joints, in the order of all arrays."""
     transmissions: tuple[Transmission, ...]
+    """Drives as the model contains them, one per joint."""
     trajectory: Trajectory
+    """Commanded motion, one sample per engine step."""
     loops: Loops
+    """Control loops and limits of all motors."""
     link_inertia: Array
     """Link inertia about every joint at the start, in the controller's model [kg·m²].
     Shape (n_joints,)."""
     load: Array
     """Constant load torque against every joint [N·m]. Shape (n_joints,)."""
     disturbances: tuple[Disturbance, ...]
+    """Disturbances of the scene, in the order of their actuators."""
     link_torque: Array
-    """Drive torque that the rigid arm needs for the motion [N·m]. Shape
-    (n, n_joints)."""
+    """Drive torque that the rigid arm and the load require on the commanded motion
+    [N·m]. Shape (n, n_joints)."""
     feedforward: Array
     """Motor torque of the feed-forward [N·m]. Shape (n, n_joints)."""
     prescribed: Array
     """Kinematic error on the commanded motion at level ``kinematic``, zero at other
     levels [rad]. Shape (n, n_joints)."""
     prescribed_rate: Array
-    """Rate of the prescribed error, differenced like the integrator's velocities
-    [rad/s]. Shape (n, n_joints)."""
+    """Rate of the prescribed error [rad/s]. Shape (n, n_joints)."""
     controlled_by: str | None
-    """Name of an external controller; None if the scene's own controller runs."""
+    """Name of the external controller; None if the scene's own controller runs."""
     link_position: NDArray[np.intp]
     """Addresses of the link angles in qpos. Shape (n_joints,)."""
     link_velocity: NDArray[np.intp]
@@ -94,7 +101,7 @@ class Assembly:
         return float(self.model.opt.timestep)
 
     def without_sub_steps(self) -> Assembly:
-        """Copy with only the samples that a run records, one per step of the scene."""
+        """Copy that keeps only the recorded samples, one per step of the scene."""
         n = self.sub_steps
         return replace(
             self,
@@ -128,10 +135,9 @@ def assemble(
 
     Args:
         scene: The scene.
-        drives: Maps that replace drive references of the scene; all other drives are
-            loaded or built.
-        controlled_by: Name of an external controller, whose motors take torques only;
-            None if the scene's own controller runs.
+        drives: Maps by drive reference; all other drives are loaded or built.
+        controlled_by: Name of an external controller, with which the motors take
+            torques only; None if the scene's own controller runs.
         variable: Whether drives at level ``full`` can deviate from their maps, see
             :mod:`swgjoint.joint.variation`.
         progress: Called while maps are built.
@@ -140,10 +146,10 @@ def assemble(
         The compiled scene with its commanded motion.
 
     Raises:
-        InputError: If a joint or drive does not exist or does not fit.
-        ComputationError: If a joint remains outside its stability region even with the
-            sub-steps that the scene accepts. The message names the exceeded bound and
-            a step that meets it.
+        InputError: If a joint or drive does not exist or cannot be used.
+        ComputationError: If the run would not fit in memory, or if a joint remains
+            outside its stability region even with the sub-steps that the scene accepts.
+            The message then names the exceeded bound and a step that meets it.
     """
     arm, known_arm = arms_of(
         scene.arm,
@@ -157,8 +163,8 @@ def assemble(
     trajectory = trajectory_of(scene, arm)
     check_ranges(arm, trajectory, where=scene.where)
 
-    # drives keep the harmonics that the scene's own step resolves: the contents of a
-    # run follow from the step that its user chose, not from that of the integrator
+    # drives keep the harmonics that the scene's own step resolves, so the contents of a
+    # run depend on the step that the user chose, not on the number of sub-steps
     spec = _spec_at_step(scene, arm)
     fittings = _fittings(
         dict(zip(arm.joints, sections, strict=True)),
@@ -179,7 +185,7 @@ def assemble(
         transmission_of(attached[name], fittings[name].drive) for name in arm.joints
     )
 
-    # motors, loads and disturbances act on the finished drives
+    # add motors, loads and disturbances after all drives are attached
     load = np.array([load_torque(scene, t.joint, t.drive) for t in transmissions])
     link_inertia = known_arm.inertia(trajectory.position[0])
     loops = motor_loops(
@@ -234,9 +240,9 @@ def assemble(
 def _checked_sections(
     scene: Scene, arm: RigidArm, *, external: bool
 ) -> tuple[JointSection, ...]:
-    """Settings of all joints of a scene that fits its arm and its controller."""
+    """Settings of all joints, after a check of the scene against arm and controller."""
     named = scene.trajectory.named_joints
-    named["start_deg"] -= set(arm.held)  # where hinges without a drive are held
+    named["start_deg"] -= set(arm.held)  # held joints may have a start angle, too
     check_joint_names(
         {
             "joints": set(scene.joints),
@@ -281,7 +287,7 @@ def _fittings(
     variable: bool,
     progress: Progress,
 ) -> dict[str, Fitting]:
-    """Drive and settings of every joint; ``top_speed`` in the order of the joints."""
+    """Drive and settings of every joint; ``top_speed`` has the order of the joints."""
     fittings = {}
     for (name, section), speed in zip(sections.items(), top_speed, strict=True):
         drive = drive_of(section, known=known, joint=name, progress=progress)
@@ -293,7 +299,7 @@ def _fittings(
             friction=section.friction is not False,
             rotor=section.rotor or "gyroscopic",
             variable=variable,
-            # any step resolves all orders of a joint at rest
+            # None for a joint at rest, of which every step resolves all orders
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
     return fittings
@@ -306,11 +312,11 @@ def _stable_sub_steps(
     attached: Mapping[str, JointDrive],
     fittings: Mapping[str, Fitting],
 ) -> tuple[int, dict[str, str]]:
-    """Sub-steps that all joints need, and the bounds that joints exceed without them.
+    """Number of sub-steps that all joints need, and the bounds exceeded without them.
 
     Raises:
         InputError: If a link is too light for its drive.
-        ComputationError: If the scene does not accept that many sub-steps.
+        ComputationError: If a joint needs more sub-steps than the scene accepts.
     """
     sub_steps, outside = 1, {}
     contacts = joints_in_contact(arm, trajectory)
@@ -341,15 +347,15 @@ def _planned_torques(
     """Drive torques of the rigid arm and motor torques of the feed-forward [N·m].
 
     Returns:
-        Both on the commanded motion. Shapes (n, n_joints).
+        Both torques on the commanded motion. Shapes (n, n_joints).
     """
-    # torques of the rigid arm change little within a step
+    # torques of the rigid arm change little within a step, so they are interpolated
     coarse = trajectory.every(sub_steps)
     motion = (coarse.position, coarse.velocity, coarse.acceleration)
     link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
     kind = scene.controller.feedforward
     if scene.controller.kind == "computed_torque":
-        kind = "gravity_inertia"  # the start only; the loop computes its own
+        kind = "gravity_inertia"  # for the start only: the loop computes its own torque
     known_torque = link_torque
     if kind == "gravity":
         known_torque = load + interpolate_samples(

@@ -8,12 +8,12 @@ from swgjoint.sim.scene.sections import ControllerSection, FeedForward
 from swgjoint.typing import Array
 
 DEFAULT_FREQUENCY = 8.0
-"""Natural frequency of the motor control unless a scene states one [Hz]."""
+"""Natural frequency of the position loop unless the scene states one [Hz]."""
 DEFAULT_DAMPING_RATIO = 1.0
-"""Damping ratio of the motor control unless a scene states one."""
+"""Damping ratio of the position loop unless the scene states one [-]."""
 INTEGRAL_TIME = 4.0
-"""Integral time of a PID loop times its natural frequency in rad/s, dimensionless. The
-loop is stable above 1/(2 zeta)."""
+"""Integral time of a PID loop, as a multiple of the reciprocal natural frequency in
+rad/s [-]. The loop with a rigid drive is stable for values above 1/(2 zeta)."""
 
 
 def control_gains(section: ControllerSection, inertia: Array) -> tuple[Array, Array]:
@@ -51,13 +51,15 @@ def integral_gain(
 
 
 def answer_speed(section: ControllerSection, jump: Array) -> Array:
-    r"""Largest joint speed of the step response, rigid drive without limits [rad/s].
+    r"""Largest joint speed of the step response with a rigid drive and no limits.
 
-    It is that of the oscillator with the loop's :math:`\omega, \zeta`, in which the
-    step enters the position loop only:
-    :math:`A\omega\,e^{-\zeta\varphi/\sin\varphi}` with :math:`\cos\varphi = \zeta`,
-    and :math:`A\omega/e` for :math:`\zeta \ge 1`. If the scene states gains instead of
-    a natural frequency, the default frequency is assumed.
+    The joint is an oscillator with the loop's natural frequency :math:`\omega` and
+    damping ratio :math:`\zeta`. A step of height A in the reference angle, without a
+    reference speed, gives the largest speed
+    :math:`A\omega\,e^{-\zeta\varphi/\sin\varphi}` with :math:`\cos\varphi = \zeta`. For
+    :math:`\zeta > 1` the value at :math:`\zeta = 1`, :math:`A\omega/e`, is an upper
+    bound. If the scene states gains instead of a natural frequency, the function uses
+    the default natural frequency and damping ratio.
 
     Args:
         section: The scene's controller.
@@ -85,8 +87,9 @@ def feedforward(
 
     Args:
         kind: ``none``, ``gravity`` or ``gravity_inertia``.
-        link_torque: Drive torque that carries weight and load, for
-            ``gravity_inertia`` that of the whole motion [N·m]. Shape (n, n_joints).
+        link_torque: Drive torque on the commanded motion [N·m]: that of weight and load
+            for ``gravity``, with the inertia of the arm for ``gravity_inertia``. Shape
+            (n, n_joints).
         acceleration: Link accelerations [rad/s²]. Shape (n, n_joints).
         ratio: Signed ratios i, output = input / i. Shape (n_joints,).
         rotor_inertia: Rotor inertias about the motor axes [kg·m²]. Shape (n_joints,).

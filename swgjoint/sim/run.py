@@ -1,4 +1,4 @@
-"""Recorded run of a scene: its states, its signals, and the figures of both."""
+"""Recorded run of a scene: states, signals and the figures computed from them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Run:
 
     @property
     def steady(self) -> slice:
-        """Samples that the figures use, see :class:`Trajectory`."""
+        """Samples that the figures use, see :attr:`.Trajectory.steady`."""
         return self.assembly.trajectory.steady
 
     @property

@@ -1,8 +1,8 @@
-"""Sampled controllers in Python, which read sensors once per control period.
+"""Control laws that run in Python and read the sensors once per control period.
 
-They serve scenes with computed torque, a control period, sensors or link feedback, and
-external controllers passed to :func:`swgjoint.run_scene`. The engine's actuators still
-apply the motor limits.
+A scene runs such a law if it has computed torque, a control period, sensors, link
+feedback, or an external controller that was passed to :func:`swgjoint.run_scene`. The
+engine's actuators still apply the motor limits.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 class Readings:
-    """Sensor readings of a scene; keeps the last motor angles for their speeds."""
+    """Sensor readings of a scene.
+
+    It stores the last motor angles, from which it computes speeds.
+    """
 
     def __init__(self, assembly: Assembly, period: float) -> None:
         """Prepare the sensors of a scene.
@@ -47,7 +50,7 @@ class Readings:
         self._last: Array | None = None
 
     def motor(self, k: int, theta: Array, rate: Array) -> tuple[Array, Array]:
-        """Readings of motor angles [rad] and speeds [rad/s] at sample k.
+        """Readings of motor angles and speeds that are used at sample k.
 
         Args:
             k: Index of the sample at which the readings are used.
@@ -55,7 +58,7 @@ class Readings:
             rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
 
         Returns:
-            Angles and speeds. Shapes (n_joints,).
+            Angles [rad] and speeds [rad/s]. Shapes (n_joints,).
         """
         angle = self._read(self.encoder, theta, k)
         if self.encoder.counts_per_turn is None and not self.encoder.noise_arcsec:
@@ -66,7 +69,7 @@ class Readings:
         return angle, (angle - last) / self._period
 
     def link(self, k: int, psi: Array) -> Array:
-        """Readings of link angles at sample k [rad]. Shape (n_joints,).
+        """Readings of link angles that are used at sample k [rad]. Shape (n_joints,).
 
         Args:
             k: Index of the sample at which the readings are used.
@@ -75,7 +78,7 @@ class Readings:
         return self._read(self.link_encoder, psi, k)
 
     def torque(self, k: int, torque: Array) -> Array:
-        """Readings of output torques at sample k [N·m]. Shape (n_joints,).
+        """Readings of output torques used at sample k [N·m]. Shape (n_joints,).
 
         Args:
             k: Index of the sample at which the readings are used.
@@ -125,32 +128,33 @@ class Loop(Protocol):
     ) -> Array:
         """Torque of every motor until the next evaluation [N·m]. Shape (n_joints,).
 
-        Arrays are filled up to sample k.
+        The arrays contain values up to and including sample k.
 
         Args:
             k: Index of the current sample.
             theta: Motor angles of all samples [rad]. Shape (n, n_joints).
             psi: Link angles of all samples [rad]. Shape (n, n_joints).
             theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
-            torque: Drive torques on the links, if they are sensed [N·m]. Shape
-                (n, n_joints).
+            torque: Drive torques on the links [N·m], zero if they are not measured.
+                Shape (n, n_joints).
         """
 
 
 class SampledLoop:
-    """The scene's own control law; keeps the error integrals between periods."""
+    """The scene's own control law, which stores the integrals of the angle errors."""
 
     senses_torque = False
 
     def __init__(self, assembly: Assembly) -> None:
-        """Prepare the loop of a scene whose :attr:`Scene.sampled` is true."""
+        """Prepare the loop of a scene whose controller is sampled."""
         self.assembly, self.controller = assembly, assembly.scene.controller
         self.period, self.every = control_period(assembly)
         self._readings = Readings(assembly, self.period)
         self._integral = np.zeros(len(assembly.joints))
         section, ratio = self.controller, assembly.ratio
         inertia = assembly.rotor_inertia * ratio**2 + assembly.link_inertia
-        # gains per inertia keep the loop's natural frequency and damping ratio
+        # gains per inertia [1/s², 1/s], so that computed torque keeps the natural
+        # frequency and the damping ratio of the loop
         self._kp = assembly.loops.stiffness * ratio**2 / inertia
         self._kd = assembly.loops.damping * ratio**2 / inertia
         self._by_link = section.feedback == "link"
@@ -158,15 +162,14 @@ class SampledLoop:
     def torque(
         self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
     ) -> Array:
-        """Motor torques, see :class:`Loop`.
+        """Motor torques [N·m], see :meth:`Loop.torque`. Shape (n_joints,).
 
         Args:
             k: Index of the current sample.
             theta: Motor angles of all samples [rad]. Shape (n, n_joints).
             psi: Link angles of all samples [rad]. Shape (n, n_joints).
             theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
-            torque: Drive torques on the links, if they are sensed [N·m]. Shape
-                (n, n_joints).
+            torque: Drive torques on the links; unused.
         """
         whole, path = self.assembly, self.assembly.trajectory
         ratio, loops = whole.ratio, whole.loops
@@ -208,7 +211,14 @@ class GivenLoop:
     """An external controller, which receives the task and the sensor readings."""
 
     def __init__(self, assembly: Assembly, controller: Controller, task: Task) -> None:
-        """Start the controller with the task of the scene."""
+        """Start the controller with the task of the scene.
+
+        Args:
+            assembly: The compiled scene.
+            controller: The external controller.
+            task: Commanded motion and nominal data, see
+                :func:`swgjoint.sim.scene.task.task_of`.
+        """
         scene = assembly.scene
         self.controller, self._joints = controller, assembly.joints
         self.period, self.every = control_period(assembly)
@@ -221,15 +231,19 @@ class GivenLoop:
     def torque(
         self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
     ) -> Array:
-        """Motor torques, see :class:`Loop`.
+        """Motor torques [N·m], see :meth:`Loop.torque`. Shape (n_joints,).
 
         Args:
             k: Index of the current sample.
             theta: Motor angles of all samples [rad]. Shape (n, n_joints).
             psi: Link angles of all samples [rad]. Shape (n, n_joints).
             theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
-            torque: Drive torques on the links, if they are sensed [N·m]. Shape
-                (n, n_joints).
+            torque: Drive torques on the links [N·m], used if the scene has a torque
+                sensor. Shape (n, n_joints).
+
+        Raises:
+            ComputationError: If the controller does not return one finite torque per
+                joint.
         """
         angle, speed = self._readings.motor(k, theta, theta_rate)
         measured = Measured(
@@ -251,7 +265,7 @@ class GivenLoop:
 
 
 def control_period(assembly: Assembly) -> tuple[float, int]:
-    """Control period [s], and engine steps per control period."""
+    """Control period [s], and number of engine steps per control period."""
     step = assembly.scene.simulation.step_s
     period = assembly.scene.controller.control_period_s or step
     whole = round(period / step)
@@ -275,13 +289,14 @@ def run_sampled(
         data: Engine data in the initial state; left in the final state.
         inputs: Actuator inputs without the torques of the loop. Shape (n_steps,
             n_inputs).
-        check: Called with the states since its last call.
-        progress: Called with the steps done.
+        check: Called with the states recorded since its last call.
+        progress: Called with the number of completed engine steps.
 
     Returns:
-        States at the scene's steps, shape (n, n_state); link speeds [rad/s] and motor
-        torques of the loop [N·m] at every engine step, shapes (n_steps + 1, n_joints).
-        The torque of a state is that of the step that led to it.
+        States at the steps of the scene, shape (n, n_state); link speeds [rad/s] and
+        motor torques of the loop [N·m] at every engine step, shapes
+        (n_steps + 1, n_joints). The torque of a state is the torque during the step
+        that led to it.
     """
     model, parts, n = assembly.model, assembly.sub_steps, len(inputs)
     joints = len(assembly.joints)
