@@ -1,1 +1,1 @@
-"""Figures of a run: ripple, orders, accuracy, energy, validity, verdict."""
+"""Figures of a run: ripple, orders, accuracy, energy, validity and verdict."""

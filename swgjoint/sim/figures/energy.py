@@ -1,17 +1,17 @@
-r"""Energy balance of a run: works, losses and stored energy.
+r"""Energy balance of a run: work, losses and stored energy.
 
 .. math:: W_\text{motor} + W_\text{load} = \Delta E_\text{kinetic}
     + \Delta E_\text{weight} + \Delta E_\text{elastic} + D
     + E_\text{balance error}
 
-The balance error consists of the numerical damping of the integrator and the error of
-sums over samples. Every term is computed independently, none as the remainder of the
-others.
+where D is the dissipated energy. The balance error consists of the numerical damping of
+the integrator and of the error of sums over samples. All other terms are computed
+independently.
 
-The work of a torque during a step is torque times step times the mean of the speeds
-before and after the step, which equals the change of kinetic energy exactly. The
-displacement of that step would not: the discrete integrator advances positions by the
-speed after the step, which is half a step late.
+The work of a torque during a step of the discrete integrator is the torque times the
+step times the mean of the speeds before and after the step. This equals the change of
+kinetic energy exactly. Torque times displacement would not, because this integrator
+advances positions by the speed after the step, which is half a step late.
 """
 
 from __future__ import annotations
@@ -30,11 +30,16 @@ if TYPE_CHECKING:
 
 
 IDLE = 1e-3
-"""Mean torque over rated torque below which a joint counts as idle."""
+"""Ratio of mean torque to rated torque below which a joint counts as idle."""
 
 
 def run_energy(run: Run) -> dict[str, float]:
-    """Energy balance of the whole arm over the whole run [J]."""
+    """Energy balance of the whole arm over the whole run [J].
+
+    Returns:
+        Terms of the balance under the keys of the JSON output; ``stored_J`` is the sum
+        of the terms whose keys end in ``_change_J``.
+    """
     joints = [joint_energy(run, j) for j in range(len(run.joints))]
     motor = sum(joint["motor_work_J"] for joint in joints)
     in_arm = arm_dissipation(run)
@@ -61,8 +66,9 @@ def run_energy(run: Run) -> dict[str, float]:
 def joint_energy(run: Run, j: int) -> dict[str, Any]:
     """Work on both sides of one drive and its dissipation over the run [J].
 
-    ``efficiency`` is output work over input work in the constant-speed part, whichever
-    side drives. It is None if the joint has no such part or transmits no torque there.
+    ``efficiency`` is the ratio of delivered to received work in the constant-speed
+    part, for either direction of power flow. It is None, with the reason under
+    ``missing``, if the joint has no such part or transmits almost no torque there.
 
     Args:
         run: The run.
@@ -100,7 +106,7 @@ def load_work(run: Run) -> float:
     for disturbance in assembly.disturbances:
         value = disturbance_at(disturbance, middle)
         if isinstance(disturbance, ToolForce):
-            # mean displacement of the tool over two steps, like that from the speeds
+            # mean displacement of the tool over two steps, as the mean speed gives it
             way = np.gradient(run.tool_position @ np.array(disturbance.force_N))[:-1]
         else:
             way = _way(run, run.velocity[:, run.joints.index(disturbance.joint)])
@@ -109,9 +115,9 @@ def load_work(run: Run) -> float:
 
 
 def dissipation(run: Run, j: int) -> float:
-    """Energy that one drive dissipates [J]; zero without a rotor.
+    """Energy that one drive dissipates [J]; zero at levels without a rotor.
 
-    It is the sum of damping, hysteresis and friction losses.
+    It is the sum of the losses by damping, hysteresis and friction.
 
     Args:
         run: The run.
@@ -139,7 +145,7 @@ def dissipation(run: Run, j: int) -> float:
 
 
 def arm_dissipation(run: Run) -> float:
-    """Energy that damping and dry friction of the arm itself dissipate [J]."""
+    """Energy dissipated by damping and dry friction of the arm without drives [J]."""
     model = run.assembly.arm.model
     step = run.assembly.scene.simulation.step_s
     speeds = 0.5 * (run.velocity[1:] + run.velocity[:-1])
@@ -167,8 +173,14 @@ def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
     .. math:: \tau = \operatorname{clip}\left((b v + a)/R, \pm f\right), \quad
         R = A (1 - d)/d, \quad b = 2/(d_\text{max} t_c)
 
-    with A the inverse inertia at the joint, d the impedance and t_c the time constant
-    of the constraint. The joint creeps where a rigid friction law would stick.
+    with joint speed v, acceleration a, friction torque limit f, inverse inertia A at
+    the joint, impedance d and time constant :math:`t_c` of the constraint. The joint
+    creeps where a rigid friction law would stick.
+
+    Args:
+        run: The run.
+        speeds: Mean joint speeds of the steps [rad/s]. Shape (n - 1, n_joints).
+        accelerations: Joint accelerations [rad/s²]. Shape (n - 1, n_joints).
 
     Source:
         MuJoCo documentation, chapter Computation, "Constraint model".
@@ -185,7 +197,7 @@ def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
 
 
 def _arm_springs(run: Run) -> float:
-    """Change of the energy in springs of the arm's joints and tendons [J]."""
+    """Change of the energy stored in springs of the arm's joints and tendons [J]."""
     model, energies = run.assembly.arm.model, []
     data = mujoco.MjData(model)
     for q in run.position[[0, -1]]:
@@ -200,6 +212,7 @@ def _arm_springs(run: Run) -> float:
 
 
 def _motor_work(run: Run, j: int, part: slice) -> float:
+    """Work of one motor during a part of the run [J]."""
     # the torque of a state acted during the whole step that led to it
     torque = run.motor_torque[part, j][1:]
     if run.assembly.scene.simulation.integrator == "discrete":
@@ -208,12 +221,13 @@ def _motor_work(run: Run, j: int, part: slice) -> float:
 
 
 def _way(run: Run, speed: Array) -> Array:
-    """Displacement per step from the mean of both speeds. Shape (n - 1, ...)."""
+    """Displacements [rad] from the mean speeds of the steps. Shape (n - 1, ...)."""
     step = run.assembly.scene.simulation.step_s
     return np.asarray(0.5 * step * (speed[1:] + speed[:-1]))
 
 
 def _link_work(run: Run, j: int, part: slice) -> float:
+    """Work of one drive on its link during a part of the run [J]."""
     return _work(run.output_torque[part, j], run.position[part, j])
 
 
@@ -236,7 +250,7 @@ def _elastic(run: Run, j: int) -> float:
 
 
 def _rigid_energies(run: Run) -> tuple[float, float]:
-    """Changes of kinetic energy and of potential energy of the weight [J]."""
+    """Changes of kinetic energy and of gravitational energy [J]."""
     assembly, model = run.assembly, run.assembly.model
     data, energies = mujoco.MjData(model), []
     flexible = assembly.motor_position >= 0

@@ -1,13 +1,15 @@
-r"""Figures of the tool: pose and path accuracy by ISO 9283 (1998), settling.
+r"""Figures of the tool: pose and path accuracy by ISO 9283 (1998), and settling.
 
-With attained positions :math:`x_j` of n approaches of one pose, their barycentre
-:math:`\bar x` and :math:`l_j = |x_j - \bar x|`,
+A pose with the commanded position :math:`x_c` is approached n times. With the attained
+positions :math:`x_j`, their barycentre :math:`\bar x` and the distances
+:math:`l_j = |x_j - \bar x|`, pose accuracy AP and pose repeatability RP are
 
 .. math:: AP = |\bar x - x_c|, \qquad
     RP = \bar l + 3 \sqrt{\textstyle\sum_j (l_j - \bar l)^2 / (n - 1)}
 
-AT and RT are the largest values of the same quantities along a path, in planes
-perpendicular to the commanded path. Only positions are evaluated, not orientations.
+Path accuracy AT and path repeatability RT are the largest values of the same quantities
+along a path, measured in planes perpendicular to the commanded path. Only positions are
+evaluated, not orientations.
 """
 
 from __future__ import annotations
@@ -32,46 +34,67 @@ REST = 16
 
 
 def pose_accuracy(attained: Array, commanded: Array) -> float:
-    """AP: distance of the mean attained from the commanded position, in their unit.
+    """Pose accuracy AP: distance from the commanded to the mean attained position.
 
     Args:
         attained: Attained positions, one row per approach. Shape (n, 3).
         commanded: Commanded position. Shape (3,).
+
+    Returns:
+        Distance in the unit of the positions.
     """
     return float(np.linalg.norm(attained.mean(axis=0) - commanded))
 
 
 def pose_repeatability(attained: Array) -> float:
-    """RP: mean distance from the barycentre plus three standard deviations of it.
+    """Pose repeatability RP: mean distance from the barycentre plus three deviations.
 
     Args:
-        attained: Attained positions, one row per approach, two or more. Shape (n, 3).
+        attained: Attained positions of two or more approaches. Shape (n, 3).
+
+    Returns:
+        Mean plus three standard deviations of the distance, in the unit of the
+        positions.
     """
     distance = np.linalg.norm(attained - attained.mean(axis=0), axis=-1)
     return float(distance.mean() + 3.0 * distance.std(ddof=1))
 
 
 def path_accuracy(attained: Array, commanded: Array) -> float:
-    """AT: largest distance of the mean attained path from the commanded path.
+    """Path accuracy AT: largest distance of the mean attained from the commanded path.
 
     Args:
-        attained: Crossings of the planes. Shape (n_passes, n_planes, 3).
+        attained: Attained crossings of the planes. Shape (n_passes, n_planes, 3).
         commanded: Commanded crossings. Shape (n_planes, 3).
+
+    Returns:
+        Distance in the unit of the crossings.
     """
     off = np.linalg.norm(attained.mean(axis=0) - commanded, axis=-1)
     return float(off.max())
 
 
 def path_repeatability(attained: Array) -> float:
-    """RT: largest RP of the crossings of any plane, from two or more passes."""
+    """Path repeatability RT: largest RP of the crossings of any plane.
+
+    Args:
+        attained: Attained crossings of two or more passes. Shape
+            (n_passes, n_planes, 3).
+
+    Returns:
+        Repeatability in the unit of the crossings.
+    """
     return max(pose_repeatability(crossings) for crossings in attained.swapaxes(0, 1))
 
 
 def crossings(run: Run) -> tuple[Array, Array] | None:
     """Crossings of planes perpendicular to the commanded path, in every pass [m].
 
-    The search for a crossing starts at the commanded instant, so a lag along the path
-    does not count as a path error.
+    The search for each crossing starts at the commanded instant. A lag along the path
+    only delays the crossing, so it does not count as a path error.
+
+    Args:
+        run: Run of a motion with passes at constant tool speed.
 
     Returns:
         Attained crossings, shape (n_passes, n_planes, 3), and commanded crossings,
@@ -104,7 +127,7 @@ def crossings(run: Run) -> tuple[Array, Array] | None:
 
 
 def settling_time(time: Array, distance: Array, arrival: float, band: float) -> Any:
-    """Time from the end of the command until the distance remains in a band [s].
+    """Time from the end of the command until the distance stays within a band.
 
     Args:
         time: Times of the samples [s]. Shape (n,).
@@ -113,7 +136,8 @@ def settling_time(time: Array, distance: Array, arrival: float, band: float) -> 
         band: Half width of the band, in the unit of the distance.
 
     Returns:
-        Settling time [s]; None if the rest is too short or the signal does not settle.
+        Settling time [s]; None if the run ends too soon after the command or the signal
+        does not settle.
     """
     rest = time >= arrival - 1e-9
     if np.count_nonzero(rest) < REST:
@@ -121,7 +145,8 @@ def settling_time(time: Array, distance: Array, arrival: float, band: float) -> 
     outside = np.flatnonzero(rest & (distance > band))
     if not outside.size:
         return 0.0
-    # the last sample is the final pose: settling needs a tenth of the rest inside
+    # the last sample, the final pose, is always inside the band; therefore the signal
+    # must remain inside for the last tenth of the rest
     if time[-1] - time[outside[-1]] < 0.1 * (time[-1] - arrival):
         return None
     return float(time[outside[-1] + 1] - arrival)
@@ -133,6 +158,10 @@ def joint_settling(run: Run, j: int) -> dict[str, Any]:
     Args:
         run: The run.
         j: Index of the joint.
+
+    Returns:
+        ``settling_band_arcmin`` and ``settling_s`` [s]; the latter is None, with the
+        reason under ``missing``, if the link does not settle.
     """
     band = run.assembly.scene.metrics.settle_band_arcmin
     off = np.abs(run.position[:, j] - run.position[-1, j]) / arcmin
@@ -153,7 +182,10 @@ def _settling(run: Run, off: Array, band: float) -> dict[str, Any]:
 
 
 def tool_metrics(run: Run) -> dict[str, Any]:
-    """Errors of the tool relative to its command; None with a reason in ``missing``."""
+    """Errors of the tool relative to its command, under the keys of the JSON output.
+
+    A figure that does not exist is None, with the reason under ``missing``.
+    """
     keys = ("ap_mm", "rp_mm", "at_mm", "rt_mm", "path_rms_mm")
     if run.tool_position.shape[1] == 0:
         return {
@@ -178,7 +210,7 @@ def tool_metrics(run: Run) -> dict[str, Any]:
 
 
 def _poses(run: Run) -> dict[str, Any]:
-    """AP and RP of the poses of a cycle, or AP of the last pose."""
+    """AP and RP of the poses of a cycle, or AP of the final pose of other motions."""
     path = run.assembly.trajectory
     if not path.visits:
         once = {"rp_mm": "repeatability needs repeated approaches of a pose"}
@@ -213,7 +245,7 @@ def _poses(run: Run) -> dict[str, Any]:
 
 
 def _path(run: Run) -> dict[str, Any]:
-    """Distance of the tool from its command at the same instant."""
+    """Distance between tool and command at the same instant."""
     if run.assembly.trajectory.answer_speed is not None:
         return {"missing": {"path_rms_mm": "a step commands no path"}}
     error = run.tool_error() / mm

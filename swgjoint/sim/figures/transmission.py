@@ -1,4 +1,4 @@
-"""Law between motor and link of one driven joint, evaluated on recorded arrays."""
+"""Torque law between motor and link of one joint, evaluated on recorded arrays."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from swgjoint.typing import Array
 
 _CHUNK = 1024  # samples per call: the coefficient table of a chunk fits in the cache
 STIFF = 1e3
-"""Stiffness of the map that represents a drive without torsion, relative to that of the
-drive. The torsion is then 0.01 arcmin at rated torque, still well above round-off."""
+"""Stiffness of the map that represents a drive without torsion, relative to the
+stiffness of the drive itself. The torsion of this map is about 0.01 arcmin at rated
+torque, which is negligible but well above round-off."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlayedSignals(JointSignals):
-    """Signals of a record, including the history-dependent torques; shapes (n,)."""
+    """Signals of a record, including history-dependent torques. Shapes (n,)."""
 
     slipping: Array
     """Hysteresis torque along the torsion [N·m]."""
@@ -35,13 +36,14 @@ class Transmission:
     """Drive of one joint as the compiled model contains it."""
 
     attached: JointDrive
+    """The drive as it was attached to the model."""
     drive: DriveMap
     """The complete map, which provides ratings, name and validity."""
     law: DriveMap | None
-    """The map that the model contains between motor and link: without unresolved
-    harmonics, with constant stiffness at level ``linear``, with the elastic polynomial
-    at ``native``, and with friction if the model has it. None at the levels without a
-    rotor, ``rigid`` and ``kinematic``."""
+    """The map that the model contains between motor and link. It has constant stiffness
+    at level ``linear``, an elastic polynomial at ``native``, and no unresolved
+    harmonics at ``full``; it has friction if the model has friction. None at the levels
+    without a rotor, which are ``rigid`` and ``kinematic``."""
 
     @property
     def joint(self) -> str:
@@ -65,11 +67,12 @@ class Transmission:
 
     @property
     def told(self) -> DriveMap:
-        """Map of the drive as simulated, for a controller.
+        """Map of the drive as simulated, for the model of a controller.
 
-        It is :attr:`law`. At the levels without a rotor it is a map of level ``rigid``
-        without friction, whose torsion is negligible (its spring is :data:`STIFF` times
-        as stiff), and which has a kinematic error at level ``kinematic`` only.
+        At levels with a rotor, it is :attr:`law`. At the other levels, it is a map of
+        level ``rigid`` without friction. Its torsion is negligible, because it is
+        :data:`STIFF` times as stiff as the drive, and it has a kinematic error at level
+        ``kinematic`` only.
         """
         if self.law is not None:
             return self.law
@@ -84,9 +87,9 @@ class Transmission:
     ) -> PlayedSignals:
         """Torsion, transmission error and torques of recorded states.
 
-        The law is evaluated at the positions and velocities of each state; hysteresis
-        and friction follow from the whole record. Levels without a rotor have no such
-        signals.
+        The elastic law is evaluated at the positions and velocities of each state.
+        Hysteresis and friction depend on the whole record. The method is for levels
+        with a rotor only.
 
         Args:
             theta: Motor angles [rad]. Shape (n,).
@@ -145,10 +148,9 @@ class Transmission:
         return total
 
     def _relaxed(self, torsion: Array) -> float:
-        """Torsion at which the hysteresis of a run is relaxed at the start [rad].
+        """Torsion at which the hysteresis springs are relaxed at the start [rad].
 
-        Level ``native`` is relaxed at zero torsion, level ``full`` at the initial
-        torsion.
+        It is the initial torsion at level ``full``, and zero at level ``native``.
         """
         return float(torsion[0]) if self.level == "full" else 0.0
 
@@ -171,7 +173,7 @@ def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
 
 
 def _linear(drive: DriveMap, stiffness: float) -> DriveMap:
-    """A map with constant stiffness only, with name and ratings of a drive."""
+    """A map with constant stiffness and the name and ratings of a drive."""
     spring = DriveMap.linear(
         stiffness,
         layout=drive.layout,
