@@ -35,7 +35,7 @@ def test_a_scene_has_friction_unless_it_says_false(bench, level):
     assert extra == pytest.approx(rubs, rel=2e-3 if level == "full" else 0.02)
     label = [run.contains["joints"]["joint"]["friction"] for run in (off, on)]
     assert label == [None, "given"]
-    changes = "of the friction its dependence on load and speed"
+    changes = "part of the friction law: its dependence on load and speed"
     now = [item["part"] for item in on.contains["left_out"]]
     assert (changes in now) == (level == "native")
     left = [item["part"] for item in off.contains["left_out"]]

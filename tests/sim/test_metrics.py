@@ -131,7 +131,7 @@ def test_orders_that_cannot_be_told_say_why(bench):
     assert joint["orders"] == []
     assert joint["missing"]["orders"] == "the joint has no constant speed"
     t = np.linspace(0.0, 60.0, 4001)
-    assert orders_untold(np.sin(t), 10.0).endswith("or to and fro")
+    assert orders_untold(np.sin(t), 10.0).endswith("or back and forth")
     assert orders_untold(t, 10.0) is None
     turned = bench(LINEAR, simulation__duration_s=2.0).metrics()
     assert "missing" not in turned["joints"]["joint"]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.figures.transmission import Transmission
 
 OFF_DAMPING = 0.02
-"""Excess of the damping ratio due to time steps from which it is reported."""
+"""Increase of the damping ratio by the time steps from which it is reported [-]."""
 _LOSSY = ("native", "full")
 _ERRING = ("kinematic", "full")
 _LEFT_OUT = {
@@ -27,7 +27,7 @@ _LEFT_OUT = {
 
 
 def contents(assembly: Assembly) -> dict[str, Any]:
-    """Counts of the compiled model and contents of every joint, as JSON values."""
+    """Contents of the compiled model and what it leaves out, as JSON values."""
     model = assembly.model
     return {
         "degrees_of_freedom": int(model.nv),
@@ -50,7 +50,7 @@ def contents(assembly: Assembly) -> dict[str, Any]:
 
 
 def _features(assembly: Assembly) -> dict[str, Any]:
-    """Controller, and the motor limits, payload, sensors and disturbances present."""
+    """Controller, and those of motor limits, payload, sensors, disturbances in use."""
     scene, loops = assembly.scene, assembly.loops
     step = scene.simulation.step_s
     external = assembly.controlled_by
@@ -81,20 +81,20 @@ def _features(assembly: Assembly) -> dict[str, Any]:
 
 
 def _absent(assembly: Assembly) -> list[dict[str, str]]:
-    """Optional parts that the scene, and therefore the model, does not have."""
+    """Optional parts that scene and model do not have, each with the reason."""
     scene, loops, tables = assembly.scene, assembly.loops, "the scene has no"
     plugin = any(t.attached.plugin for t in assembly.transmissions)
     parts = (
         ("motor limits", any(loops.limits), f"{tables} motor table"),
         ("payload", scene.payload, f"{tables} [payload]"),
-        ("sensors", scene.sensors, f"{tables} [sensors]: angles are read exactly"),
+        ("sensors", scene.sensors, f"{tables} [sensors]; angles are read exactly"),
         ("disturbances", scene.disturbance, f"{tables} [[disturbance]]"),
-        ("load torques", any(assembly.load), f"{tables} [load] that is not zero"),
+        ("load torques", any(assembly.load), f"{tables} non-zero [load]"),
         ("integral of the error", any(loops.integral), "the controller is not a pid"),
         (
             "sampled controller",
             loops.sampled,
-            "nothing in the scene requires one: control acts within every step",
+            "the scene does not require one; the control acts within every step",
         ),
         ("engine plugin", plugin, "no joint has a level that needs it"),
     )
@@ -102,7 +102,7 @@ def _absent(assembly: Assembly) -> list[dict[str, str]]:
 
 
 def _set_keys(section: Section) -> dict[str, Any]:
-    """Keys of a table that have a value."""
+    """Values of a table under their keys, without keys that have none."""
     return section.model_dump(exclude_none=True)
 
 
@@ -151,7 +151,10 @@ def _at_step(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
 def _modes(
     assembly: Assembly, transmission: Transmission
 ) -> tuple[StepMode | None, StepMode | None]:
-    """Torsional vibration about zero and rated torque; None if not ``discrete``."""
+    """Torsional vibration in discrete time about zero and about rated torque.
+
+    Both are None for integrators other than ``discrete``.
+    """
     if assembly.scene.simulation.integrator != "discrete":
         return None, None
     rated = transmission.drive.ratings.rated_torque
@@ -165,7 +168,7 @@ def _modes(
 def _off_damping(
     assembly: Assembly, transmission: Transmission
 ) -> list[dict[str, str]]:
-    """Report that the time steps damp the torsion much more than the drive does."""
+    """Entry for a torsional vibration that the time steps damp more than the drive."""
     for mode, where in zip(
         _modes(assembly, transmission), ("", " at rated torque"), strict=True
     ):
@@ -191,7 +194,7 @@ def _error(attached: JointDrive) -> str | None:
 
 
 def _no_error(transmission: Transmission) -> str | None:
-    """Why a catalogue drive has no kinematic error at a level that can have one."""
+    """Reason why a catalogue drive has no kinematic error although its level can."""
     drive = transmission.drive
     if (
         transmission.level not in _ERRING
@@ -225,6 +228,7 @@ def _native(attached: JointDrive) -> dict[str, Any]:
 
 
 def _left_out(transmission: Transmission) -> list[dict[str, str]]:
+    """Parts of the drive that the model leaves out, each with the reason."""
     attached = transmission.attached
     items = []
     if attached.level in _LEFT_OUT:
@@ -267,7 +271,7 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     if attached.native is not None and attached.native.note:
         items.append({"part": "the stiffness curve", "reason": attached.native.note})
     if attached.native is not None and attached.native.friction_note:
-        part = f"of the friction {attached.native.friction_note}"
+        part = f"part of the friction law: {attached.native.friction_note}"
         items.append({"part": part, "reason": "no native form"})
     if attached.unresolved:
         left = [f"{u.order:.4g}" for u in attached.unresolved]

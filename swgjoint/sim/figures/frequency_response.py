@@ -1,9 +1,11 @@
 r"""Two-mass frequency response of one joint, from a periodic chirp of motor torque.
 
-Rotor J_m (at the input) and link J_l on a torsional stiffness K at the output resonate
-at :math:`\sqrt{K (1/J_l + 1/(i^2 J_m))}`; at :math:`\sqrt{K/J_l}` the rotor stands
-still (anti-resonance). The chirp repeats: once the initial transient has decayed, the
-ratio of two Fourier transforms over whole periods has no leakage.
+A rotor with inertia :math:`J_m` at the input and a link with inertia :math:`J_l` at the
+output, coupled by a torsional stiffness K at the output, resonate at the angular
+frequency :math:`\sqrt{K (1/J_l + 1/(i^2 J_m))}`. At :math:`\sqrt{K/J_l}`, the
+anti-resonance, the rotor does not move. The chirp is repeated. Once the initial
+transient has decayed, the ratio of two Fourier transforms over a whole period has no
+leakage.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from swgjoint.typing import Array
 Complex = NDArray[np.complex128]
 
 JOINT = "joint"
+"""Name of the link joint in the model."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +51,11 @@ class TwoMass:
         return sqrt(stiffness * compliance) / (2.0 * pi)
 
     def antiresonance(self, stiffness: float) -> float:
-        """Undamped anti-resonance frequency of the rotor in closed form [Hz]."""
+        """Undamped anti-resonance frequency of the rotor in closed form [Hz].
+
+        Args:
+            stiffness: Torsional stiffness [N·m/rad].
+        """
         return sqrt(stiffness / self.link_inertia) / (2.0 * pi)
 
 
@@ -61,9 +68,9 @@ class Chirp:
     high: float
     """Highest frequency [Hz]."""
     period: float = 16.0
-    """Duration of one sweep [s]; spectral lines are 1/period apart."""
+    """Duration of one sweep [s]; the spectral lines are 1/period apart."""
     settling: int = 1
-    """Number of periods before the evaluated one."""
+    """Number of periods that are simulated before the evaluated one."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.low < self.high or self.period * self.low < 1.0:
@@ -73,7 +80,11 @@ class Chirp:
             )
 
     def samples(self, step: float) -> Array:
-        """One period of unit amplitude, without its mean. Shape (n,)."""
+        """One period with unit amplitude and its mean removed. Shape (n,).
+
+        Args:
+            step: Time between two samples [s].
+        """
         n = round(self.period / step)
         rate = np.log(self.high / self.low) / n
         phase = 2.0 * pi * self.low * step * np.expm1(rate * np.arange(n)) / rate
@@ -83,7 +94,7 @@ class Chirp:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrequencyResponse:
-    """Complex speeds per motor torque over the band of the chirp."""
+    """Complex ratios of speeds to motor torque over the frequency band of the chirp."""
 
     frequency: Array
     """Frequencies of the spectral lines [Hz]. Shape (n,)."""
@@ -92,16 +103,20 @@ class FrequencyResponse:
     link: Complex
     """Link speed per motor torque [rad/s per N·m]. Shape (n,)."""
     largest_torque: float
-    """Largest elastic torque of the drive in the evaluated period [N·m]."""
+    """Largest torque of the drive's mean torsion curve in the evaluated period [N·m].
+    """
 
     @property
     def resonance(self) -> float:
-        """Frequency of the largest link motion relative to a free body [Hz]."""
+        """Frequency at which the link speed, times frequency, is largest [Hz].
+
+        The factor compensates for the 1/f response of a free body.
+        """
         return self._extreme(np.abs(self.link) * self.frequency)
 
     @property
     def antiresonance(self) -> float:
-        """Frequency of the least rotor motion relative to a free body [Hz]."""
+        """Frequency at which the rotor speed, times frequency, is smallest [Hz]."""
         return self._extreme(1.0 / (np.abs(self.rotor) * self.frequency))
 
     @property
@@ -110,7 +125,7 @@ class FrequencyResponse:
         return float(np.abs(self.link).max())
 
     def _extreme(self, height: Array) -> float:
-        """Frequency of the maximum [Hz], by a parabola through the log values."""
+        """Frequency of the maximum [Hz], by a parabola through the logarithms."""
         k = int(height.argmax())
         if not 0 < k < len(height) - 1:
             raise ComputationError(
@@ -138,18 +153,24 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Excite the rotor of a joint that is free at both ends and record both speeds.
 
+    The model has no gravity, and the friction of the drive is left out.
+
     Args:
         drive: Map of the drive.
         masses: Inertias of rotor and link.
         chirp: Excitation.
         level: Level of the joint: ``linear``, ``native`` or ``full``.
         amplitude: Amplitude of the motor torque, reduced to the output [N·m].
-        bias: Additional constant torque on the drive, reduced to the output [N·m]: the
-            motor drives, the load resists.
+        bias: Constant torque on the drive in addition, reduced to the output [N·m]. The
+            motor exerts it, and a load on the link balances it.
         step: Time step of the simulation [s].
-        integrator: Integrator of the engine. RK4 has no numerical damping at these
-            steps; scenes use ``discrete`` by default.
-        damping_ratio: As in :func:`swgjoint.joint.attach.attach`.
+        integrator: Integrator of the engine. RK4 has almost no numerical damping at
+            such steps; scenes use ``discrete`` by default.
+        damping_ratio: Damping ratio of the torsional vibration; None uses that of the
+            map.
+
+    Returns:
+        Response over the band of the chirp, from its last period.
 
     Raises:
         InputError: If the level has no rotor or the step cannot resolve the chirp.

@@ -1,4 +1,4 @@
-"""Figures that comparisons and specifications use, with their better direction."""
+"""Figures that comparisons and specifications use, by the side of their limit."""
 
 from __future__ import annotations
 

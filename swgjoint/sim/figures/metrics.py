@@ -1,12 +1,14 @@
-"""Figures of a run; keys and units are those of the JSON output.
+"""Figures of a run, with the keys and units of the JSON output.
 
-Joint figures refer to all steps of the constant-speed part of the motion, or to the
-whole motion if it has no such part (a chirp, a path of the tool).
+Joint figures refer to the samples of :attr:`.Trajectory.steady`: the constant-speed
+part of the motion, or another main part if no joint speed is constant, as in a chirp or
+along a path of the tool.
 
-Torque ripple of the moving arm is the output torque of the drive minus the torque that
+Torque ripple of the moving arm is the output torque of the drive, minus the torque that
 the rigid arm needs at the same instant of the commanded motion (its weight torque
 changes with the pose), minus a straight line in time. The line removes the mean and the
-slow effect of sag; nothing above half a cycle per record is affected.
+slow effect of sag. It also reduces oscillations of one or two cycles per record, but
+has almost no effect on faster ones.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ NOISE = 1e-6
 """Amplitude, relative to rated torque or to 1 arcmin, below which lines are round-off.
 """
 RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
-NOT_STEADY = "whole motion, no speed is constant: includes the dynamics of the motion"
+NOT_STEADY = "no speed is constant, so it includes the dynamics of the motion"
 
 
 def run_metrics(run: Run) -> dict[str, Any]:
@@ -60,7 +62,9 @@ def run_metrics(run: Run) -> dict[str, Any]:
 
 
 def joint_metrics(run: Run, j: int) -> dict[str, Any]:
-    """Figures of one joint; torsion and error of a rigid joint are zero.
+    """Figures of one joint under the keys of the JSON output.
+
+    Torsion and transmission error of a joint at level ``rigid`` are zero.
 
     Args:
         run: The run.
@@ -122,7 +126,10 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
 
 
 def _off_command(run: Run, j: int) -> float | None:
-    """Largest deviation of a link from its command [deg]; None if speed varies."""
+    """Largest deviation of a link from its command at constant speed [deg].
+
+    The result is None for motions without a constant speed.
+    """
     if not _any_steady(run):
         return None
     off = run.position[run.steady, j] - run.reference[run.steady, j]
@@ -139,7 +146,7 @@ def orders_untold(angle: Array, highest: float | None) -> str | None:
     if highest is None:
         return "the joint has no constant speed"
     if resample(angle, angle) is None:
-        return "the input turns less than half a turn, or to and fro"
+        return "the input turns less than half a turn, or back and forth"
     return None
 
 
@@ -152,7 +159,7 @@ def _any_steady(run: Run) -> bool:
 
 
 def use_of_motor(run: Run, j: int) -> dict[str, Any]:
-    """Torque and current of one motor over the run, and its time at a limit.
+    """Torque and current of one motor over the run, and the time it spends at a limit.
 
     Args:
         run: The run.
@@ -183,7 +190,7 @@ def torque_deviation(run: Run, j: int, part: slice = slice(None)) -> Array:
     Args:
         run: The run.
         j: Index of the joint.
-        part: Samples; all by default.
+        part: Samples to return, n of them; all by default.
     """
     return np.asarray(run.output_torque[part, j] - run.assembly.link_torque[part, j])
 
@@ -204,11 +211,14 @@ def torque_ripple(run: Run, j: int) -> Array:
 
 
 def highest_resolved_order(run: Run, j: int) -> float | None:
-    """Highest order per input turn that the step resolves; None for a joint at rest.
+    """Highest order per input turn that the step resolves at the constant speed.
 
     Args:
         run: The run.
         j: Index of the joint.
+
+    Returns:
+        Order per input turn; None for a joint without a constant speed.
     """
     speed = np.abs(run.assembly.ratio[j] * run.assembly.trajectory.steady_velocity[j])
     if speed == 0.0:
@@ -220,8 +230,8 @@ def phase_step(run: Run, j: int) -> float:
     """Largest phase advance of the highest kept order in one engine step [rad].
 
     It refers to the part of the motion that the figures use. The commanded speed
-    decides which harmonics are kept, but a rotor may turn faster. Zero at levels
-    without harmonics.
+    determines which harmonics are kept, but the rotor may turn faster. The result is
+    zero at levels without harmonics.
 
     Args:
         run: The run.
@@ -236,7 +246,7 @@ def phase_step(run: Run, j: int) -> float:
 
 
 def drive_order(run: Run, j: int, order: float) -> float | None:
-    """Order of the joint's own drive to which a line belongs; None for other lines.
+    """Order of the joint's own drive to which a spectral line belongs.
 
     Other lines are vibrations of the arm, products of two orders, and orders of other
     joints that reach this one through the arm.
@@ -245,6 +255,9 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
         run: The run.
         j: Index of the joint.
         order: Order of the line per input turn.
+
+    Returns:
+        Order per input turn; None for lines that are not of the drive.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
@@ -255,9 +268,10 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
 
 
 def line_error(run: Run, j: int, order: float) -> float | None:
-    """Relative amplitude error of a torque line due to the step, joint moving alone.
+    """Relative amplitude error of a torque line that the time step causes.
 
-    See :mod:`swgjoint.joint.step_error`.
+    The estimate assumes that the joint moves alone, see
+    :mod:`swgjoint.joint.step_error`.
 
     Args:
         run: The run.
@@ -265,7 +279,8 @@ def line_error(run: Run, j: int, order: float) -> float | None:
         order: Order of the line per input turn.
 
     Returns:
-        Relative error; None for lines that are not of the drive.
+        Relative error [-]; None for lines that are not of the drive, and for
+        integrators other than ``discrete``.
     """
     if run.assembly.scene.simulation.integrator != "discrete":
         return None
@@ -290,10 +305,10 @@ def line_error(run: Run, j: int, order: float) -> float | None:
 
 
 def strongest_left_out(transmission: Transmission) -> bool:
-    """Whether the strongest harmonic of a drive is among those left out.
+    """Whether the step leaves out the strongest harmonic of a drive.
 
-    Strength is an angle: amplitude in the kinematic error, plus amplitude in the torque
-    at rated torque divided by the stiffness.
+    The strength of a harmonic is its amplitude in the kinematic error [rad], plus its
+    amplitude in the output torque at rated torque divided by the stiffness.
     """
     attached = transmission.attached
     if not attached.unresolved:
@@ -316,11 +331,15 @@ def signal_statistics(values: Array) -> dict[str, float]:
 
 
 def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
-    """Distance of the tool from that of the rigid arm on the same motion [mm].
+    """Distance between the tool and that of the rigid arm on the same motion [mm].
 
     Args:
         run: The run.
         rigid: Run of the same motion with rigid joints.
+
+    Returns:
+        Mean, root mean square and largest value over the whole run, and the
+        peak-to-peak value ``pp_mm`` over the part that the joint figures use.
     """
     error = run.tool_error(rigid) / mm
     steady = error[run.steady]

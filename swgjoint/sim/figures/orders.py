@@ -1,13 +1,13 @@
-r"""Order analysis: lines of a signal per turn of the wave generator.
+r"""Order analysis: spectral lines in cycles per turn of the wave generator.
 
-The signal is resampled at equal steps of the input angle and a cubic trend is removed.
+The signal is resampled at equal steps of the input angle, and a cubic trend is removed.
 The lines are then found one by one in a Hann-windowed spectrum, strongest first. Their
 amplitudes result from one least-squares fit of all lines and the trend,
 
 .. math:: x(\theta) = \sum_{j<4} c_j \theta^j
     + \sum_k a_k \cos(n_k \theta) + b_k \sin(n_k \theta),
 
-so neither the window nor an order between two bins reduces them.
+so they are reduced neither by the window nor by an order between two bins.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from swgjoint.typing import Array
 TREND_DEGREE = 3
 """Degree of the polynomial trend in the input angle."""
 PADDING = 8
-"""Factor by which zero padding at least extends the record."""
+"""Smallest factor by which zero padding extends the record."""
 SKIRT = 4.0
-"""Order distance times turns of the record below which two lines count as one. It is
-twice the half width of the Hann window, because loads and amplitudes vary along a
-motion."""
+"""Smallest distance between the orders of two lines, times the number of input turns of
+the record. It is twice the half width of the main lobe of the Hann window, because the
+amplitude of a line varies along a motion, which widens the line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,15 +57,17 @@ def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
         signal: Signal in any unit. Shape (n,).
 
     Returns:
-        Angle from zero [rad] and signal, both of shape (n,). None if the angle covers
-        less than half a turn or reverses too often.
+        Angle from zero [rad] and signal, both of shape (n,). None if there are fewer
+        than 16 samples, or if the angle covers less than half a turn or decreases too
+        often.
     """
     from scipy.interpolate import CubicSpline
 
     travel = (angle - angle[0]) * np.sign(angle[-1] - angle[0])
     if travel.size < 16 or travel[-1] < np.pi:
         return None
-    # the signal of a vibrating drive would not be a function of its angle
+    # keep new maxima of the angle only: if the drive vibrates, the signal would
+    # otherwise not be a function of the angle
     keep = np.concatenate([[True], travel[1:] > np.maximum.accumulate(travel)[:-1]])
     if keep.mean() < 0.5:
         return None
@@ -95,18 +97,18 @@ def strongest_lines(
     count: int = 3,
     floor: float = 0.0,
 ) -> tuple[OrderLine, ...]:
-    """The strongest lines of a signal, strongest first.
+    """The strongest spectral lines of a signal, strongest first.
 
     Args:
         angle: Input angle [rad]. Shape (n,).
         signal: Signal in any unit. Shape (n,).
         highest: Highest order to search, usually the highest that the step resolves.
-        count: Number of lines.
-        floor: Amplitude below which lines are noise and are left out.
+        count: Largest number of lines.
+        floor: Amplitude up to which lines count as noise, in the unit of the signal.
 
     Returns:
-        At most ``count`` lines; none if the input turns less than half a turn. Orders
-        below one half or below two cycles per record belong to the trend.
+        At most ``count`` lines; none where :func:`resample` returns None. Orders below
+        one half or below two cycles per record belong to the trend.
     """
     even = resample(angle, signal)
     if even is None:
@@ -119,7 +121,7 @@ def strongest_lines(
     while len(orders) < count:
         spectrum = _spectrum(grid, residual)
         allowed = (spectrum.order >= lowest) & (spectrum.order <= highest)
-        for known in orders:  # skirts of a line whose amplitude varies along the motion
+        for known in orders:  # exclude the skirts of known lines
             allowed &= np.abs(spectrum.order - known) > SKIRT / turns
         if not allowed.any():
             break
@@ -137,6 +139,7 @@ def strongest_lines(
 
 
 def _detrend(grid: Array, values: Array) -> Array:
+    """Signal without its cubic trend."""
     return _fit(grid, values, [])[0]
 
 
@@ -147,7 +150,8 @@ def _fit(grid: Array, values: Array, orders: list[float]) -> tuple[Array, Array]
     for order in orders:
         columns += [np.cos(order * grid)[:, None], np.sin(order * grid)[:, None]]
     basis = np.hstack(columns)
-    # normal equations: few, well-conditioned columns; ten times faster than lstsq
+    # normal equations suffice for few, well-conditioned columns, and are ten times
+    # faster than lstsq of the basis
     weights = np.linalg.lstsq(basis.T @ basis, basis.T @ values, rcond=1e-12)[0]
     pairs = weights[TREND_DEGREE + 1 :].reshape(-1, 2)
     return values - basis @ weights, np.hypot(pairs[:, 0], pairs[:, 1])

@@ -14,17 +14,18 @@ if TYPE_CHECKING:
 
 
 SLACK = 1.01
-"""Factor on ratings, which have two or three digits: a run at rated torque passes."""
+"""Tolerance factor on ratings, which catalogues state with two or three digits. With
+it, a run at rated torque is within the ratings."""
 AT_REST = 1e-9
-"""Commanded speed below which a joint counts as resting [rad/s]; the round-off of a
-motion through equal points is below it."""
+"""Largest commanded speed of a joint that counts as resting [rad/s]. It is larger than
+the round-off of a motion through equal points."""
 
 
 def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
     """Torques and speed of one joint over the whole run, compared with its ratings.
 
-    The cubed mean is weighted with the speed; for a joint at rest it is the mean over
-    time.
+    The cubed mean torque is weighted with the speed; for a joint at rest it is weighted
+    with time.
 
     Args:
         run: The run.
@@ -65,9 +66,9 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
 def first_ratcheting(
     time: Array, torque: Array, limit: float | None
 ) -> dict[str, Any] | None:
-    """First instant at which teeth would skip; None if they do not.
+    """First instant at which teeth would skip; None if they would not.
 
-    The simulation continues with the elastic law, without a skipped tooth.
+    The simulation itself continues with the elastic law, without a skipped tooth.
 
     Args:
         time: Times of the samples [s]. Shape (n,).
@@ -86,7 +87,7 @@ def first_ratcheting(
 
 
 def cubed_mean(torque: Array, speed: Array) -> float:
-    """Mean load torque as catalogues define it, (sum |T|³ |n| / sum |n|)^(1/3) [N·m].
+    """Mean load torque by catalogue definition, (sum |T|³ |n| / sum |n|)^(1/3) [N·m].
 
     Args:
         torque: Output torque at equal time steps [N·m]. Shape (n,).

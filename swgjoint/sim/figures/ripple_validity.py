@@ -2,14 +2,17 @@ r"""Validity of the torque ripple of a joint.
 
 The ripple results from the harmonics of the maps, which :func:`map_label` assesses. A
 run without harmonics has no ripple, only vibration and round-off. A run whose step
-cannot resolve some harmonics leaves them out and has less ripple than the drive. The
-missing part is estimated from the map. The inertias on both sides resist fast motion,
-so that order n of the kinematic error, :math:`e_n`, becomes torsion, with the torque
+cannot resolve some harmonics leaves them out and has less ripple than the drive.
 
-.. math:: T_n = K e_n + |\partial_\Delta V_n|
+The missing part is estimated from the map. At high frequency the inertias on both sides
+of the drive hardly move, so order n of the kinematic error, with amplitude
+:math:`e_n`, becomes torsion. With the amplitude of the same order in the output torque
+at rated torque, :math:`|\partial_\Delta V_n|`, the amplitude of the torque is
 
-at rated torque. The rms of the ripple is then at least the recorded rms :math:`r`, and
-about :math:`\sqrt{r^2 + \sum T_n^2/2}`.
+.. math:: T_n = K e_n + |\partial_\Delta V_n|.
+
+If r is the recorded rms, the rms of the ripple of the drive is at least r, and about
+:math:`\sqrt{r^2 + \sum T_n^2/2}`.
 """
 
 from __future__ import annotations
@@ -28,12 +31,14 @@ if TYPE_CHECKING:
 
 
 HARMONIC_LEVELS = ("kinematic", "full")
+"""Levels at which the model contains harmonics of the map."""
 SHARE = 0.05
-"""Relative increase of the ripple by orders left out that makes it a lower bound."""
+"""Relative increase of the ripple by the omitted orders above which the recorded ripple
+is reported as a lower bound."""
 ABOVE_NOISE = 3.0
 """Smallest ratio of ripple to integration noise at which the ripple is reported."""
 ROUND_OFF = 1e-6
-"""Share of the rated torque below which no ripple is reported."""
+"""Rms of the ripple, relative to the rated torque, below which it is not reported."""
 
 
 def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
@@ -45,12 +50,11 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
         ripple: Torque ripple of the joint [N·m]. Shape (n_window,).
 
     Returns:
-        ``ripple_missing``: reason why no ripple is reported; None if it is.
+        ``ripple_missing``: reason why no ripple is reported; None if it is reported.
         ``ripple_noise_percent``: rms of the integration noise, relative to the rated
-        torque. ``ripple_left_out_percent``: rms of the orders that the step leaves out.
-        ``ripple_is_lower_bound``: whether they are significant. ``resolving``: the
-        strongest order left out, the step that resolves it, and the joint speed at
-        which the step of the run resolves it; None if nothing is left out.
+        torque. ``ripple_left_out_percent``: estimated rms of the orders that the step
+        leaves out, relative to the rated torque. ``ripple_is_lower_bound``: whether
+        these orders are significant. ``resolving``: see :func:`find_resolving_step`.
     """
     transmission = run.assembly.transmissions[j]
     rated = transmission.drive.ratings.rated_torque
@@ -86,10 +90,11 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         told: Whether the run reports a ripple of the joint.
 
     Returns:
-        ``ripple_valid``: whether the map is within the limit; None if there is no
-        ripple to assess or no record. ``map_difference``: the largest differences under
-        ``input_torque`` and ``output_error``, and ``torque_range_Nm``; None with the
-        reason in ``map_difference_missing``.
+        ``ripple_valid``: whether the differences of the map from finite elements are
+        within the limit; None if there is no ripple to assess or no record.
+        ``map_difference``: the largest differences under ``input_torque`` and
+        ``output_error``, and the torques of the run under ``torque_range_Nm``; None
+        without a record. ``map_difference_missing``: the reason for None.
     """
     transmission = run.assembly.transmissions[j]
     record, reason = map_validation(transmission.drive)
@@ -118,7 +123,7 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
 
 
 def has_harmonics(run: Run, j: int) -> bool:
-    """Whether the map of a joint causes torque ripple at the level of the joint.
+    """Whether a joint has a level with harmonics and a map that contains some.
 
     Args:
         run: The run.
@@ -131,10 +136,14 @@ def has_harmonics(run: Run, j: int) -> bool:
 
 
 def integration_noise(signal: Array) -> float:
-    r"""Rms noise between adjacent samples, in the unit of the signal.
+    r"""Rms of the sample-to-sample noise of a signal, in the unit of the signal.
 
     White noise of standard deviation s has second differences of standard deviation
-    :math:`\sqrt 6\, s`; those of a wave that the step resolves are almost zero.
+    :math:`\sqrt 6\, s`, whereas the second differences of a wave that the step resolves
+    are almost zero.
+
+    Args:
+        signal: Samples at equal intervals. Shape (n,).
     """
     if signal.size < 3:
         return 0.0
@@ -160,15 +169,16 @@ def left_out_torque(run: Run, j: int) -> float:
 
 
 def find_resolving_step(run: Run, j: int) -> dict[str, float] | None:
-    """Strongest order left out, with the step and the speed that resolve it.
+    """Strongest order that the step leaves out, and what would resolve it.
 
     Args:
         run: The run.
         j: Index of the joint.
 
     Returns:
-        ``order`` per input turn; ``step_s`` at the speed of the run [s];
-        ``speed_deg_s`` at the step of the run [deg/s]; None if nothing is left out.
+        ``order``: order per input turn. ``step_s``: longest step that resolves it at
+        the speed of the run [s]. ``speed_deg_s``: largest joint speed at which the step
+        of the run resolves it [deg/s]. None if no order is left out.
     """
     transmission = run.assembly.transmissions[j]
     attached = transmission.attached

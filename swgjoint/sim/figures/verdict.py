@@ -1,12 +1,17 @@
 """Verdict on the figures of a run, with its reasons.
 
-A run is ``NOT VALID`` if it leaves the range of its model: bodies collide, so that
-torque ripple and tool error have no reference; a torque leaves the map of its drive;
-teeth would skip; a rotor turns too fast for the orders that the step resolves; the
-ripple of a map differs too much from finite elements that the map was not fitted to, at
-the torques of the run; or the energy balance is not closed.
-A drive above its ratings is a fault of the design, not of the figures, and causes a
-warning only.
+A run is ``NOT VALID`` if its model does not apply:
+
+- Bodies collide, so that torque ripple and tool error have no reference.
+- A torque leaves the range of the map of its drive.
+- Teeth would skip.
+- A rotor turns so fast that the step does not resolve the kept orders.
+- At the torques of the run, the ripple of a map differs too much from finite-element
+  results that were not used in the fit of the map.
+- The energy balance does not close.
+
+A drive that exceeds its ratings is a fault of the design, not of the figures, and
+causes a warning only.
 """
 
 from __future__ import annotations
@@ -29,12 +34,14 @@ VALID, NOT_VALID = "VALID", "NOT VALID"
 PHASE_STEP = 0.5
 """Largest phase advance per step of a resolved order [rad]."""
 FAST = 1.5
-"""Phase advance per step, relative to :data:`PHASE_STEP`, that invalidates a run."""
+"""Phase advance per step, relative to :data:`PHASE_STEP`, above which a run is not
+valid."""
 POSES = 400
 """Largest number of recorded states that are checked for collisions."""
 ENERGY_SHARE, ENERGY_FLOOR = 0.1, 1e-3
-"""Largest accepted balance error: relative to all works and losses, or, if these are
-small, to the sum of the rated torques times 1 rad. Bundled scenes reach 0.4 %."""
+"""Largest accepted balance error: the first value is relative to the sum of work,
+losses and stored energy; the second, which applies if that sum is small, is relative to
+the sum of the rated torques times 1 rad. Bundled scenes reach 0.4 % of the former."""
 MAPPED = ("native", "full")
 """Levels at which the torque follows the map."""
 
@@ -44,6 +51,7 @@ class Collision:
     """Two bodies that touch during a run."""
 
     bodies: tuple[str, str]
+    """Names of the bodies."""
     time: float
     """Time of the first checked state with the contact [s]."""
     depth: float
@@ -59,7 +67,10 @@ class Collision:
 
 
 def collisions(run: Run) -> list[Collision]:
-    """Bodies that touch in up to :data:`POSES` recorded states, the deepest first."""
+    """Pairs of bodies that touch in a run, the deepest penetration first.
+
+    Up to :data:`POSES` recorded states are checked.
+    """
     assembly, model = run.assembly, run.assembly.model
     if not (model.geom_contype.any() and model.geom_conaffinity.any()):
         return []
@@ -96,12 +107,15 @@ def collisions(run: Run) -> list[Collision]:
 def judge_run(
     run: Run, joints: Mapping[str, Any], energy: Mapping[str, float]
 ) -> dict[str, Any]:
-    """``verdict``, ``reasons`` and ``collisions`` of a run.
+    """Verdict on a run under the keys of the JSON output.
 
     Args:
         run: The run.
         joints: Figures of its joints, see :meth:`swgjoint.sim.run.Run.metrics`.
-        energy: Its energy balance, see :mod:`swgjoint.sim.figures.energy` [J].
+        energy: Its energy balance [J], see :mod:`swgjoint.sim.figures.energy`.
+
+    Returns:
+        ``verdict``, ``reasons`` and ``collisions``.
     """
     touching = collisions(run)
     reasons = []
@@ -123,15 +137,16 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
 
     Args:
         name: Name of the joint.
-        joint: Its figures, see :meth:`swgjoint.sim.run.Run.metrics`.
+        joint: Its figures, see :func:`swgjoint.sim.figures.metrics.joint_metrics`.
     """
     lines = []
     ratings = joint["ratings"]
     if not ratings["within_map"] and joint["level"] in MAPPED:
         low, high = ratings["map_range_Nm"]
         lines.append(
-            f"{name}: torque up to {ratings['peak_Nm']:.4g} N·m leaves the map of its"
-            f" drive ({low:.4g} to {high:.4g} N·m), which continues linearly there"
+            f"{name}: torque of up to {ratings['peak_Nm']:.4g} N·m leaves the range of"
+            f" the map of its drive ({low:.4g} to {high:.4g} N·m); the run extrapolates"
+            " the map linearly"
         )
     if skips := ratings["ratcheting"]:
         lines.append(
@@ -142,16 +157,17 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
     if joint["ripple_valid"] is False and (doubt := joint_doubt(joint)):
         seen = _range(joint["map_difference"]["torque_range_Nm"])
         lines.append(
-            f"{name}: torque ripple not valid from {seen}: the map of {joint['drive']}"
+            f"{name}: torque ripple not valid at {seen}: the map of {joint['drive']}"
             f" {doubt}; accepted: {percent(LIMIT)}; 'swgjoint meshing DESIGN --torque"
-            " NM' computes the ripple of the drive itself, level 'linear' runs without"
+            " NM' computes the ripple of the drive itself, and level 'linear' has no"
             " ripple"
         )
     if joint["phase_step_rad"] > FAST * PHASE_STEP:
         lines.append(
-            f"{name}: its rotor turned faster than commanded, the highest order of its"
-            f" drive by {joint['phase_step_rad']:.2g} rad per step; accepted: up to"
-            f" {PHASE_STEP:g} rad; use a smaller simulation.step_s"
+            f"{name}: its rotor turned faster than commanded, so that the phase of the"
+            f" highest order of its drive advanced by {joint['phase_step_rad']:.2g} rad"
+            f" per step; accepted: up to {FAST * PHASE_STEP:g} rad; use a smaller"
+            " simulation.step_s"
         )
     return lines
 
@@ -163,10 +179,10 @@ def _range(torques: Sequence[float]) -> str:
 
 
 def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
-    """One line if the balance error exceeds that of integration and sums.
+    """One line if the balance error is too large for errors of integration and sums.
 
     Args:
-        energy: Energy balance, see :func:`judge_run` [J].
+        energy: Energy balance [J], see :func:`judge_run`.
         rated: Sum of the rated torques [N·m].
     """
     works = ("motor_work_J", "load_work_J", "dissipated_J")
@@ -175,9 +191,10 @@ def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
     if abs(missing) <= max(ENERGY_SHARE * turnover, ENERGY_FLOOR * rated):
         return []
     return [
-        f"the energy balance has an error of {missing:.3g} J, with {turnover:.3g} J of"
-        " works and losses: a joint works against its stops, or the step is too long;"
-        " use another motion or a smaller simulation.step_s"
+        f"the energy balance has an error of {missing:.3g} J, compared with"
+        f" {turnover:.3g} J of work, losses and stored energy: a joint pushes against"
+        " its stops, or the step is too long; use another motion or a smaller"
+        " simulation.step_s"
     ]
 
 
@@ -191,5 +208,5 @@ def _collision_reason(touching: list[Collision]) -> str:
     more = f" and {len(touching) - 3} other pairs" if len(touching) > 3 else ""
     return (
         f"bodies collide: {', '.join(some)}{more}; use another start or travel, or"
-        " metrics.contacts_expected = true where contact is part of the task"
+        " metrics.contacts_expected = true if contact is part of the task"
     )

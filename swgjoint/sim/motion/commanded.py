@@ -28,7 +28,7 @@ from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 HOLDS_ORIENTATION = 6
-"""Number of joints from which the tool keeps its orientation by default."""
+"""Smallest number of joints with which the tool keeps its orientation by default."""
 
 
 def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Trajectory:
@@ -66,7 +66,7 @@ def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Traject
 
 
 def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
-    """The motion of the scene's kind, not yet checked."""
+    """Commanded motion of the scene, not yet checked for non-finite values."""
     section, timing = scene.trajectory, scene.simulation
     joints = arm.joints
     start = _angles(section.start_deg, joints)
@@ -176,7 +176,7 @@ def _tool_motion(
 
 
 def _angles(values: dict[str, float], joints: tuple[str, ...]) -> Array:
-    """Angles of a table in degrees, in the order of the joints [rad]."""
+    """Joint angles [rad] from a table in degrees; zero for joints without a value."""
     return np.array([values.get(name, 0.0) for name in joints]) * deg
 
 

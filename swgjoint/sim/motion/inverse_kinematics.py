@@ -1,12 +1,19 @@
 r"""Joint angles that move the tool along a path, by damped least squares.
 
-.. math:: \Delta q = J^T (J J^T + \lambda^2 I)^{-1} e, \qquad \lambda = c\,|e|,
+With the Jacobian J and the pose error e of the tool, an iteration changes the joint
+angles by
 
-so that the damping vanishes with the error :math:`e` and the last steps are Newton
-steps (Wampler 1986, IEEE Trans. SMC 16:93-101, with constant :math:`\lambda`). Each
+.. math:: \Delta q = J^T (J J^T + \lambda^2 I)^{-1} e, \qquad \lambda = c\,|e|.
+
+The damping vanishes with the error, so that the last iterations are Newton steps. Each
 solution starts from the previous one, which keeps the arm in one configuration. A
 quintic spline through the solutions is refined until the tool also follows the path
-between them; its derivatives are the joint speeds and accelerations.
+between them; its derivatives give the joint speeds and accelerations.
+
+Source:
+    Wampler (1986), "Manipulator inverse kinematic solutions based on vector
+    formulations and damped least-squares methods", IEEE Transactions on Systems, Man,
+    and Cybernetics 16:93-101, with constant :math:`\lambda`.
 """
 
 from __future__ import annotations
@@ -23,15 +30,15 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 TOLERANCE = 1e-12
-"""Largest error of a pose: norm of its position [m] and rotation [rad] errors."""
+"""Largest error of a solution: joint norm of position [m] and rotation [rad] errors."""
 PATH_TOLERANCE = 1e-10
-"""Largest path error between two solutions [m]."""
+"""Largest error of any tool coordinate midway between two solutions [m]."""
 DAMPING = 0.1
-"""Factor c: damping over error [1/m]."""
+"""Ratio c of the damping to the norm of the error [-]."""
 MAX_STEPS = 200
 """Largest number of iterations per pose."""
 MAX_NODES = 8192
-"""Number of nodes along a path beyond which refinement stops."""
+"""Number of solutions along a path above which the refinement stops."""
 LONGEST_STEP = 0.2
 """Largest change of a joint angle per iteration [rad]."""
 
@@ -40,10 +47,10 @@ class ToolKinematics:
     """Forward and inverse kinematics of the tool site of one arm."""
 
     def __init__(self, arm: RigidArm, *, hold_orientation: bool, where: str) -> None:
-        """Use an arm that has a tool site.
+        """Prepare the kinematics of an arm.
 
         Args:
-            arm: The arm.
+            arm: The arm, which must have a tool site.
             hold_orientation: Whether the tool keeps its orientation.
             where: Start of the messages.
 
@@ -60,7 +67,11 @@ class ToolKinematics:
         self._data = mujoco.MjData(arm.model)
 
     def pose(self, q: Array) -> tuple[Array, Array]:
-        """Tool position [m], shape (3,), and rotation matrix, shape (9,)."""
+        """Tool position [m], shape (3,), and rotation matrix by rows, shape (9,).
+
+        Args:
+            q: Joint angles [rad]. Shape (n_joints,).
+        """
         data = self._data
         data.qpos[:] = q
         mujoco.mj_kinematics(self.arm.model, data)
@@ -75,14 +86,14 @@ class ToolKinematics:
         Args:
             guess: Joint angles near the solution [rad]. Shape (n_joints,).
             position: Position of the tool [m]. Shape (3,).
-            rotation: Rotation matrix of the tool. Shape (9,); unused if the orientation
-                is free.
+            rotation: Rotation matrix of the tool by rows; unused if the orientation is
+                free. Shape (9,).
 
         Returns:
             Joint angles [rad]. Shape (n_joints,).
 
         Raises:
-            InputError: If the tool cannot reach the pose.
+            InputError: If the tool cannot reach the pose, or the arm is singular.
         """
         model, data, tool = self.arm.model, self._data, self.arm.tool
         q, jacobian = guess.copy(), np.zeros((6, model.nv))
@@ -108,7 +119,7 @@ class ToolKinematics:
             damped = J @ J.T + (DAMPING * size) ** 2 * np.eye(self.rows)
             try:
                 step = J.T @ np.linalg.solve(damped, error)
-            except np.linalg.LinAlgError:  # the damping is below round-off, too
+            except np.linalg.LinAlgError:  # even the damping is below round-off
                 raise InputError(
                     f"{self.where}: the arm is in a singular pose where the tool passes"
                     f" ({_in_mm(position)}) mm; accepted: a path away from it, or"
@@ -131,18 +142,19 @@ def follow(
     length: float,
     nodes: int = 32,
 ) -> Any:
-    """Joint angles along a path with the initial orientation of the tool.
+    """Joint angles at which the tool follows a path in its initial orientation.
 
     Args:
         kinematics: Kinematics of the tool.
         start: Joint angles at the start of the path [rad]. Shape (n_joints,).
-        place: Function of the path parameter, shape (m,), that returns points of the
-            path [m], shape (m, 3).
-        length: Largest parameter; the smallest is zero.
-        nodes: Number of intervals of the first attempt.
+        place: Function that returns the points of the path [m], shape (m, 3), at
+            values of the path parameter, shape (m,).
+        length: Largest value of the parameter; the smallest is zero.
+        nodes: Number of intervals between the solutions of the first attempt.
 
     Returns:
-        A spline of the parameter, with joint angles of shape (m, n_joints) [rad].
+        A spline that returns joint angles [rad], shape (m, n_joints), at values of the
+        parameter, shape (m,).
 
     Raises:
         InputError: If the tool cannot reach the path, leaves the range of a joint, or
@@ -190,4 +202,5 @@ def _check_limits(kinematics: ToolKinematics, q: Array) -> None:
 
 
 def _in_mm(point: Array) -> str:
+    """Coordinates in mm, as text for a message."""
     return ", ".join(f"{x / mm:.4g}" for x in point)

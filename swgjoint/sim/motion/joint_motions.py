@@ -1,4 +1,4 @@
-"""Motions of the joints: step, trapezoid, chirp, points of a file."""
+"""Motions defined by joint angles: step, trapezoid, chirp, and points from a file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 CLOSEST, LONGEST = 1e-6, 1e4
-"""Shortest time between points of a file and longest motion [s], equal to the shortest
-step and the longest duration of a simulation."""
+"""Shortest accepted time between two points of a file and longest accepted motion [s].
+They equal the shortest step and the longest duration of a simulation."""
 LARGEST = 1e4
-"""Largest angle of a point of a file [rad], more than a thousand turns."""
+"""Largest accepted angle in a file [rad], more than a thousand turns."""
 
 
 def step(
@@ -28,7 +28,7 @@ def step(
         time: Time grid [s]. Shape (n,).
         start: Joint angles before the step [rad]. Shape (n_joints,).
         jump: Height of the step [rad]. Shape (n_joints,).
-        at: Time of the step [s]; a sample at this time has the new reference.
+        at: Time of the step [s]; a sample at this time already has the new reference.
         answer_speed: Expected largest speed of the step response [rad/s]. Shape
             (n_joints,).
     """
@@ -56,10 +56,10 @@ def trapezoid(
     max_acceleration: float,
     where: str = "trajectory",
 ) -> Trajectory:
-    """Constant acceleration, constant speed, constant deceleration, rest.
+    """Point-to-point motion with a trapezoidal velocity profile, between two rests.
 
-    All joints follow one law from 0 to 1, the fastest that keeps every joint within its
-    limits. The velocity is continuous, the acceleration is not.
+    All joints follow the same law from 0 to 1, which is the fastest that keeps every
+    joint within its limits. The velocity is continuous, but the acceleration is not.
 
     Args:
         time: Time grid [s]. Shape (n,).
@@ -115,12 +115,14 @@ def chirp(
     hold: float,
     ramp: float,
 ) -> Trajectory:
-    r"""Oscillation of one joint at linearly changing frequency; twice differentiable.
+    r"""Oscillation of one joint with linearly changing frequency.
 
     .. math:: q = q_0 + A\,w(t)\sin\phi(t), \quad
         \dot\phi = 2\pi\left(f_0 + (f_1 - f_0)\,t/T\right)
 
-    with :math:`w` the smooth step from 0 to 1 and back over ``ramp``.
+    Here t and T are time and duration of the oscillation. The factor w rises smoothly
+    from 0 to 1 during the first ramp and falls to 0 during the last. The position is
+    twice continuously differentiable.
 
     Args:
         time: Time grid [s]. Shape (n,).
@@ -130,7 +132,7 @@ def chirp(
         first_frequency: Frequency at the start of the oscillation [Hz].
         last_frequency: Frequency at the end of the oscillation [Hz].
         hold: Rest before and after the oscillation [s].
-        ramp: Time in which the amplitude grows, and in which it decays [s].
+        ramp: Time in which the amplitude grows, and time in which it decays [s].
     """
     length = time[-1] - 2.0 * hold
     t = np.clip(time - hold, 0.0, length)
@@ -143,7 +145,7 @@ def chirp(
         60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         for x in (np.clip(s / ramp, 0.0, 1.0) for s in (t, length - t))
     )
-    # the two ramps do not overlap: while one changes the other is 1
+    # the two ramps do not overlap, so one factor is 1 while the other changes
     w, w_1 = up * down, (up_1 - down_1) / ramp
     w_2 = (up_2 + down_2) / ramp**2
     sine, cosine = np.sin(phase), np.cos(phase)
@@ -170,15 +172,15 @@ def chirp(
 def spline_motion(
     time: Array, *, points_time: Array, points: Array, hold: float
 ) -> Trajectory:
-    """Rest, a smooth motion through all points, rest; twice differentiable.
+    """Smooth motion through given points, between two rests.
 
     The motion is a quintic spline that starts and ends with zero speed and
-    acceleration.
+    acceleration, so the position is twice continuously differentiable.
 
     Args:
         time: Time grid [s]. Shape (n,).
-        points_time: Increasing times of the points [s]; the rest ends at the first.
-            Shape (m,).
+        points_time: Increasing times of the points [s]; the first point is reached at
+            the end of the rest. Shape (m,).
         points: Joint angles [rad]. Shape (m, n_joints).
         hold: Rest before the motion [s].
     """
@@ -205,16 +207,20 @@ def spline_motion(
 def read_points(
     path: str | Path, joints: tuple[str, ...], start: Array
 ) -> tuple[Array, Array]:
-    """Times [s] and joint angles [rad] of a CSV file. Shapes (m,) and (m, n_joints).
+    """Read the points of a motion from a CSV file.
 
     Args:
         path: File with the columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``;
-            joints without a column remain at their start.
+            joints without a column remain at their start angle.
         joints: Names of all joints of the arm.
         start: Joint angles at the start [rad]. Shape (n_joints,).
 
+    Returns:
+        Times [s], shape (m,), and joint angles [rad], shape (m, n_joints).
+
     Raises:
-        InputError: If the file cannot be used; names the file and the line or column.
+        InputError: If the file cannot be used; the message names the file and the line
+            or column.
     """
     accepted = {
         name: {f"{name}_deg": deg, f"{name}_rad": 1.0} for name in joints

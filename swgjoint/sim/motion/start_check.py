@@ -12,12 +12,12 @@ from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 FASTEST = 1e10
-"""Largest acceleration of a link by the peak torque of its drive that the engine can
-integrate [rad/s²]."""
+"""Largest acceleration of a link by the repeated peak torque of its drive that the
+engine accepts [rad/s²]."""
 
 
 def check_ranges(arm: RigidArm, trajectory: Trajectory, *, where: str) -> None:
-    """Reject a motion that leaves the range of a joint, whose limit would exert force.
+    """Reject a motion that leaves the range of a joint, where limits would push back.
 
     Args:
         arm: The arm.
@@ -25,7 +25,7 @@ def check_ranges(arm: RigidArm, trajectory: Trajectory, *, where: str) -> None:
         where: Start of the message.
 
     Raises:
-        InputError: If the motion leaves a range; one line per joint with angle and
+        InputError: If the motion leaves a range; one line per joint states angle and
             range.
     """
     model, path = arm.model, trajectory.position
@@ -59,7 +59,7 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
         where: Start of the message.
 
     Raises:
-        InputError: If the link is too light; names link, inertia and mass.
+        InputError: If the link is too light; the message names link, inertia and mass.
     """
     torque, inertia = attached.drive.ratings.repeated_peak, attached.link_inertia
     if attached.rotor is None or torque <= FASTEST * inertia:
@@ -69,8 +69,8 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
     fastest = torque / inertia if inertia else np.inf
     raise InputError(
         f"{where}: joint {attached.joint!r}: link {body.name!r} has {inertia:.2g} kg·m²"
-        f" about the joint (its own mass: {body.mass[0]:.2g} kg), which"
-        f" {torque:.3g} N·m of drive {attached.drive.name} accelerate by"
+        f" about the joint (its own mass: {body.mass[0]:.2g} kg), so the peak torque"
+        f" {torque:.3g} N·m of drive {attached.drive.name!r} would accelerate it by"
         f" {fastest:.1g} rad/s²; needed: more than"
         f" {torque / FASTEST:.1g} kg·m², that is, a realistic inertia in {arm.path}, or"
         " a joint without a drive"
@@ -78,11 +78,14 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
 
 
 def touching_bodies(arm: RigidArm, position: Array) -> str:
-    """Bodies in contact in a pose, as part of a message; empty if there are none.
+    """Deepest contacts between bodies in a pose, as text for a message.
 
     Args:
         arm: The arm.
         position: Joint angles [rad]. Shape (n_joints,).
+
+    Returns:
+        Up to three pairs of bodies with their penetration; empty without contacts.
     """
     pairs = arm.contacts(position[None])[:3]
     return ", ".join(f"{a!r} and {b!r} by {depth / mm:.2g} mm" for a, b, depth in pairs)

@@ -1,4 +1,4 @@
-"""Motions of the tool: line, circle, and the pose cycle of ISO 9283."""
+"""Motions defined by the tool: line, circle, and the pose cycle of ISO 9283."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ DIRECTIONS = {
 }
 """Horizontal unit vectors (x, y) by name."""
 ORDER = (5, 4, 3, 2, 1)
-"""Poses of one cycle in the order of the standard."""
+"""Numbers of the poses of one cycle, in the order of the standard."""
 POSE_SHARE = 0.8
-"""Distance of P2 to P5 from the centre of the cube, relative to that of the corners: a
-tenth of the diagonal from its ends."""
+"""Distance of P2 to P5 from the centre of the cube, relative to the distance of the
+corners. These poses are a tenth of the diagonal away from its ends."""
 
 
 def line(
@@ -36,8 +36,8 @@ def line(
 ) -> Trajectory:
     """Motion back and forth on a straight line with a rest at both ends.
 
-    The motion fills the time grid. The passes for path figures are the constant-speed
-    parts of the forward strokes.
+    The motion fills the time grid. The constant-speed parts of the forward strokes are
+    the passes from which the path figures are computed.
 
     Args:
         time: Time grid [s]. Shape (n,).
@@ -45,8 +45,8 @@ def line(
         start: Joint angles at the start of the line [rad]. Shape (n_joints,).
         displacement: Vector from the start to the far end [m]. Shape (3,).
         cycles: Number of cycles back and forth.
-        hold: Rest at the start and at every end [s].
-        ramp: Time of acceleration, and of deceleration [s].
+        hold: Rest at the start and at every turning point [s].
+        ramp: Duration of each acceleration and of each deceleration [s].
     """
     path = _straight(kinematics, start, displacement)
     way = (time[-1] - hold) / (2 * cycles) - hold
@@ -82,20 +82,20 @@ def circle(
 ) -> Trajectory:
     """Motion along a circle at constant speed between smooth ramps.
 
-    The motion fills the time grid. The passes for path figures are the whole turns at
-    constant speed, counted from the end of the first ramp.
+    The motion fills the time grid. The whole turns at constant speed, counted from the
+    end of the first ramp, are the passes from which the path figures are computed.
 
     Args:
         time: Time grid [s]. Shape (n,).
         kinematics: Kinematics of the tool.
         start: Joint angles at the start [rad]. Shape (n_joints,).
         radius: Radius of the circle [m].
-        normal: Axis of the circle. Shape (3,).
-        towards: Direction from the start to the centre, not parallel to ``normal``.
-            Shape (3,).
+        normal: Axis of the circle, about which the tool moves right-handed. Shape (3,).
+        towards: Direction from the start to the centre, not parallel to ``normal``; its
+            component perpendicular to ``normal`` is used. Shape (3,).
         cycles: Number of turns.
         hold: Rest before and after the motion [s].
-        ramp: Time of acceleration, and of deceleration [s].
+        ramp: Duration of the acceleration and of the deceleration [s].
     """
     origin, _ = kinematics.pose(start)
     axis = normal / np.linalg.norm(normal)
@@ -126,16 +126,17 @@ def circle(
 
 
 def cube_poses(centre: Array, edge: float, plane: str) -> Array:
-    """P1 to P5 of ISO 9283 (1998) [m]. Shape (5, 3).
+    """Positions of the poses P1 to P5 of ISO 9283 (1998) [m]. Shape (5, 3).
 
     The diagonal plane of the cube contains two opposite horizontal edges and the two
-    space diagonals between them. P1 is the centre. P2 to P5 are on the diagonals in the
-    order of the corners, a tenth of a diagonal away from them.
+    space diagonals between them. P1 is the centre of the cube. P2 to P5 are on the
+    diagonals, a tenth of a diagonal away from the corners, in the order of the corners
+    around the plane.
 
     Args:
         centre: Centre of the cube [m]. Shape (3,).
-        edge: Edge of the cube [m].
-        plane: Direction in which the plane rises, see :data:`DIRECTIONS`.
+        edge: Edge length of the cube [m].
+        plane: Direction in which the plane rises, a key of :data:`DIRECTIONS`.
     """
     x, y = DIRECTIONS[plane]
     rising, level = np.array([x, y, 1.0]), np.array([-y, x, 0.0])
@@ -157,14 +158,14 @@ def iso9283(
 ) -> Trajectory:
     """Cycles from P1 to P5, P4, P3, P2 and back to P1, with a rest at each pose.
 
-    Between the poses all joints move together on a smooth point-to-point motion. All
-    moves take the same share of the time without the rests.
+    Between the poses all joints move together in a smooth point-to-point motion. All
+    moves take the same time, such that the motion fills the time grid.
 
     Args:
         time: Time grid [s]. Shape (n,).
         kinematics: Kinematics of the tool.
         start: Joint angles at P1 [rad]. Shape (n_joints,).
-        edge: Edge of the cube [m].
+        edge: Edge length of the cube [m].
         plane: Direction in which the diagonal plane rises, see :func:`cube_poses`.
         cycles: Number of cycles.
         hold: Rest before the first cycle [s].
@@ -185,7 +186,7 @@ def iso9283(
         x = np.clip((time[first:] - begin) / move, 0.0, 1.0)
         x[x > 1.0 - 1e-9] = 1.0  # round-off of the time is not a motion
         x = x[: int(np.searchsorted(x, 1.0)) + 1]
-        # the integral of the smooth ramp's slope: a smooth step of the position
+        # the position follows the smooth step itself, not its integral
         _, value, slope = smooth_ramp(x)
         bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         here = slice(first, first + x.size)
@@ -209,13 +210,16 @@ def iso9283(
 
 
 def _straight(kinematics: ToolKinematics, start: Array, way: Array) -> Any:
-    """Joint angles from ``start`` to a tool displaced by ``way`` [m], over 0 to 1."""
+    """Spline of joint angles that displaces the tool by ``way`` [m] on a straight line.
+
+    Its parameter runs from 0 at ``start`` to 1.
+    """
     origin, _ = kinematics.pose(start)
     return follow(kinematics, start, lambda s: origin + s[:, None] * way, length=1.0)
 
 
 def _even(t: Array, way: float, ramp: float) -> tuple[Array, Array, Array]:
-    """Law from 0 to 1 in ``way`` seconds with smooth ramps, and its derivatives."""
+    """Law from 0 to 1 over time ``way`` [s] with smooth ramps, and its derivatives."""
     speed = 1.0 / (way - ramp)
     up_s, up_v, up_a = smooth_ramp(np.clip(t / ramp, 0.0, 1.0))
     down_s, down_v, down_a = smooth_ramp(np.clip((t - way + ramp) / ramp, 0.0, 1.0))
@@ -236,7 +240,10 @@ def _along(
     steady: tuple[float, float],
     **rest: Any,
 ) -> Trajectory:
-    """Joint motion from a path over its parameter, and the parameter over time."""
+    """Joint motion from a path as a function of its parameter, and the parameter's law.
+
+    The law contains the parameter and its first and second derivatives over time.
+    """
     s, v, a = (x[:, None] for x in law)
     slope, bend = path(s[:, 0], 1), path(s[:, 0], 2)
     return Trajectory(

@@ -11,10 +11,11 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
-    """Position, velocity and acceleration of every joint at every step."""
+    """Commanded position, velocity and acceleration of every joint at every step."""
 
     time: Array
-    """Start of every step and the end of the last one [s]. Shape (n,)."""
+    """Times of the samples: the start of every step and the end of the last one [s].
+    Shape (n,)."""
     position: Array
     """Joint angles [rad]. Shape (n, n_joints)."""
     velocity: Array
@@ -22,23 +23,28 @@ class Trajectory:
     acceleration: Array
     """Joint accelerations [rad/s²]. Shape (n, n_joints)."""
     steady: slice
-    """Samples of the constant-speed part that the metrics use."""
+    """Samples that the metrics use: the part at constant joint speed, or, if no joint
+    speed is constant, the main part of the motion (a chirp at full amplitude, a path of
+    the tool, the time after a step)."""
     steady_velocity: Array
-    """Speed in that part [rad/s], zero if no speed is constant. Shape (n_joints,)."""
+    """Constant speed in that part [rad/s]; zero if the speed is not constant. Shape
+    (n_joints,)."""
     arrival: float | None = None
-    """Time at which the command comes to rest at its last pose [s]; None if never."""
+    """Time at which the command comes to rest in its final pose [s]; None if it does
+    not."""
     visits: tuple[tuple[int, float], ...] = ()
-    """Repeatedly visited poses: number of the pose and end of the rest there [s]."""
+    """Visits of repeatedly approached poses: number of the pose, and time at the end of
+    the rest there [s]."""
     passes: tuple[float, ...] = ()
-    """Start times of passes along one path at constant tool speed [s]."""
+    """Start times of the passes along one path at constant tool speed [s]."""
     pass_time: float = 0.0
     """Duration of each pass [s]."""
     answer_speed: Array | None = None
-    """Speed of a step response, whose commanded speed is zero [rad/s]. Shape
-    (n_joints,)."""
+    """Largest expected speed of a step response [rad/s], shape (n_joints,); None for
+    motions other than a step."""
 
     def every(self, n: int) -> Trajectory:
-        """The same motion at every n-th sample, the first included."""
+        """The same motion with every n-th sample, beginning with the first."""
         return replace(
             self,
             time=self.time[::n],
@@ -52,7 +58,8 @@ class Trajectory:
     def top_speed(self) -> Array:
         """Largest commanded speed of every joint [rad/s]. Shape (n_joints,).
 
-        For a step, whose commanded speed is zero, it is that of the step response.
+        For a step, whose commanded speed is zero, it is the expected speed of the step
+        response.
         """
         if self.answer_speed is not None:
             return self.answer_speed
@@ -62,14 +69,14 @@ class Trajectory:
 def smooth_ramp(x: Array) -> tuple[Array, Array, Array]:
     r"""Integral, value and slope of the smooth step :math:`10x^3 - 15x^4 + 6x^5`.
 
-    The slope and the second derivative of the step vanish at both ends, so a velocity
-    that follows it gives a three times continuously differentiable position.
+    The first and second derivatives of the step vanish at both ends. If a velocity
+    follows the step, the position is three times continuously differentiable.
 
     Args:
         x: Argument from 0 to 1.
 
     Returns:
-        Integral, value and slope, each of the shape of ``x``.
+        Integral from 0, value and slope, each with the shape of ``x``.
     """
     return (
         x**4 * (2.5 - 3.0 * x + x**2),
@@ -89,7 +96,7 @@ def sweep(
     settle: float = 0.0,
     sub_steps: int = 1,
 ) -> Trajectory:
-    """Rest, smooth ramp to constant speed, smooth ramp to rest; all joints together.
+    """Motion of all joints together: rest, ramp, constant speed, ramp, rest.
 
     Args:
         start: Joint angles at the start [rad]. Shape (n_joints,).
@@ -97,9 +104,9 @@ def sweep(
         duration: Total time [s], more than ``2 (hold + ramp) + settle``.
         step: Time step of the scene [s].
         hold: Rest before and after the motion [s].
-        ramp: Time of each ramp [s].
+        ramp: Duration of each ramp [s].
         settle: Time after the first ramp that the metrics leave out [s].
-        sub_steps: Samples per time step.
+        sub_steps: Number of samples per time step.
     """
     time = time_grid(duration, step, sub_steps)
     top = duration - hold - ramp  # the second ramp starts here
@@ -130,7 +137,7 @@ def constant_speed(
     settle: float = 0.0,
     sub_steps: int = 1,
 ) -> Trajectory:
-    """Constant speed from the first instant.
+    """Motion at constant joint speeds from the first instant.
 
     Args:
         start: Joint angles at the start [rad]. Shape (n_joints,).
@@ -138,7 +145,7 @@ def constant_speed(
         duration: Total time [s].
         step: Time step of the scene [s].
         settle: Initial time that the metrics leave out [s].
-        sub_steps: Samples per time step.
+        sub_steps: Number of samples per time step.
     """
     time = time_grid(duration, step, sub_steps)
     return Trajectory(
@@ -152,12 +159,14 @@ def constant_speed(
 
 
 def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
-    """Times of all states of a run, first and last included [s].
+    """Times of all states of a run, including the first and the last [s].
+
+    The duration is rounded to whole time steps.
 
     Args:
         duration: Total time [s].
         step: Time step of the scene [s].
-        sub_steps: Samples per time step.
+        sub_steps: Number of samples per time step.
 
     >>> time_grid(0.004, 0.001).tolist()
     [0.0, 0.001, 0.002, 0.003, 0.004]
@@ -167,10 +176,10 @@ def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
 
 
 def window(time: Array, first: float, last: float) -> slice:
-    """Samples between two times, both included.
+    """Slice of the samples from one time to another, both included.
 
     Args:
-        time: Increasing times [s]. Shape (n,).
+        time: Increasing times of the samples [s]. Shape (n,).
         first: First time [s].
         last: Last time [s].
     """
