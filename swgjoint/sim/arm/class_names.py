@@ -1,7 +1,7 @@
-"""Names of MJCF classes that the engine would use as a format string.
+"""Check of MJCF class names, which the engine would use as format strings.
 
-MuJoCo 4.0.0 puts the name of an unknown class into the format of its error message, so
-that ``class="%n"`` ends the process instead of raising an error.
+MuJoCo 4.0.0 inserts the name of an unknown class into the format string of its error
+message. ``class="%n"`` therefore terminates the process instead of raising an error.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def check_class_names(path: Path) -> None:
     while waiting:
         file = waiting.pop()
         if file in seen or not is_file(file):
-            continue  # the engine says which file is missing
+            continue  # the engine reports missing files
         seen.add(file)
-        # markup is ASCII in every encoding that the engine reads
+        # in every encoding that the engine reads, the markup itself is ASCII
         text = file.read_text(encoding="latin-1")
         for quoted in _ATTRIBUTE.findall(text):
             if "%" in html.unescape(quoted):

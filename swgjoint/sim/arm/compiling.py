@@ -1,4 +1,4 @@
-"""Compilation of models, with failures as one-line messages."""
+"""Compilation of models, with error messages of one line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from swgjoint.errors import InputError
 
 
 def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
-    """Compile a model and report failure in one line.
+    """Compile a model, with an error message of one line.
 
     Args:
         spec: The model.
@@ -24,9 +24,9 @@ def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
         remedy = ""
         if "balanceinertia" in line or "positive eigenvalues" in line:
             remedy = (
-                "; accepted: moments of inertia of a rigid body, or the option"
-                " --balance-inertia (scene key balance_inertia), which sets all three"
-                " to their mean"
+                "; accepted: moments of inertia that a rigid body can have, or the"
+                " option --balance-inertia (scene key balance_inertia), which sets all"
+                " three to their mean"
             )
         raise InputError(f"{where}: MuJoCo cannot compile it: {line}{remedy}") from None
 

@@ -1,4 +1,4 @@
-"""Selection of catalogue drives by rule: the smallest that carries each joint."""
+"""Selection of catalogue drives by rule: the smallest one that suffices per joint."""
 
 from __future__ import annotations
 
@@ -15,25 +15,28 @@ from swgjoint.sim.motion.trajectory import Trajectory
 SERIES = "CSG"
 """Series of the selected drives."""
 RATIO = 100
-"""Reduction of the selected drives."""
+"""Reduction ratio of the selected drives."""
 LARGER = 10.0
-"""Available over required torque above which the smallest drive is reported as larger
-than needed."""
+"""Ratio of available to required torque above which the smallest drive is reported as
+larger than needed."""
 SAMPLES = 200
-"""Approximate number of poses of a motion at which torques are evaluated."""
+"""Smallest number of poses of a motion at which torques are evaluated, if it has as
+many samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveChoice:
-    """The drive of one joint and the torque that decided its size."""
+    """The drive of one joint and the required torque that determined its size."""
 
     drive: str
+    """Catalogue name of the drive."""
     decided_by: str
-    """``effort`` (motor torque in the arm's file), ``weight`` or ``motion``."""
+    """Kind of the torque that determined the size: ``effort`` (torque limit in the
+    arm's file), ``weight`` or ``motion``."""
     needed: float
-    """Required torque that decided the size [N·m]."""
+    """Required torque that determined the size [N·m]."""
     available: float
-    """Torque of the drive that ``needed`` is compared with [N·m]: rated torque for the
+    """Torque of the drive with which ``needed`` is compared [N·m]: rated torque for the
     weight, repeated peak torque otherwise."""
     fits: bool
     """Whether the drive suffices; if not, it is the largest of the series."""
@@ -60,20 +63,20 @@ class DriveChoice:
 
 
 def choose_drives(arm: RigidArm, motion: Trajectory) -> dict[str, DriveChoice]:
-    """Select the smallest CSG of ratio 100 for every joint of an arm on a motion.
+    """Select the smallest CSG drive with ratio 100 for every joint of an arm.
 
-    The repeated peak torque of the drive is at least the motor torque limit in the
-    arm's file, if there is one, and at least the largest torque of the rigid arm on the
-    motion (weight, acceleration and friction of the file). The rated torque is at
-    least the largest weight torque on the motion. If no drive suffices, the largest is
-    selected.
+    The repeated peak torque of the drive is at least the torque limit in the arm's
+    file, if there is one, and at least the largest torque of the rigid arm on the
+    motion, which includes weight, acceleration, and damping and friction of the file.
+    The rated torque is at least the largest weight torque on the motion. If no drive
+    suffices, the largest one is selected.
 
     Args:
         arm: The rigid arm.
         motion: Its commanded motion.
 
     Returns:
-        Drive selection by joint.
+        Selected drive by joint name.
     """
     step = max(1, len(motion.time) // SAMPLES)
     path = motion.every(step)
@@ -92,9 +95,9 @@ def choose_drive(*, effort: float | None, weight: float, motion: float) -> Drive
     """Select the smallest drive for three output torques.
 
     Args:
-        effort: Motor torque limit [N·m]; None if the file states none.
+        effort: Torque limit of the joint [N·m]; None if the file states none.
         weight: Largest torque at rest [N·m].
-        motion: Largest torque in motion, weight included [N·m].
+        motion: Largest torque in motion, including the weight [N·m].
     """
     rows = _rows()
     asked = {"weight": weight, "motion": motion}
@@ -106,7 +109,7 @@ def choose_drive(*, effort: float | None, weight: float, motion: float) -> Drive
         sizes[kind] = fits[0] if fits else len(rows)
     largest = len(rows) - 1
     row = rows[min(max(sizes.values()), largest)]
-    # of the torques that require this size, the one that uses most of it decides
+    # among the torques that require this size, choose the one closest to the limit
     decided_by = max(
         asked, key=lambda kind: (sizes[kind], asked[kind] / _carries(row, kind))
     )
@@ -121,9 +124,11 @@ def choose_drive(*, effort: float | None, weight: float, motion: float) -> Drive
 
 
 def _carries(row: CatalogueRow, kind: str) -> float:
+    """Torque of a drive with which a kind of required torque is compared [N·m]."""
     return row.rated_torque if kind == "weight" else row.repeated_peak
 
 
 def _rows() -> list[CatalogueRow]:
+    """Drives to select from, by increasing rated torque."""
     rows = (r for r in catalogue_rows() if (r.series, r.ratio) == (SERIES, RATIO))
     return sorted(rows, key=lambda row: row.rated_torque)

@@ -1,4 +1,4 @@
-"""Import of an MJCF or URDF arm as bare mechanics, without motors."""
+"""Import of an arm from MJCF or URDF: links, joints and shapes, without motors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _OF_ACTUATORS = (
     *("biastype", "biasprm", "dyntype", "dynprm", "delay", "nsample", "interp"),
     *("damping", "armature", "cranklength", "lengthrange"),
 )
-"""Actuator attributes that a default class may set."""
+"""Attributes of actuators that a default class may set."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,10 +37,11 @@ class ArmFile:
     """Contents of an arm's file that a scene uses."""
 
     spec: mujoco.MjSpec
-    """Links, joints, shapes and tendons. Actuators, sensors, keyframes, motor torque
-    limits and armature are removed, because drives and scene provide them."""
+    """Links, joints that move, shapes and tendons. Actuators, sensors, keyframes,
+    equalities, motor torque limits and armature are removed."""
     held: dict[str, str]
-    """Held joints with the reason: their type, or what ties them."""
+    """Held joints, each with the reason: its type, what ties it, or that it has no
+    drive."""
     keyframes: dict[str, dict[str, float]]
     """Named poses of the file: angles of all hinges [rad]."""
     effort: dict[str, float]
@@ -48,26 +49,34 @@ class ArmFile:
 
 
 def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
-    """Read an arm and remove everything that the scene provides.
+    """Read an arm and remove everything that drives or scene provide.
 
-    Joints that are not hinges, or that an equality ties to others, are held in the pose
-    of ``reading``. Shapes of a URDF file are dropped if their meshes are missing or in
-    a format that the engine does not read; the inertia is stated in the file. Gravity
-    compensation (``gravcomp``) is removed, because the drives carry the weight. Each
-    case causes a one-line warning. Shapes of a URDF file do not collide, because
-    adjacent links overlap and the format cannot exclude them; shapes of an MJCF file
-    collide as the file states.
+    The following cases cause a one-line warning each:
+
+    - Joints that are not hinges, or that an equality ties to others, are held in the
+      pose of ``reading``.
+    - Shapes of a URDF file are dropped if their meshes are missing or in a format that
+      the engine does not read. This does not affect the inertias, which the file
+      states.
+    - Gravity compensation (``gravcomp``) is removed, because the drives carry the
+      weight.
+
+    Shapes of a URDF file do not collide, because adjacent links overlap and the format
+    cannot exclude such contacts. Shapes of an MJCF file collide as the file states.
 
     Args:
         path: MJCF or URDF file.
-        reading: Which hinges move, and the pose of held joints; None moves every hinge.
+        reading: Hinges that move, and pose of held joints; None moves every hinge.
+
+    Returns:
+        The contents of the file that a scene uses.
 
     Raises:
-        InputError: If the file is not an arm, or no hinge of it moves independently.
+        InputError: If the file is not an arm, or if all its hinges are tied to others.
     """
     try:
         return _arm_of(path, reading or ArmReading())
-    except UnicodeDecodeError as error:  # the engine reads names of any bytes
+    except UnicodeDecodeError as error:  # the engine accepts names of any bytes
         byte = error.object[error.start]
         raise InputError(
             f"{path}: a name in the file has the byte 0x{byte:02x}, which is not UTF-8;"
@@ -76,13 +85,13 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
 
 
 def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
-    """See :func:`read_arm`."""
+    """The arm in a file, see :func:`read_arm`."""
     spec = _spec_of(path)
     if reading.balance_inertia:
         _balance_inertia(spec)
-    spec.compiler.fusestatic = False  # every link keeps its name
+    spec.compiler.fusestatic = False  # links without a joint remain separate bodies
     if path.suffix.lower() == ".urdf":
-        spec.compiler.discardvisual = False  # shapes without collision stay visible
+        spec.compiler.discardvisual = False  # keep shapes that do not collide
         _find_meshes(spec, path)
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
@@ -108,7 +117,7 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
     for element in [*spec.sensors, *spec.actuators]:
         spec.delete(element)
     for key in spec.keys:
-        key.ctrl, key.act = [], []  # their actuators are removed
+        key.ctrl, key.act = [], []  # the actuators that they refer to are removed
     bones = skeleton(spec, where=str(path))
     check_numbers(bones, where=str(path))
     keyframes = _keyframes(bones)
@@ -136,9 +145,9 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
 
 
 def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
-    """Reject tendons, equalities and pairs that name elements missing in the file.
+    """Reject tendons, equalities and pairs that refer to elements missing in the file.
 
-    The engine rejects them as well, but only after joints have been held.
+    The engine would reject them, too, but only after the held joints are removed.
     """
     tendons = [
         (f"tendon {tendon.name!r}", wrap.target)
@@ -160,15 +169,18 @@ def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
     for element, target in [*tendons, *equalities, *pairs]:
         if target is None:
             raise InputError(
-                f"{path}: {element} names an element that is not in the file;"
-                " accepted: its joints, sites, bodies, geoms and tendons"
+                f"{path}: {element} refers to an element that is not in the file;"
+                " accepted: joints, sites, bodies, geoms and tendons of the file"
             )
 
 
 def _tied_element(
     spec: mujoco.MjSpec, equality: mujoco.MjsEquality, name: str
 ) -> object:
-    """Element that an equality names, None if missing; the name for other kinds."""
+    """Element to which an equality refers by name; None if it is missing.
+
+    For kinds of equality that :func:`choose_held` rejects, the name itself is returned.
+    """
     if equality.type == mujoco.mjtEq.mjEQ_JOINT:
         return spec.joint(name)
     if equality.type == mujoco.mjtEq.mjEQ_TENDON:
@@ -180,7 +192,7 @@ def _tied_element(
 
 
 def _forget_actuators(spec: mujoco.MjSpec) -> None:
-    """Reset the default actuator class, which actuators of the scene would inherit."""
+    """Reset the actuator defaults of the file, so that the scene's motors are plain."""
     fresh = mujoco.MjSpec()
     own, plain = spec.default.actuator, fresh.default.actuator
     for key in _OF_ACTUATORS:
@@ -188,7 +200,7 @@ def _forget_actuators(spec: mujoco.MjSpec) -> None:
 
 
 def _spec_of(path: Path) -> mujoco.MjSpec:
-    """Read a file with the engine; suffixes may be in upper case."""
+    """Read a file with the engine; its suffix may be in upper case."""
     suffix = path.suffix.lower()
     if suffix == ".xacro":
         raise InputError(
@@ -209,8 +221,10 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
 
 
 def _balance_inertia(spec: mujoco.MjSpec) -> None:
-    """Replace the moments of inertias that no rigid body can have by their mean."""
-    spec.compiler.balanceinertia = True  # those that break the triangle inequality
+    """Replace the moments of inertia of impossible rigid bodies by their mean."""
+    # the compiler replaces moments that violate the triangle inequality; the loop
+    # replaces inertia tensors that are not positive definite
+    spec.compiler.balanceinertia = True
     for body in spec.bodies:
         full = np.array(body.fullinertia)
         if not np.isfinite(full).all():
@@ -236,7 +250,10 @@ def _keyframes(model: mujoco.MjModel) -> dict[str, dict[str, float]]:
 def _tell_held(
     held: dict[str, str], reading: ArmReading, path: Path, *, moves: bool
 ) -> None:
-    """Warn in one line about joints that are held although the user chose none."""
+    """Warn in one line about joints that are held for a reason other than ``driven``.
+
+    There is no warning if no joint moves, because the caller then raises an error.
+    """
     reported = {name: why for name, why in held.items() if why != NOT_CHOSEN}
     if not reported or not moves:
         return
@@ -255,7 +272,7 @@ def _tell_held(
 
 
 def _let_weigh(spec: mujoco.MjSpec, path: Path) -> None:
-    """Remove gravity compensation, which carries bodies without a drive."""
+    """Remove gravity compensation, which would carry weight instead of the drives."""
     carried = [body for body in spec.bodies if body.gravcomp]
     for body in carried:
         body.gravcomp = 0.0
@@ -284,10 +301,11 @@ def _effort(spec: mujoco.MjSpec) -> dict[str, float]:
 
 
 def _solve_well(spec: mujoco.MjSpec) -> None:
-    """Restore at least the default solver effort of the engine.
+    """Set the solver effort to at least the engine's defaults.
 
-    Files made for learning limit the solver to a few iterations. The drives are part of
-    the system that it solves in a step: without convergence their torques are wrong.
+    Files made for reinforcement learning limit the solver to a few iterations. The
+    drives are part of the system that the solver solves in every step. If it does not
+    converge, their torques are wrong.
     """
     usual = mujoco.MjSpec().option
     option = spec.option
@@ -300,7 +318,10 @@ def _solve_well(spec: mujoco.MjSpec) -> None:
 
 
 def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
-    """Resolve ``package://`` and drop shapes whose mesh cannot be read."""
+    """Resolve mesh paths such as ``package://``, and drop shapes without a mesh.
+
+    A warning reports the shapes whose mesh is missing or cannot be read.
+    """
     unknown: list[str] = []
     missing: list[str] = []
     for mesh in list(spec.meshes):
@@ -324,8 +345,7 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
         reasons.append(f"{len(missing)} not found, the first is {missing[0]}")
     if reasons:
         warnings.warn(
-            f"{path}: shapes are left out because of their meshes:"
-            f" {'; '.join(reasons)}",
+            f"{path}: shapes without a usable mesh are left out: {'; '.join(reasons)}",
             stacklevel=3,
         )
 
@@ -339,13 +359,13 @@ def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
 
 
 def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
-    """Paths at which a mesh may be found, the most likely one first."""
+    """Paths at which a mesh may be found, in order of decreasing likelihood."""
     scheme, colon, rest = reference.partition("://")
     if not colon:
         return [folder / meshdir / reference, folder / reference]
     if scheme != "package":
         return [Path(rest)]
-    # a package is a parent folder of the file, or a sibling of a parent folder
+    # look for the package among the parent folders of the file and their subfolders
     package, _, inside = rest.partition("/")
     above = folder.resolve()
     parents = (above, *above.parents)
@@ -354,5 +374,5 @@ def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
         for parent in parents
         for place in ((parent,) if parent.name == package else (parent / package,))
     ]
-    # a renamed copy of the package keeps its folders
+    # a renamed copy of the package still has the same folders inside
     return [*places, *(parent / inside for parent in parents[:4])]

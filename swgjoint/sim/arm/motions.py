@@ -1,4 +1,4 @@
-"""Gentle default motions for an arm without a scene."""
+"""Slow default motions for an arm that has no scene file."""
 
 from __future__ import annotations
 
@@ -11,24 +11,28 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 SWEEP_TIMING = {"hold_s": 0.25, "ramp_s": 0.5, "settle_s": 0.25}
+"""Times of the sweep."""
 DURATION = 4.0
 """Duration of most motions [s]."""
 STEP = 1.0
 """Step height of every joint, and amplitude of the chirp [deg]."""
 AXES = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
+"""Candidate directions of a line in the world frame; the last four also of a circle."""
 TOOL_MOTIONS = ("line", "circle", "iso9283")
+"""Kinds of trajectory that move the tool along a path."""
 PLANES = ("+x", "-x", "+y", "-y")
+"""Candidate planes of the ISO 9283 cycle."""
 
 
 def tables_of(
     kind: str, arm: RigidArm, start: Array, end: Array
 ) -> tuple[list[dict[str, Any]], float]:
-    """Candidate tables ``[trajectory]`` of one kind, and a duration.
+    """Candidate tables ``[trajectory]`` for one kind of motion, and the duration.
 
     The caller uses the first table that the arm can follow. Motions of the tool have
     candidates in several directions, because an arm near the limit of its reach can
-    move in one direction only. An unknown kind, or one that needs a file, gets a table
-    that the scene rejects with its message.
+    move in some directions only. For an unknown kind, or one that needs a file, the
+    table is incomplete, and validation of the scene reports what is missing.
 
     Args:
         kind: Kind of the trajectory.

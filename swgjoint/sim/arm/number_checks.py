@@ -1,4 +1,4 @@
-"""Checks of a compiled arm for numbers that no real arm has."""
+"""Checks of a compiled arm for numbers that no real arm can have."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from swgjoint.errors import InputError
 
 LARGEST = 1e10
-"""The engine's ``mjMAXVAL`` in SI units; larger states count as diverged."""
+"""The engine's ``mjMAXVAL`` in SI units; it treats larger states as a divergence."""
 _KINDS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "jnt": mujoco.mjtObj.mjOBJ_JOINT,
@@ -19,31 +19,32 @@ _KINDS = {
     "eq": mujoco.mjtObj.mjOBJ_EQUALITY,
     "key": mujoco.mjtObj.mjOBJ_KEY,
 }
-"""Prefixes of the model's arrays, and the elements that own their rows."""
+"""Kinds of the elements that own the rows of a model array, by prefix of the array."""
 _BOUNDED = {
     *("body_mass", "body_inertia", "body_pos", "body_ipos", "geom_pos", "geom_size"),
     *("jnt_pos", "site_pos", "key_qpos"),
 }
-"""Arrays that hold numbers of the file. Derived arrays may be larger, and an unlimited
-range is written as a large number."""
+"""Arrays with numbers from the file, which :data:`LARGEST` bounds. Derived arrays may
+contain larger numbers, and large numbers represent unlimited ranges."""
 _HOLDING = {
     *("jnt_stiffness", "dof_damping", "dof_frictionloss"),
     *("tendon_stiffness", "tendon_damping", "tendon_frictionloss"),
 }
-"""Arrays with which some arms lock a joint, for example by a damping of 1e11."""
+"""Arrays with which some files lock a joint, for example by a damping of 1e11."""
 HOLDING = LARGEST**2
-"""Largest value of the arrays that may lock a joint."""
+"""Largest accepted value in the arrays that may lock a joint, in SI units."""
 
 
 def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
-    """Reject non-finite or absurdly large numbers, and axes without direction.
+    """Reject non-finite or absurdly large numbers, and joint axes without direction.
 
     Args:
         model: The compiled arm.
         where: Start of the message.
 
     Raises:
-        InputError: If there is such a number; names the first element and attribute.
+        InputError: If there is such a number; the message names the first element and
+            attribute.
     """
     for name in ("timestep", "gravity", "wind", "density", "viscosity"):
         _refuse(where, f"option: {name}", np.atleast_1d(getattr(model.opt, name)))

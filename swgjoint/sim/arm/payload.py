@@ -13,7 +13,8 @@ from swgjoint.units import mm
 
 BODY = "payload"
 POINT = 1e-9
-"""Inertia of a point mass over its mass [m²], because the engine needs some."""
+"""Moment of inertia added to every payload, divided by its mass [m²], because the
+engine rejects bodies without inertia."""
 
 
 class LoadedArm(RigidArm):
@@ -35,11 +36,13 @@ class LoadedArm(RigidArm):
             tool_site: Site at which the payload is fixed.
             payload: The payload.
             where: Start of messages about the payload.
-            reading: Which hinges move; None moves every hinge.
+            reading: Hinges that move, and pose of held joints; None moves every hinge.
 
         Raises:
-            InputError: If the arm has no such site.
+            InputError: If the arm has no such site, or already has a body with the name
+                of the payload.
         """
+        # load the arm without the payload first, to check for the site
         self._payload: Payload | None = None
         self._site, self._where = tool_site, where
         super().__init__(reference, tool_site=tool_site, reading=reading)
@@ -61,9 +64,12 @@ class LoadedArm(RigidArm):
     def _add(self, spec: mujoco.MjSpec, payload: Payload) -> None:
         site = spec.site(self._site)
         if spec.body(BODY) is not None:
-            raise InputError(f"{self._where}: payload: the arm has a body {BODY!r}")
+            raise InputError(
+                f"{self._where}: payload: the arm already has a body named {BODY!r};"
+                " accepted: another name for that body"
+            )
         copy = spec.copy()
-        copy.compiler.fusestatic = False  # keeps every body where the spec has it
+        copy.compiler.fusestatic = False  # the site stays on the body of the spec
         placed = copy.compile().site(self._site)
         body = site.parent.add_body(name=BODY, pos=placed.pos, quat=placed.quat)
         body.explicitinertial = True
@@ -80,17 +86,18 @@ def arms_of(
     where: str,
     reading: ArmReading | None = None,
 ) -> tuple[RigidArm, RigidArm]:
-    """The arm of a scene, and the controller's model of it.
+    """The arm of a scene, and the controller's model of the arm.
 
     Args:
         reference: Path or bundled name.
         tool_site: Name of the tool site.
         payload: Payload at the tool site; None without a payload.
         where: Start of messages about the payload.
-        reading: Which hinges move; None moves every hinge.
+        reading: Hinges that move, and pose of held joints; None moves every hinge.
 
     Returns:
-        The arm, and the controller's model: without the payload if it is not known.
+        The arm with its payload, and the controller's model, which is the arm without
+        the payload if the payload is not known.
     """
     if payload is None:
         arm = RigidArm(reference, tool_site=tool_site, reading=reading)

@@ -1,4 +1,4 @@
-"""Choices of a scene for an arm's file: moving hinges, and pose of held joints."""
+"""Choices for reading an arm's file: hinges that move, and pose of held joints."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ class ArmReading:
     angles: Mapping[str, float] = field(default_factory=dict)
     """Angles of held hinges that differ from ``pose`` [rad]."""
     balance_inertia: bool = False
-    """Whether inertias that no rigid body can have are repaired: the mean replaces the
+    """Whether to repair inertias that no rigid body can have: their mean replaces the
     three principal moments."""
 
     def drives(self, hinge: str) -> bool:
-        """Whether a hinge moves."""
+        """Whether a hinge is to have a drive and move."""
         return not self.driven or matches(hinge, self.driven)
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether a joint matches a pattern, with or without its suffix ``_joint``.
+    """Whether a joint name, with or without its suffix ``_joint``, matches a pattern.
 
-    The match is case-sensitive.
+    The comparison is case-sensitive.
 
     Args:
         name: Name of the joint.
@@ -42,6 +42,13 @@ def matches(name: str, patterns: Sequence[str]) -> bool:
 
 
 def patterns_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Patterns in comma-separated strings, e.g. ``["shoulder*,elbow", "wrist_1"]``."""
+    """Split comma-separated strings, such as ``"shoulder*,elbow"``, into patterns.
+
+    Args:
+        texts: Strings with one or several patterns each.
+
+    Returns:
+        All patterns in their order, without duplicates.
+    """
     parts = (part.strip() for text in texts for part in text.split(","))
     return tuple(dict.fromkeys(part for part in parts if part))
