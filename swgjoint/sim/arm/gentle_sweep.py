@@ -18,25 +18,28 @@ from swgjoint.units import deg, mm
 SWEEP = 20.0 * deg
 """Travel of every joint, unless its range or obstacles limit it [rad]."""
 MARGIN = 0.1
-"""Distance of the sweep from both ends of a joint's range, relative to the range. The
-start may be closer to an end."""
+"""Smallest distance of the sweep, and of a start in the reference pose, from both ends
+of a joint's range, relative to the range. Other starts may be closer to an end."""
 START_MARGIN = 0.01
-"""Such a distance for the pose of a keyframe: drives yield, and limits exert force."""
+"""Smallest distance of a keyframe pose from both ends of a joint's range, relative to
+the range. At an end, the limit would exert a force as soon as the drive yields."""
 CLEARANCE = 5.0 * mm
-"""Distance between bodies on a sweep [m], more than the compliance of the drives."""
+"""Smallest distance between bodies during a sweep [m]. It is larger than the
+displacement of the links by the compliance of the drives."""
 DEEPER = 0.1 * mm
 """Accepted increase in penetration of bodies that touch at the start [m]."""
 SPACING = 1.0 * deg
 """Joint angle between two poses at which distances are checked [rad]."""
 BENDS = (45.0 * deg, 30.0 * deg, 60.0 * deg)
-"""Bends of the joints of a stretched arm whose tool must move [rad]."""
+"""Angles to try in turn by which the joints of a stretched arm are bent [rad]."""
 SHARES = (1.0, 0.5, 0.25)
 """Fractions of the sweep to try in turn if obstacles limit it."""
 REFERENCE, MIDDLE, HOME = "reference", "middle", "home"
+"""Names of start poses that need no keyframe."""
 
 
 class StartWarning(UserWarning):
-    """Warns that bodies touch at the start of an arm."""
+    """Warning that bodies touch in the start pose of an arm."""
 
 
 def place_arm(
@@ -44,16 +47,18 @@ def place_arm(
 ) -> tuple[RigidArm, Array]:
     """Read an arm in its start pose.
 
-    The start pose is the first of these poses in which no bodies touch: the first
-    keyframe of the file; the reference position, with joints outside their range at the
-    middle of the range; the middle of all ranges. Hinges without a drive are held
-    there.
+    By default, the start pose is the first of the following poses in which no bodies
+    touch: the first keyframe of the file; the reference position, with joints whose
+    range excludes it at the middle of the range; the middle of all ranges. If bodies
+    touch in all of them, the first one is used with a :class:`StartWarning`. Hinges
+    without a drive are held in the start pose.
 
     Args:
-        reference: Path or name of a bundled arm.
-        reading: Which hinges move; its pose and angles are replaced.
-        pose: Keyframe, ``reference`` or ``middle``. ``home`` is a keyframe of that name
-            or else the first keyframe. None chooses as above.
+        reference: Path of an arm's file, or name of a bundled arm.
+        reading: Hinges that move; its pose and angles are replaced.
+        pose: Name of a keyframe, ``reference`` or ``middle``. ``home`` is the keyframe
+            of that name, or else the first keyframe or the reference position. None
+            chooses the default.
 
     Returns:
         The arm, and its joint angles [rad], shape (n_joints,).
@@ -89,7 +94,7 @@ def _in_pose(
     keyframe: str | None,
     angles: dict[str, float],
 ) -> RigidArm:
-    """The arm, with its held joints in a pose."""
+    """The arm with its held joints in a pose."""
     others = {name: q for name, q in angles.items() if not reading.drives(name)}
     if not others and (keyframe is None or not whole.held):
         return whole if not reading.driven else RigidArm(reference, reading=reading)
@@ -135,16 +140,17 @@ def _poses(
 
 
 def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
-    """Poses near a start in which the arm is bent and no bodies touch.
+    """Poses with bent joints near a start pose in which no bodies touch.
 
-    Successive joints bend in opposite directions, each within its range.
+    Successive joints are bent in opposite directions, each within its range.
 
     Args:
         arm: The arm.
         start: Joint angles at the start [rad]. Shape (n_joints,).
 
     Returns:
-        Joint angles of each pose [rad]. Shapes (n_joints,).
+        Joint angles of each pose [rad], in the order in which to try
+            them. Shapes (n_joints,).
     """
     model = arm.model
     low, high = model.jnt_range.T
@@ -159,14 +165,16 @@ def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
 def gentle_sweep(arm: RigidArm, start: Array | None = None) -> tuple[Array, Array]:
     """Start and end of a collision-free sweep [rad]. Shapes (n_joints,).
 
-    Every joint turns towards its farther limit by :data:`SWEEP` or less. If bodies
-    would come closer than :data:`CLEARANCE`, the joints are treated one by one: each
-    turns in the other direction, or less far, or remains at rest.
+    Every joint turns towards its farther limit by :data:`SWEEP`, or less if its range
+    ends before. If bodies would come closer than :data:`CLEARANCE`, the joints are
+    added one by one. A joint that would cause this turns in the other direction, or
+    less far, or remains at rest.
 
     Args:
         arm: The arm.
-        start: Joint angles at the start [rad], shape (n_joints,). None is the reference
-            position, with joints outside their range at the middle of it.
+        start: Joint angles at the start [rad], shape (n_joints,). None uses the
+            reference position, with joints whose range excludes it at the middle of the
+            range.
 
     Raises:
         InputError: If no joint can turn without a collision.
@@ -205,7 +213,7 @@ def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
     """Bounds of the sweep of all joints [rad]; they always include the start."""
     model = arm.model
     low, high = model.jnt_range.T.copy()
-    # a limit beyond any real angle is none, and differences of such limits overflow
+    # an extremely large limit is no limit, and differences of such limits overflow
     free = ~_limited(arm)
     low[free], high[free] = 0.0, 0.0
     room = MARGIN * (high - low)
@@ -215,20 +223,20 @@ def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
 
 
 def _limited(arm: RigidArm) -> NDArray[np.bool_]:
-    """Whether both ends of each joint's range can be reached. Shape (n_joints,)."""
+    """Whether each joint has a range with realistic ends. Shape (n_joints,)."""
     model = arm.model
     reached = (abs(model.jnt_range) < LARGEST).all(axis=1)
     return np.asarray(model.jnt_limited.astype(bool) & reached)
 
 
 class _Way:
-    """Collision check of straight joint motions from the start of an arm."""
+    """Collision check of straight motions in joint space from the start of an arm."""
 
     def __init__(self, arm: RigidArm, start: Array) -> None:
         self._arm, self._start = arm, start
         self.in_the_way = "because the ranges end there"
-        # bodies that are close at the start may come half as close; those that touch
-        # there must not penetrate much deeper
+        # bodies that are close at the start may halve their distance; bodies that touch
+        # there may penetrate only slightly deeper
         self._allowed = {
             (a, b): 0.5 * depth if depth < 0.0 else depth + DEEPER
             for a, b, depth in arm.contacts(start[None], within=CLEARANCE)

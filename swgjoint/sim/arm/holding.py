@@ -1,4 +1,4 @@
-"""Joints that do not move in a scene: removed in a pose of the arm."""
+"""Removal of joints that do not move in a scene, in a given pose of the arm."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.typing import Array
 
 Pose = tuple[Array, Array]
-"""Position [m] and unit quaternion (w, x, y, z)."""
+"""Position [m] and orientation as a unit quaternion (w, x, y, z)."""
 
 WORLD = "world"
 HINGE = "hinge"
@@ -28,11 +28,12 @@ class Holding:
     """Joints of a file that do not move, with reasons and consequences."""
 
     held: dict[str, str]
-    """Held joints with the reason: their type, or what ties them."""
+    """Held joints, each with the reason: its type, what ties it, or that it has no
+    drive."""
     unfiltered: list[tuple[str, str]]
-    """Pairs of bodies to exclude from contact after these joints are removed."""
+    """Pairs of bodies to exclude from contact once these joints are removed."""
     hung: frozenset[str]
-    """Bodies that a held free joint carries."""
+    """Bodies of a robot whose free joint is held."""
     still: frozenset[str]
     """Bodies that no joint of the file moves."""
 
@@ -40,16 +41,20 @@ class Holding:
 def choose_held(spec: mujoco.MjSpec, reading: ArmReading, path: Path) -> Holding:
     """Find joints that are not hinges, that equalities tie, or that have no drive.
 
-    All equalities are deleted: inactive ones, those that pull a body to a mocap body,
-    which replace a motor, and those whose joints are all held.
+    All equalities are deleted. Inactive ones have no effect, those that pull a body to
+    a mocap body replace a motor, and the joints that the others tie are held.
 
     Args:
         spec: The arm; its equalities are deleted.
-        reading: Which hinges have drives.
+        reading: Hinges that have drives.
         path: File of the arm, for messages.
 
+    Returns:
+        The joints to hold.
+
     Raises:
-        InputError: If no hinge is left to move, or a pattern matches none.
+        InputError: If equalities tie every hinge, if an equality has an unsupported
+            kind, or if a pattern matches no independent hinge.
     """
     held = {
         joint.name: mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower()
@@ -66,7 +71,7 @@ def choose_held(spec: mujoco.MjSpec, reading: ArmReading, path: Path) -> Holding
             if tied is None:
                 raise InputError(
                     f"{path}: equality {name!r} of kind {kind}; accepted: connect,"
-                    " weld, joint, tendon, whose joints are held"
+                    " weld, joint and tendon, whose joints are then held"
                 )
             held |= {
                 joint: f"{HINGE}, tied by {name!r}"
@@ -80,13 +85,13 @@ def choose_held(spec: mujoco.MjSpec, reading: ArmReading, path: Path) -> Holding
     if hinges and not free:
         raise InputError(
             f"{path}: every hinge is tied to another joint: {first}; accepted in a"
-            " scene: a hinge that moves independently"
+            " scene: an arm with a hinge that moves independently"
         )
     for pattern in reading.driven:
         if not any(ArmReading(driven=(pattern,)).drives(name) for name in free):
             raise InputError(
-                f"{path}: joints {pattern!r}: no independent hinge has such a"
-                f" name; accepted: {', '.join(free)}"
+                f"{path}: joints {pattern!r}: no independent hinge matches it;"
+                f" accepted: {', '.join(free)}"
             )
     held |= {name: NOT_CHOSEN for name in free if not reading.drives(name)}
     hung = {
@@ -112,7 +117,10 @@ def hold(
     bones: mujoco.MjModel,
     path: Path,
 ) -> None:
-    """Remove the held joints in their pose, with the tendons and pairs that need them.
+    """Remove the held joints in their pose, and what depends on them.
+
+    Tendons with a held joint are deleted, and so are contact pairs between fixed bodies
+    and a robot whose free joint is held.
 
     Args:
         spec: The arm; changed in place.
@@ -199,7 +207,14 @@ _WIDTH = {
 
 
 def _moved(joint: object, value: Array, *, start: float, body: object) -> Pose:
-    """Displacement of a body by one joint, in the frame of the body."""
+    """Displacement of a body by one joint, in the frame of the body.
+
+    Args:
+        joint: The joint in the compiled model.
+        value: Its coordinates in the pose [rad or m].
+        start: Its first coordinate in the reference position [rad or m].
+        body: The body in the compiled model.
+    """
     own, here = joint, body
     kind = int(own.type[0])  # type: ignore[attr-defined]
     axis, anchor = own.axis, own.pos  # type: ignore[attr-defined]
@@ -232,6 +247,7 @@ def _own_pose(body: mujoco.MjsBody) -> Pose:
 
 
 def _unit(quat: Array) -> Array:
+    """Normalised copy of a quaternion."""
     out = np.array(quat, dtype=float)
     mujoco.mju_normalize4(out)
     return out
@@ -245,6 +261,7 @@ def _after(first: Pose, second: Pose) -> Pose:
 
 
 def _inverse(pose: Pose) -> Pose:
+    """Inverse of a pose."""
     place, turn = np.empty(3), np.empty(4)
     mujoco.mju_negPose(place, turn, *pose)
     return place, turn
@@ -275,7 +292,7 @@ def _tied(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> set[str] | None:
 
 
 def _pulls_to_mocap(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
-    """Whether an equality pulls a body to a mocap body, which a user moves."""
+    """Whether an equality pulls a body to a mocap body, which the user would move."""
     if equality.type not in _ON_BODIES:
         return False
     names = [name for name in (equality.name1, equality.name2) if name]
@@ -291,7 +308,7 @@ def _body(
 
 
 def _between(ends: Iterable[mujoco.MjsBody]) -> set[str]:
-    """Joints between bodies in the tree, or between one body and the world."""
+    """Joints in the tree between bodies, or between one body and the world."""
     chains = [{body.name: body for body in _chain(end)} for end in ends]
     shared = set(chains[0]).intersection(*chains[1:]) if len(chains) > 1 else {WORLD}
     return {
@@ -317,7 +334,7 @@ def _joints_of_tendon(tendon: mujoco.MjsTendon) -> set[str]:
 
 
 def _joints_along(tendon: mujoco.MjsTendon) -> set[str]:
-    """Joints between the sites along a spatial tendon."""
+    """Joints between the bodies whose sites are on a spatial tendon."""
     sites = [w.target for w in tendon.path if w.type == mujoco.mjtWrap.mjWRAP_SITE]
     return _between([site.parent for site in sites]) if sites else set()
 
@@ -327,10 +344,11 @@ def _unfiltered(
 ) -> list[tuple[str, str]]:
     """Pairs of bodies that would touch only because joints are held.
 
-    The engine excludes contact between a body and its parent, counting welded bodies as
-    one, but not if the parent is fixed to the world. Holding a joint fixes bodies to
-    the world. A robot whose free base is held hangs: contact forces between its feet
-    and the floor would depend on the height at which it is held.
+    The engine excludes contact between a body and its parent, where welded bodies count
+    as one, but not if the parent is fixed to the world. Holding a joint can fix bodies
+    to the world and thus enable such contacts. In addition, contact forces between the
+    feet of a robot whose free base is held and the floor would depend on the height at
+    which it is held, so these pairs are included as well.
     """
     before, after = _welds(spec, set()), _welds(spec, set(held))
     shaped = [body.name for body in spec.bodies if _collides(body)]

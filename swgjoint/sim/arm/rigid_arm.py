@@ -25,12 +25,13 @@ class RigidArm:
     Attributes:
         reference: Path or bundled name of the arm, as passed.
         path: File of the arm.
-        reading: Which hinges move, and the pose of held joints.
+        reading: Hinges that move, and pose of held joints.
         model: The compiled arm, see :class:`~swgjoint.sim.arm.file.ArmFile`.
         joints: Names of its joints, in the order of all arrays.
-        held: Joints of the file that do not move, with the reason: their type, or what
-            ties them.
-        keyframes: Named poses of the file: angles of all hinges, held ones included
+        tool: Index of the tool site in the model, -1 without one.
+        held: Joints of the file that do not move, each with the reason: its type, what
+            ties it, or that it has no drive.
+        keyframes: Named poses of the file: angles of all hinges, including held ones
             [rad].
         effort: Torque limits of the joints for which the file states one [N·m].
     """
@@ -47,11 +48,11 @@ class RigidArm:
         Args:
             reference: Path or bundled name.
             tool_site: Site at the tool, or a body whose frame is the tool frame.
-            reading: Which hinges move, and the pose of held joints; None moves every
-                hinge.
+            reading: Hinges that move, and pose of held joints; None moves every hinge.
 
         Raises:
-            InputError: If the file is missing, neither MJCF nor URDF, or has no hinge.
+            InputError: If the file is missing, is neither MJCF nor URDF, has no hinge,
+                or lacks the tool site.
         """
         self.reference = reference
         self.path: Path = find(reference, "arms", ".xml", what="arm")
@@ -79,7 +80,7 @@ class RigidArm:
         return self._spec.copy()
 
     def _mark_tool(self, name: str) -> None:
-        """Add a site to a body that is named as the tool."""
+        """Add a tool site if the name denotes a body instead of a site."""
         spec = self._spec
         if spec.site(name) is not None:
             return
@@ -105,7 +106,7 @@ class RigidArm:
             Joint torques. Shape (n, n_joints).
         """
         model, data, out, touching = self.model, self._data, np.empty_like(position), ""
-        # an attribute lookup takes as long as a copy
+        # look up the arrays once, because an attribute lookup takes as long as a copy
         qpos, qvel, qacc, needed = data.qpos, data.qvel, data.qacc, data.qfrc_inverse
         motion = zip(position, velocity, acceleration, strict=True)
         for k, (q, v, a) in enumerate(motion):
@@ -126,7 +127,11 @@ class RigidArm:
         return out
 
     def gravity(self, position: Array) -> Array:
-        """Joint torques that carry the weight at rest [N·m]. Shapes (n, n_joints)."""
+        """Joint torques that carry the weight at rest [N·m]. Shape (n, n_joints).
+
+        Args:
+            position: Joint angles [rad]. Shape (n, n_joints).
+        """
         zero = np.zeros_like(position)
         return self.torques(position, zero, zero)
 
@@ -140,8 +145,8 @@ class RigidArm:
             within: Distance below which bodies count as touching [m].
 
         Returns:
-            Two bodies and their largest penetration [m], negative for a distance. Pairs
-            that the model excludes from contact are omitted.
+            Names of two bodies and their largest penetration [m], which is negative for
+            a distance. Pairs that the model excludes from contact are omitted.
         """
         model, data = self._probe, self._probe_data
         model.geom_margin[:] = np.maximum(self.model.geom_margin, within)
@@ -165,7 +170,7 @@ class RigidArm:
 
     @cached_property
     def _probe(self) -> mujoco.MjModel:
-        """A copy of the model whose margins may change."""
+        """Copy of the model in which :meth:`contacts` can change the margins."""
         return copy(self.model)
 
     @cached_property
@@ -173,7 +178,11 @@ class RigidArm:
         return mujoco.MjData(self._probe)
 
     def inertia(self, position: Array) -> Array:
-        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
+        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,).
+
+        Args:
+            position: Joint angles [rad]. Shape (n_joints,).
+        """
         data, nv = self._data, self.model.nv
         data.qpos[:], data.qvel[:] = position, 0.0
         mujoco.mj_forward(self.model, data)
@@ -182,7 +191,11 @@ class RigidArm:
         return np.diag(full).copy()
 
     def tool_positions(self, position: Array) -> Array:
-        """Tool position in the world [m]. Shape (n, 3), or (n, 0) without a tool."""
+        """Tool positions in the world [m]. Shape (n, 3), or (n, 0) without a tool.
+
+        Args:
+            position: Joint angles [rad]. Shape (n, n_joints).
+        """
         if self.tool < 0:
             return np.empty((len(position), 0))
         model, data, out = self.model, self._data, np.empty((len(position), 3))
@@ -194,10 +207,14 @@ class RigidArm:
         return out
 
     def body_poses(self, position: Array) -> tuple[Array, Array]:
-        """Positions [m] and quaternions (w, x, y, z) of all bodies in the world frame.
+        """Poses of all bodies in the world frame.
+
+        Args:
+            position: Joint angles [rad]. Shape (n, n_joints).
 
         Returns:
-            Shapes (n, n_bodies, 3) and (n, n_bodies, 4), the world body first.
+            Positions [m], shape (n, n_bodies, 3), and unit quaternions (w, x, y, z),
+            shape (n, n_bodies, 4); the world is the first body.
         """
         model, data, count = self.model, self._data, len(position)
         places = np.empty((count, model.nbody, 3))

@@ -1,4 +1,4 @@
-"""A scene for any arm: a drive in every hinge and a gentle motion."""
+"""Generation of a scene for any arm: a drive in every hinge, and a slow motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 ROTOR_INERTIA = 1e-4
-"""Assumed for drives outside the catalogue, as in scene ``bench`` [kg·m²]."""
+"""Inertia of rotor and wave generator that is assumed for drives outside the catalogue,
+as in the scene ``bench`` [kg·m²]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +42,10 @@ class ArmScene:
     """A generated scene for an arm."""
 
     scene: Scene
+    """The scene."""
     drive_choice: dict[str, DriveChoice]
-    """Drives selected by rule; empty if one drive was given for all joints."""
+    """Drives that were selected by rule, by joint; without joints whose drive the user
+    chose."""
 
 
 def is_arm(reference: str) -> bool:
@@ -66,16 +69,22 @@ def scene_of_arm(
     balance_inertia: bool = False,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
 ) -> Scene:
-    """The scene of :func:`arm_scene`, without its drive selection.
+    """Generate a scene for an arm, see :func:`arm_scene`.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
-        drive: Drive of all joints.
-        joints: Names or patterns of the hinges that move.
-        pose: Start pose.
-        motion: Kind of the trajectory.
-        balance_inertia: Whether inertias that no rigid body can have are repaired.
+        drive: Drive of all joints; None selects one for each joint.
+        joints: Names or patterns of the hinges that move; all if empty.
+        pose: Start pose; None chooses one without contact.
+        motion: Kind of the trajectory; None uses a sweep.
+        balance_inertia: Whether to repair inertias that no rigid body can have.
         overrides: Changes of the scene.
+
+    Returns:
+        The scene, without the reasons for the selected drives.
+
+    Raises:
+        InputError: If the arm cannot be used.
     """
     return arm_scene(
         reference,
@@ -98,26 +107,31 @@ def arm_scene(
     balance_inertia: bool = False,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
 ) -> ArmScene:
-    """Generate a scene in which the chosen hinges have drives and move gently.
+    """Generate a scene in which the chosen hinges have drives and move slowly.
 
     Without ``drive``, :func:`swgjoint.sim.arm.drive_choice.choose_drives` selects a
-    drive for each joint. This rule is a starting point, not the choice of the arm's
-    manufacturer. The rotor inertia is twice that of the wave generator of the size: a
-    motor of the same inertia is assumed.
+    drive for each joint. This rule is a starting point; the manufacturer of the arm may
+    have chosen other drives. The rotor inertia is twice that of the wave generator of
+    the drive's size, because a motor of equal inertia is assumed.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
         drive: Drive of all joints: design, map or catalogue name.
-        joints: Names or patterns of the hinges that move, each string one or several
-            separated by commas; all if empty. The others are held in the start pose.
+        joints: Names or patterns of the hinges that move. A string may contain several,
+            separated by commas. If empty, all hinges move. The others are held in the
+            start pose.
         pose: Start pose, see :func:`swgjoint.sim.arm.gentle_sweep.place_arm`.
-        motion: Kind of the trajectory. None uses ``trajectory.kind`` of the overrides,
-            otherwise ``sweep``. If a motion of the tool is out of reach from the start,
-            the arm starts with bent joints, unless a start is given.
-        balance_inertia: Whether inertias that no rigid body can have are repaired.
+        motion: Kind of the trajectory; ``trajectory.kind`` of the overrides takes
+            precedence, and None uses ``sweep``. If the tool cannot follow its motion
+            from the start pose, the arm starts with bent joints, unless the user gave a
+            start.
+        balance_inertia: Whether to repair inertias that no rigid body can have.
         overrides: Changes of the scene, as for :meth:`Scene.load_file`. Unless they
-            state ``simulation.step_s``, the step resolves the strongest order of every
-            drive, see :mod:`swgjoint.sim.step_choice`.
+            state ``simulation.step_s``, the step resolves the torque ripple of every
+            drive if possible, see :mod:`swgjoint.sim.step_choice`.
+
+    Returns:
+        The scene, and the drives that were selected by rule.
 
     Raises:
         InputError: If the arm cannot be used.
@@ -140,7 +154,7 @@ def arm_scene(
         "arm": reference,
         "tool_site": _tool(arm),
         "defaults": {"level": "full"},
-        # the integral compensates drive friction, which would otherwise cause a lag
+        # the integral term prevents a lag due to drive friction
         "controller": {"kind": "pid", "feedforward": "gravity_inertia"},
     }
     if reading.driven:
@@ -155,7 +169,8 @@ def arm_scene(
     except InputError:
         own = pose or any(key.startswith("trajectory.start_deg") for key in changes)
         bent = [] if own or not by_tool else bent_starts(arm, start)
-        for other in bent:  # a stretched arm cannot move its tool in every direction
+        # a stretched arm cannot move its tool in every direction: try bent starts
+        for other in bent:
             with suppress(InputError):
                 scene, rigid = _with_motion(data, kind, arm, other, end, held, changes)
                 break
@@ -194,12 +209,24 @@ def _with_motion(
     held: dict[str, float],
     changes: Mapping[str, Any],
 ) -> tuple[Scene, RigidArm]:
-    """Add a motion to the data: the first of a kind without reach limit or collision.
+    """Add the first motion of a kind that the arm can follow without a collision.
 
-    If all candidates collide, the first reachable one is used.
+    If all candidates collide, the first one that the arm can follow is used.
+
+    Args:
+        data: Tables of the scene; changed in place.
+        kind: Kind of the trajectory.
+        arm: The arm.
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        end: Joint angles at the end of a sweep [rad]. Shape (n_joints,).
+        held: Angles of held hinges by name [deg].
+        changes: The user's changes of the scene.
 
     Returns:
-        The scene, still without drives, and its arm with its payload.
+        The scene, which has no drives yet, and its arm with its payload.
+
+    Raises:
+        InputError: If the arm can follow none of the candidates.
     """
     where = f"scene of {data['arm']}"
     tables, duration = tables_of(kind, arm, start, end)
@@ -233,7 +260,7 @@ def _with_motion(
 
 
 def _read_anew(scene: Scene, arm: RigidArm) -> bool:
-    """Whether the user's changes lead to another arm."""
+    """Whether the user's changes require that the arm is read again."""
     there, here = scene.reading, arm.reading
     return scene.arm != arm.reference or (
         there.driven,
@@ -255,7 +282,7 @@ def rigid_arm_of(scene: Scene) -> RigidArm:
 
 
 def _collides(arm: RigidArm, path: Array, start: Array) -> bool:
-    """Whether bodies touch on a motion that do not touch at the start."""
+    """Whether bodies that are apart at the start touch during a motion."""
     before = {pair[:2] for pair in arm.contacts(start[None])}
     few = path[:: max(1, len(path) // 100)]
     return any(pair[:2] not in before for pair in arm.contacts(few))
@@ -270,7 +297,7 @@ def _as_mapping(
 
 
 def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
-    """The start with the user's angles; the scene itself reports wrong ones."""
+    """Start angles with those that the user stated [rad]; the scene reports faults."""
     start = start.copy()
     for key, value in changes.items():
         table, _, name = key.rpartition(".")
@@ -284,14 +311,14 @@ def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
 
 
 def _say_once(recorded: list[warnings.WarningMessage]) -> None:
-    """Repeat warnings about the start; the run itself repeats those about the file."""
+    """Issue recorded warnings about the start; the run repeats those about the file."""
     for one in recorded:
         if issubclass(one.category, StartWarning):
             warnings.warn(one.message, stacklevel=3)
 
 
 def _name(path: Path) -> str:
-    """Name of a scene: that of the arm's file, or of the folder of a ``scene`` file."""
+    """Name of the scene: that of the arm's file, or of its folder for ``scene.xml``."""
     folder = path.resolve().parent.name
     return folder if path.stem.lower() == "scene" and folder else path.stem
 
@@ -302,7 +329,7 @@ def _rotor(drive: str) -> float:
 
 
 def _tool(arm: RigidArm) -> str:
-    """The site ``tool``, or else the last body of the longest chain."""
+    """Name of the tool site: ``tool``, or else the last body of the longest chain."""
     if arm.tool >= 0:
         return "tool"
     model = arm.model
