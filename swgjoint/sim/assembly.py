@@ -263,7 +263,7 @@ def _checked_sections(
     check_motion(scene, {section.level for section in sections})
     if scene.sensors and scene.sensors.torque and not external:
         raise InputError(
-            f"{scene.where}: sensors.torque: unused; accepted: with an external"
+            f"{scene.where}: sensors.torque: not used; accepted: with an external"
             " controller, run_scene(..., controller=...)"
         )
     return sections

@@ -67,7 +67,8 @@ def site_of_force(scene: Scene, arm: RigidArm) -> str:
     if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
         raise InputError(
             f"{scene.where}: disturbance: tool_force on arm {scene.arm!r}, which has no"
-            " site for the tool; needed: tool_site"
+            f" site {scene.tool_site!r}; accepted: the name of a site or body in"
+            " tool_site"
         )
     return scene.tool_site
 

@@ -48,8 +48,8 @@ class LoadedArm(RigidArm):
         super().__init__(reference, tool_site=tool_site, reading=reading)
         if self.tool < 0:
             raise InputError(
-                f"{where}: payload: arm {reference!r} has no site for the tool; needed:"
-                " tool_site"
+                f"{where}: payload: arm {reference!r} has no site {tool_site!r};"
+                " accepted: the name of a site or body in tool_site"
             )
         self._payload = payload
         super().__init__(reference, tool_site=tool_site, reading=reading)

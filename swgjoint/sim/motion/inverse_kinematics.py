@@ -59,8 +59,8 @@ class ToolKinematics:
         """
         if arm.tool < 0:
             raise InputError(
-                f"{where}: arm {arm.path.stem!r} has no site for the tool; needed for"
-                " this trajectory: tool_site"
+                f"{where}: arm {arm.path.stem!r} has no site for the tool, which this"
+                " trajectory needs; accepted: the name of a site or body in tool_site"
             )
         self.arm, self.where = arm, where
         self.rows = 6 if hold_orientation else 3

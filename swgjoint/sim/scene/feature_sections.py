@@ -19,17 +19,17 @@ class Sensor(Section):
     """An angle sensor that the controller reads."""
 
     counts_per_turn: Annotated[int, Field(ge=4, le=2**32)] | None = None
-    """Resolution of the reading; if omitted, the angle is not quantised. With a
-    resolution, the motor speed is computed as the change of the reading over a control
-    period, divided by that period."""
+    """Resolution of the reading; if omitted, the angle is not quantised. If the motor
+    encoder has a resolution, the motor speed is the change of its reading over a
+    control period, divided by that period."""
     delay_s: Seconds = 0.0
     """Age of a reading when the controller uses it, a multiple of ``step_s``. The
     controller knows this age and compares a reading with the command at the instant at
     which it was taken."""
     noise_arcsec: Annotated[float, Field(ge=0, le=1e5)] = 0.0
     """Standard deviation of the normally distributed noise of every reading, before
-    quantisation. With noise, the motor speed is computed from readings in the same way
-    as with a resolution."""
+    quantisation. If the motor encoder has noise, the motor speed is computed from its
+    readings in the same way."""
 
 
 class TorqueSensor(Section):
@@ -80,7 +80,7 @@ class Payload(Section):
     def _is_a_body(self) -> Self:
         if math.hypot(*self.centre_mm) > 10_000.0:
             raise Fault(
-                ("centre_mm", f"{list(self.centre_mm)} mm; accepted: within 10000 mm")
+                ("centre_mm", f"{list(self.centre_mm)} mm; accepted: up to 10000 mm")
             )
         a, b, c = sorted(self.inertia_kgm2)
         if a < 0.0 or c > 1e6 or a + b < c * (1.0 - 1e-9):

@@ -112,7 +112,7 @@ class Scene(Section):
         run = round(duration / step) * step
         if run <= needed + 1e-9:
             rounded = (
-                "" if abs(run - duration) < 1e-9 else f", {run:g} s in whole steps"
+                "" if abs(run - duration) < 1e-9 else f", in whole steps {run:g} s"
             )
             faults.append(
                 (
@@ -138,7 +138,7 @@ class Scene(Section):
             faults.append(
                 (
                     "sensors.link",
-                    "unused; accepted: with controller.feedback = 'link'",
+                    "not used; accepted: with controller.feedback = 'link'",
                 )
             )
         faults += [

@@ -90,21 +90,21 @@ class ControllerSection(Section):
             faults.append(
                 (
                     "stiffness_Nm_rad",
-                    "accepted: stiffness_Nm_rad with damping_Nms_rad, or"
-                    " natural_frequency_Hz with damping_ratio, not both",
+                    "expected either stiffness_Nm_rad with damping_Nms_rad, or"
+                    " natural_frequency_Hz with damping_ratio",
                 )
             )
         if self.kind == "computed_torque" and by_gain != (None, None):
             faults.append(
                 (
                     "stiffness_Nm_rad",
-                    "with computed_torque; accepted: natural_frequency_Hz with"
+                    "not used by computed_torque; accepted: natural_frequency_Hz with"
                     " damping_ratio",
                 )
             )
         for key in ("integral_time_s", "integral_limit_Nm"):
             if self.kind != "pid" and getattr(self, key) is not None:
-                faults.append((key, f"with {self.kind}; accepted: with pid"))
+                faults.append((key, f"not used by {self.kind}; accepted: kind pid"))
         if faults:
             raise Fault(*faults)
         return self
@@ -122,7 +122,7 @@ class LoadSection(Section):
     @model_validator(mode="after")
     def _one_value(self) -> Self:
         if (self.torque_Nm is None) == (self.rated_fraction is None):
-            raise Fault(("torque_Nm", "accepted: either torque_Nm or rated_fraction"))
+            raise Fault(("torque_Nm", "expected either torque_Nm or rated_fraction"))
         return self
 
 

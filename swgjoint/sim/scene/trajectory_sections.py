@@ -217,7 +217,7 @@ class LineSection(ToolMotion):
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
         if not any(self.displacement_mm):
-            raise Fault(("displacement_mm", "[0, 0, 0] mm; accepted: a direction"))
+            raise Fault(("displacement_mm", "[0, 0, 0] mm; accepted: not zero"))
         return self
 
 
