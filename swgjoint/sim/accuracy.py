@@ -258,6 +258,7 @@ def common_samples(run: Run, other: Run) -> tuple[slice, slice]:
 
 
 def _ripple_error(run: Run, reference: Run) -> float:
+    """Largest ``ripple_spectrum`` error of all joints [%], see :func:`errors`."""
     worst = 0.0
     for j, transmission in enumerate(reference.assembly.transmissions):
         lines = _lines(torque_ripple(reference, j))

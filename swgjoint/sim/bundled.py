@@ -42,6 +42,7 @@ def bundled_rows(kind: str) -> list[dict[str, Any]]:
 
 
 def _drives() -> list[dict[str, Any]]:
+    """Rows of the catalogue drives."""
     from swgjoint.gear.catalogue import named_rows
     from swgjoint.gear.catalogue_stated import stated_figures, stiffness_of
 
@@ -64,6 +65,7 @@ def _drives() -> list[dict[str, Any]]:
 
 
 def _design(name: str, _: str) -> dict[str, Any]:
+    """Row of one design."""
     from swgjoint.gear.catalogue import ratings_of
     from swgjoint.gear.design.design import Design
     from swgjoint.units import mm
@@ -86,6 +88,7 @@ def _design(name: str, _: str) -> dict[str, Any]:
 
 
 def _arm(name: str, _: str) -> dict[str, Any]:
+    """Row of one arm."""
     import numpy as np
 
     from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -104,6 +107,7 @@ def _arm(name: str, _: str) -> dict[str, Any]:
 
 
 def _scene(name: str, _: str) -> dict[str, Any]:
+    """Row of one scene."""
     from swgjoint.sim.scene.scene import Scene
 
     scene = Scene.load_file(models_path() / "scenes" / f"{name}.toml")
@@ -120,5 +124,6 @@ def _scene(name: str, _: str) -> dict[str, Any]:
 
 
 def _described(name: str, folder: str) -> dict[str, Any]:
+    """Row of an item whose file has a description."""
     data = read_toml(models_path() / folder / f"{name}.toml", what=folder)
     return {"name": name, "description": data.get("description", "")}

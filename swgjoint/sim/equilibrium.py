@@ -297,6 +297,7 @@ def joint_equilibrium(
 
 
 def _message(transmission: Transmission, torque: float, left: float) -> str:
+    """Message about a drive without equilibrium at an output torque [N·m]."""
     return (
         f"joint {transmission.joint!r}: no equilibrium with {torque:.4g} N·m at the"
         f" output (residual {left:.2g} N·m); start at another pose or lower the load"

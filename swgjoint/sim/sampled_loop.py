@@ -89,6 +89,7 @@ class Readings:
         )
 
     def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
+        """Noisy and quantised reading of an angle that is used at sample k."""
         noisy = self._noisy(
             angle[self.sample_of(sensor, k)], sensor.noise_arcsec * arcsec
         )
@@ -98,6 +99,7 @@ class Readings:
         return np.asarray(np.floor(noisy / count) * count)
 
     def _noisy(self, exact: Array, deviation: float) -> Array:
+        """Values with normally distributed noise of a standard deviation."""
         if not deviation:
             return exact
         return exact + deviation * self._noise.standard_normal(exact.shape)

@@ -62,6 +62,7 @@ class LoadedArm(RigidArm):
         return spec
 
     def _add(self, spec: mujoco.MjSpec, payload: Payload) -> None:
+        """Add the payload to the tool site of an editable model."""
         site = spec.site(self._site)
         if spec.body(BODY) is not None:
             raise InputError(

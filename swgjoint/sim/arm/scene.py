@@ -291,6 +291,7 @@ def _collides(arm: RigidArm, path: Array, start: Array) -> bool:
 def _as_mapping(
     overrides: Mapping[str, Any] | Iterable[str] | None,
 ) -> dict[str, Any]:
+    """Overrides as a mapping from dotted keys to values."""
     if isinstance(overrides, Mapping):
         return dict(overrides)
     return dict(parse_override(text) for text in overrides or ())

@@ -107,6 +107,7 @@ def _set_keys(section: Section) -> dict[str, Any]:
 
 
 def _joint(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
+    """Contents of one joint in the compiled model."""
     attached = transmission.attached
     return {
         "level": attached.level,
@@ -153,7 +154,7 @@ def _modes(
 ) -> tuple[StepMode | None, StepMode | None]:
     """Torsional vibration in discrete time about zero and about rated torque.
 
-    Both are None for integrators other than ``discrete``.
+    Both are None for integrators other than ``discrete`` and joints without a rotor.
     """
     if assembly.scene.simulation.integrator != "discrete":
         return None, None

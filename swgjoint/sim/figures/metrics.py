@@ -40,7 +40,9 @@ NOISE = 1e-6
 """Amplitude, relative to rated torque or to 1 arcmin, below which lines are round-off.
 """
 RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
+"""Definition of the torque ripple in reports."""
 NOT_STEADY = "no speed is constant, so it includes the dynamics of the motion"
+"""Remark on the torque ripple of a motion without a constant speed."""
 
 
 def run_metrics(run: Run) -> dict[str, Any]:
@@ -354,6 +356,7 @@ def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
 def _lines(
     angle: Array, signal: Array, highest: float | None, *, floor: float
 ) -> tuple[OrderLine, ...]:
+    """Strongest lines of a signal; none for a joint without a constant speed."""
     if highest is None:
         return ()
     return strongest_lines(angle, signal, highest=highest, floor=floor)

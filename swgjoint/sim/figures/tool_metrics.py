@@ -169,6 +169,7 @@ def joint_settling(run: Run, j: int) -> dict[str, Any]:
 
 
 def _settling(run: Run, off: Array, band: float) -> dict[str, Any]:
+    """``settling_s`` of a signal about its final value, or the reason for None."""
     arrival = run.assembly.trajectory.arrival
     if arrival is None:
         return {"settling_s": None, "missing": {"settling_s": "no rest at the end"}}

@@ -141,6 +141,7 @@ def _tool_motion(
     kinematics: ToolKinematics,
     start: Array,
 ) -> Trajectory:
+    """Commanded motion of the tool on a time grid."""
     if isinstance(section, LineSection):
         return tool_motions.line(
             time,

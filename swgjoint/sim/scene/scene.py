@@ -106,6 +106,7 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _times_fit(self) -> Self:
+        """Check durations, periods and frequencies against the time step."""
         duration, step = self.simulation.duration_s, self.simulation.step_s
         needed = self.trajectory.shortest_s
         faults = []
@@ -289,6 +290,7 @@ class Scene(Section):
         return self._with_all(kinematic_error_arcmin=arcmin)
 
     def _with_all(self, **values: Any) -> Self:
+        """A copy in which all joints have these settings."""
         defaults = self.defaults.model_copy(update=values)
         joints = {
             name: joint.model_copy(update={key: None for key in values})
