@@ -299,7 +299,7 @@ def _fittings(
             friction=section.friction is not False,
             rotor=section.rotor or "gyroscopic",
             variable=variable,
-            # None for a joint at rest, of which every step resolves all orders
+            # None for a joint at rest, because any step resolves all its orders
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
     return fittings

@@ -20,7 +20,7 @@ VIEWER = 0.15e9
 
 
 def required_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> float:
-    """Estimated memory of a run, in addition to that of the process before it [B].
+    """Estimated memory that a run needs in addition to the memory in use before it [B].
 
     Args:
         scene: The scene, which states duration and step.

@@ -123,7 +123,10 @@ def prepare_scene(
         )
     elif known_drives or known_arm is not None:
         argument = "known_drives" if known_drives else "known_arm"
-        raise InputError(f"{argument} without a controller; accepted: with controller")
+        raise InputError(
+            f"{argument} is used by an external controller only; accepted:"
+            " together with controller"
+        )
     return assembly, loop
 
 

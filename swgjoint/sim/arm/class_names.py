@@ -37,8 +37,8 @@ def check_class_names(path: Path) -> None:
         for quoted in _ATTRIBUTE.findall(text):
             if "%" in html.unescape(quoted):
                 raise InputError(
-                    f"{file}: class {html.unescape(quoted)[:60]}; accepted: names"
-                    " without a percent sign"
+                    f"{file}: class name {html.unescape(quoted)[:60]}; accepted:"
+                    " names without a percent sign"
                 )
         included = (html.unescape(quoted[1:-1]) for quoted in _INCLUDE.findall(text))
         waiting += [path.parent / name for name in included]

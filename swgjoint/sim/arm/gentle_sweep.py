@@ -79,8 +79,8 @@ def place_arm(
     names = ", ".join(name for name, _, _ in tried)
     warnings.warn(
         f"{arm.path}: bodies {first!r} and {second!r} touch at the start,"
-        f" {depth / mm:.2g} mm deep (tried: {names}); another pose: --pose with one of"
-        f" {', '.join([*whole.keyframes, REFERENCE, MIDDLE])}",
+        f" {depth / mm:.2g} mm deep (tried: {names}); for another pose: --pose with one"
+        f" of {', '.join([*whole.keyframes, REFERENCE, MIDDLE])}",
         StartWarning,
         stacklevel=2,
     )

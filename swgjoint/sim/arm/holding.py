@@ -136,8 +136,8 @@ def hold(
     for name in set(reading.angles) & set(held):
         if not held[name].startswith(HINGE):
             raise InputError(
-                f"{path}: an angle for joint {name!r}, a {held[name]} joint held in"
-                f" the {reading.pose or 'reference'} pose; accepted: hinges"
+                f"{path}: an angle for joint {name!r}, a {held[name]} joint that is"
+                f" held in the {reading.pose or 'reference'} pose; accepted: hinges"
             )
     for tendon in list(spec.tendons):
         if _joints_of_tendon(tendon) & set(held):

@@ -50,7 +50,7 @@ def contents(assembly: Assembly) -> dict[str, Any]:
 
 
 def _features(assembly: Assembly) -> dict[str, Any]:
-    """Controller, and those of motor limits, payload, sensors, disturbances in use."""
+    """Controller, and any motor limits, payload, sensors and disturbances."""
     scene, loops = assembly.scene, assembly.loops
     step = scene.simulation.step_s
     external = assembly.controlled_by

@@ -243,7 +243,8 @@ def _last_period(
     state = np.empty(mujoco.mj_stateSize(model, full))
     mujoco.mj_getState(model, data, state, full)
     joints = [model.joint(name) for name in (rotor, JOINT)]
-    q = [1 + int(joint.qposadr[0]) for joint in joints]  # after the time
+    # the state vector begins with the time
+    q = [1 + int(joint.qposadr[0]) for joint in joints]
     v = [1 + model.nq + int(joint.dofadr[0]) for joint in joints]
     for _ in range(periods):
         states, _ = mujoco.rollout.rollout(model, data, state[None], control[None])

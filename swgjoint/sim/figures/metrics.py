@@ -187,7 +187,7 @@ def use_of_motor(run: Run, j: int) -> dict[str, Any]:
 
 
 def torque_deviation(run: Run, j: int, part: slice = slice(None)) -> Array:
-    """Output torque minus that of the rigid arm at the same instant [N·m]. Shape (n,).
+    """Output torque minus the torque that the rigid arm needs [N·m]. Shape (n,).
 
     Args:
         run: The run.
@@ -333,7 +333,7 @@ def signal_statistics(values: Array) -> dict[str, float]:
 
 
 def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
-    """Distance between the tool and that of the rigid arm on the same motion [mm].
+    """Distance between the tools of a run and of the rigid arm on the same motion [mm].
 
     Args:
         run: The run.

@@ -105,7 +105,7 @@ def crossings(run: Run) -> tuple[Array, Array] | None:
     path = run.assembly.trajectory
     tool = CubicSpline(run.time, run.tool_position)
     command = CubicSpline(run.time, run.tool_reference)
-    # stay away from the ends of the pass, so that a lag does not lead beyond them
+    # leave out the ends of a pass, where a lag would move the crossing out of the pass
     offsets = np.linspace(0.02, 0.98, PATH_POINTS) * path.pass_time
     attained = []
     for begin in path.passes:

@@ -194,6 +194,6 @@ def check_motion(scene: Scene, levels: set[str | None]) -> None:
     if scene.trajectory.kind == "step" and "kinematic" in levels:
         raise InputError(
             f"{scene.where}: trajectory.kind = 'step' at level kinematic, whose"
-            " error is prescribed on a continuous commanded motion; accepted: rigid,"
-            " linear, native, full"
+            " error is prescribed on a continuous commanded motion; accepted: level"
+            " rigid, linear, native or full"
         )

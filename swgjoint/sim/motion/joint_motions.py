@@ -75,7 +75,9 @@ def trapezoid(
     """
     way = float(np.abs(end - start).max())
     if way == 0.0:
-        raise InputError(f"{where}.end_deg: equal to start_deg; needed: a difference")
+        raise InputError(
+            f"{where}.end_deg: equal to start_deg; accepted: another angle"
+        )
     speed, acceleration = max_speed / way, max_acceleration / way
     ramp = min(speed / acceleration, acceleration**-0.5)
     speed = acceleration * ramp

@@ -184,7 +184,7 @@ def iso9283(
         way = angles[number] - angles[last]
         first = int(np.searchsorted(time, begin))
         x = np.clip((time[first:] - begin) / move, 0.0, 1.0)
-        x[x > 1.0 - 1e-9] = 1.0  # round-off of the time is not a motion
+        x[x > 1.0 - 1e-9] = 1.0  # remove round-off of the time at the end of a move
         x = x[: int(np.searchsorted(x, 1.0)) + 1]
         # the position follows the smooth step itself, not its integral
         _, value, slope = smooth_ramp(x)
