@@ -190,7 +190,7 @@ def test_a_rotor_that_outruns_its_command_is_named(bench):
     fast = bench(drive, controller=keys, load__joint__torque_Nm=20.0).metrics()
     assert fast["joints"]["joint"]["phase_step_rad"] > 0.75
     assert any(
-        names(line, "joint", "rotor", "0.5 rad", "simulation.step_s")
+        names(line, "joint", "rotor", "0.75 rad", "simulation.step_s")
         for line in fast["reasons"]
     )
 
