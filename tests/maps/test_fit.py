@@ -25,6 +25,16 @@ def test_known_potential_comes_back():
     assert drive.coefficients(x, 1)[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.parametrize("keep", [0.0, 0.01])
+def test_stiffness_range_covers_a_pitch(keep):
+    """Least half a pitch after its largest, however many harmonics are kept."""
+    drive = fit_map(samples_of(), keep=keep)
+    low, high = drive.info["stiffness_range_Nm_rad"]
+    largest = np.abs(drive.torsion_knots[[0, -1]]).max()
+    assert low == pytest.approx(2e4 * (1.0 - 0.1), rel=0.01)
+    assert high == pytest.approx(2e4 * (1 + 24e4 * largest**2) * (1 + 0.1), rel=0.02)
+
+
 def test_integration_constant_is_the_cogging_energy():
     """Without load the input feels the derivative of the strain energy."""
     drive = fit_map(samples_of(error=0.0, cogging=2e-6, swing=0.0), keep=1e-6)

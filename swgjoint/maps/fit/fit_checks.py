@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.samples import FullSolves, MapSamples
+
+PER_CYCLE = 24
+"""Angles in a cycle of the fastest harmonic at which the stiffness is sampled."""
+MOST_ANGLES = 4000
+"""Largest number of these angles."""
+ROUND_OFF = 1e-9
+"""Cycles per input turn, divided by those of the fastest harmonic, below which a
+harmonic counts as constant [-]."""
 
 
 def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
@@ -85,12 +95,17 @@ def against_solves(
 def stiffness_range(drive: DriveMap) -> list[float]:
     """Smallest and largest sampled stiffness inside the knots [N·m/rad].
 
-    The input angles cover one cycle of the largest order of alpha or beta. An
-    equilibrium where the stiffness is not positive would be unstable.
+    Input and output turn in the ideal ratio over one cycle of the slowest harmonic,
+    :data:`PER_CYCLE` steps in each of the fastest, or :data:`MOST_ANGLES` steps if
+    that is fewer. An equilibrium where the stiffness is not positive would be unstable.
     """
     knots = drive.torsion_knots
     x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
-    theta = np.linspace(0.0, 2.0 * np.pi / max(1, drive.orders.max()), 97)
+    cycles = np.abs(drive.angle_orders @ np.array([1.0, 1.0 / drive.ratio]))
+    fastest = max(1.0, float(cycles.max()))
+    slowest = cycles[cycles > ROUND_OFF * fastest].min(initial=fastest)
+    steps = ceil(PER_CYCLE * fastest / slowest)
+    theta = np.linspace(0.0, 2.0 * np.pi / slowest, min(steps, MOST_ANGLES) + 1)
     stiffness = drive.stiffness(x, theta, theta / drive.ratio)
     return [float(stiffness.min()), float(stiffness.max())]
 
