@@ -23,7 +23,7 @@ class Bearing(Section):
     ball_diameter_mm: Millimetre
     """Diameter of a ball."""
     race_thickness_mm: Millimetre
-    """Radial thickness of the outer race, including the depth of its groove."""
+    """Radial thickness of the outer race, from its outer surface to the raceway."""
     clearance_um: Micrometre = 0.0
     """Radial internal clearance as in catalogues, a difference of diameters."""
     race_width_mm: Millimetre | None = None
