@@ -21,15 +21,17 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidContinuation(Follower[SolidState]):
-    """Follows equilibria of the 3D model.
+    """Follows equilibria of the 3D model over torque and input angle.
 
-    It corresponds to :class:`swgjoint.fe.plane.continuation.Continuation` in 2D; the
-    rotation of the flexspline is that of the diaphragm's bore.
+    It is the 3D counterpart of :class:`swgjoint.fe.plane.continuation.Continuation`.
+    The rotation of the flexspline is that of the bore of its diaphragm.
     """
 
     model: SolidSectorModel
     ratio: float
+    """Signed gear ratio i [-]."""
     layout: Layout = "circular_spline_fixed"
+    """Which of the three members is fixed."""
     solver: SolidSolver = field(default_factory=SolidSolver)
 
     @property
@@ -63,10 +65,10 @@ class SolidContinuation(Follower[SolidState]):
         )
 
     def deflect(self, angle: float = 0.0) -> SolidState:
-        """Flexspline deflected by the wave generator, without tooth contact.
+        """Equilibrium of the flexspline on the wave generator, without tooth contact.
 
         Args:
-            angle: Input angle [rad]; the members are at the ideal ratio.
+            angle: Input angle [rad]; all members are at the angles of the ideal ratio.
         """
         alpha, rotation, circular_spline_rotation = self._ideal(angle)
         start = self.model.initial_guess(alpha, rotation)
@@ -79,7 +81,7 @@ class SolidContinuation(Follower[SolidState]):
 
         Args:
             start: State from which the search starts, with its input at ``angle``.
-            torque: Output torque [N·m].
+            torque: Torque T of the output on its load [N·m].
             angle: Input angle [rad].
         """
         if not self.circular_spline_is_output:
@@ -95,7 +97,9 @@ class SolidContinuation(Follower[SolidState]):
         return fixed
 
     def rotate_output(self, state: SolidState, output: float) -> SolidState:
-        """Predictor that rotates the output at a fixed input and a fixed wave field.
+        """Predict a state with a rotated output.
+
+        The input does not move, and the displacement field stays on the wave generator.
 
         Args:
             state: Equilibrium from which the prediction starts.
@@ -107,9 +111,10 @@ class SolidContinuation(Follower[SolidState]):
         return self._moved(state, alpha, output, state.circular_spline_rotation)
 
     def predict(self, state: SolidState, angle: float) -> SolidState:
-        """Predictor that moves the displacement field with the wave generator.
+        """Predict the state at another input angle.
 
-        The members rotate at the ideal ratio.
+        The displacement field moves with the wave generator, and the members rotate at
+        the ideal ratio.
 
         Args:
             state: Equilibrium from which the prediction starts.
@@ -127,7 +132,7 @@ class SolidContinuation(Follower[SolidState]):
         )
 
     def influence(self, state: SolidState) -> Influence:
-        """Influence of the gap of every tooth on the output at an equilibrium."""
+        """Influence of every tooth gap on the output, linearised at an equilibrium."""
         return influence(
             self.model, state, circular_spline_is_output=self.circular_spline_is_output
         )
@@ -135,12 +140,13 @@ class SolidContinuation(Follower[SolidState]):
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
     ) -> SolidContinuation:
-        """The same drive with errors of its teeth and of its axis.
+        """The same drive with manufacturing errors of its teeth and a tilted axis.
 
         Args:
             flexspline: Shifts of the flexspline's teeth in their frames (N, 2) [m].
-            circular_spline: Shifts of the circular spline's teeth (N_c, 2) [m].
-            tilt: Slope of the circular spline's axis (2,) [rad].
+            circular_spline: Shifts of the circular spline's teeth in their frames
+                (N_c, 2) [m].
+            tilt: Slope of the circular spline's axis in x and y (2,) [rad].
         """
         teeth = replace(
             self.model.teeth,
@@ -151,7 +157,7 @@ class SolidContinuation(Follower[SolidState]):
         return replace(self, model=replace(self.model, teeth=teeth))
 
     def _ideal(self, theta: float) -> tuple[float, float, float]:
-        """Angles of wave generator, flexspline and circular spline."""
+        """Ideal angles of wave generator, flexspline and circular spline [rad]."""
         return member_angles(self.layout, theta, theta / self.ratio)
 
     def _moved(

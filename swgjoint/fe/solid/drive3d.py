@@ -1,4 +1,4 @@
-"""The 3D model of a design."""
+"""Construction of the 3D model from a design, and checks that the model applies."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ from swgjoint.typing import Array
 from swgjoint.units import mm, um
 
 Bearing = Literal["free", "held"]
-"""Whether the ball grooves leave the race free along the axis or hold it."""
+"""Axial support of the outer race by its ball grooves: ``free`` lets every section move
+along the axis, ``held`` prevents this motion."""
 
 
 def solid_sector_model(
@@ -39,21 +40,24 @@ def solid_sector_model(
     orders: Orders | None = None,
     bearing: Bearing | None = None,
 ) -> SolidSectorModel:
-    """3D model of a design.
+    """Build the 3D model of a design.
 
     Args:
         design: The drive; it needs a ``[cup]``.
-        half: Whether to model half of the drive, closed by its symmetry; ``auto`` does
-            so wherever it applies.
-        nonlinear: Whether segments rotate by large angles.
-        elastic_circular_spline: Whether the circular spline deforms.
-        orders: Polynomial degrees of the displacements of faces and sections.
+        half: Whether to model only half of the drive, which a rotation by 180 deg maps
+            onto the other half; ``auto`` does so if the drive has this symmetry.
+        nonlinear: Whether segments may rotate by large angles.
+        elastic_circular_spline: Whether the circular spline is elastic instead of
+            rigid.
+        orders: Polynomial degrees of the displacements of faces and sections; None for
+            the default degrees.
         bearing: Axial support of the outer race of ``[wave_generator.bearing]`` on its
-            balls; None makes the wave generator rigid.
+            balls; None replaces bearing and cam by a rigid wave generator.
 
     Raises:
-        DesignError: If the design cannot be built, the half model does not apply, or a
-            design with errors has a rigid circular spline.
+        DesignError: If the design cannot be built or has features that the model lacks,
+            if the half model does not apply, or if a design with manufacturing errors
+            is combined with a rigid circular spline.
         ComputationError: If the model does not fit in the memory of the machine.
     """
     name = design.drive.name
@@ -87,7 +91,8 @@ def solid_sector_model(
     if has_errors(design):
         if gear is None:
             raise DesignError(
-                f"{name}: tolerances: accepted only with an elastic circular spline"
+                f"{name}: tolerances: the 3d model supports them only with an elastic"
+                " circular spline"
             )
         errors = {
             "shift": tooth_errors(design, "flexspline").shift,
@@ -120,14 +125,15 @@ def solid_sector_model(
 
 
 def check_bearing(design: Design, *, half: bool) -> None:
-    """Reject features that the 3D bearing model lacks.
+    """Reject designs to which the 3D model of the bearing does not apply.
 
     Args:
         design: The drive.
         half: Whether the half model is used.
 
     Raises:
-        DesignError: If the design has any; one line per key.
+        DesignError: If the design has no bearing or an unsupported feature, with one
+            line per key, or if the bearing cannot be built.
     """
     drive, generator = design.drive, design.wave_generator
     faults = []
@@ -156,10 +162,11 @@ def check_bearing(design: Design, *, half: bool) -> None:
 
 
 def check_modelled(design: Design) -> None:
-    """Reject features that the 3D model lacks.
+    """Reject designs to which the 3D model does not apply.
 
     Raises:
-        DesignError: If the design has any; one line per key.
+        DesignError: If the design has no ``[cup]`` or has tooth friction; the message
+            has one line per key.
     """
     drive = design.drive
     faults = []

@@ -1,9 +1,9 @@
 """Equilibrium of the 3D cup between wave generator and circular spline.
 
-Newton's method is applied to the corotational strips. The contact of the wave generator
-is a primal-dual active set, condensed in every sector. Tooth contact and the rotation
-of the output form a small complementarity problem on the frozen tangent, as in the 2D
-model.
+The corotational strips are solved by Newton's method. Contact with the wave generator
+is treated by a primal-dual active-set method and condensed in every sector. In every
+iteration the tooth forces and the rotation of the output solve a small complementarity
+problem for the current tangent, as in the 2D model.
 """
 
 from __future__ import annotations
@@ -26,23 +26,27 @@ from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
 
 RELEASES = 6
-"""Number of times that planes may release a shared contact; some would never settle."""
+"""Number of times that a line of bore nodes may return from contact in several planes
+to contact at a vertex. Without this limit some lines would alternate for ever."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolidLoad:
-    """Prescribed torque and rotation.
+    """Prescribed torque, rotation or both.
 
-    With the torque alone the bore of the diaphragm is the output; with the rotation
-    alone it is held; with both it is held and the circular spline is the output.
+    If only the torque is given, the output is the bore of the diaphragm. If only the
+    rotation is given, the bore of the diaphragm is held there and the circular spline
+    is fixed. If both are given, the bore is held and the circular spline is the output.
     """
 
     torque: float | None = None
-    """Torque T that the output of the whole drive exerts on its load [N·m]."""
+    """Torque T that the output of the whole drive exerts on its load [N·m]; None if it
+    is a result."""
     rotation: float | None = None
-    """Rotation of the bore of the diaphragm [rad]."""
+    """Rotation at which the bore of the diaphragm is held [rad]; None if it is a
+    result."""
     teeth: bool = True
-    """Whether the teeth can touch."""
+    """Whether tooth contact is considered."""
 
     def __post_init__(self) -> None:
         if self.torque is None and self.rotation is None:
@@ -51,25 +55,26 @@ class SolidLoad:
 
 @dataclass(frozen=True, kw_only=True)
 class SolidSolver:
-    """Settings of the iteration."""
+    """Settings of Newton's method."""
 
     max_iterations: int = 80
+    """Largest number of iterations."""
     step_tolerance: float = 1e-10
-    """Displacement increment at which the iteration ends [m]; a thousandth of the
-    smallest effect of interest, which is 0.1 µm."""
+    """Largest displacement increment of a converged iteration [m]. It is a thousandth
+    of the smallest effect of interest, which is 0.1 µm."""
     thorough_below: float = 1e-7
-    """Displacement increment below which contact is also searched between the nodes
-    [m]."""
+    """Largest displacement increment below which tooth contact is also searched between
+    the nodes [m]."""
     stride: float = 0.2
-    """Largest displacement increment of an iteration, in lobe heights [-]; it is
-    limited because contact changes on the way."""
+    """Limit of the displacement increment of an iteration, in lobe heights [-]; larger
+    increments are damped because the contacts change on the way."""
     largest_step: float = 0.1
-    """Displacement increment from which the search counts as diverged [m]."""
+    """Displacement increment from which the iteration counts as diverged [m]."""
 
     def __call__(
         self, model: SolidSectorModel, start: SolidState, load: SolidLoad
     ) -> SolidState:
-        """Equilibrium at the wave-generator angle of ``start``.
+        """Solve for the equilibrium at the wave-generator angle of ``start``.
 
         Args:
             model: The 3D model.
@@ -77,7 +82,8 @@ class SolidSolver:
             load: Prescribed torque and rotation.
 
         Returns:
-            The state with its outcome, whether it converged or not.
+            The last state with the outcome of the search. If the search did not
+            converge, the state is not an equilibrium.
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
@@ -88,8 +94,8 @@ class SolidSolver:
             for iteration in range(self.max_iterations):
                 linear = linearise(model, state, kept=released >= RELEASES)
                 reach = (0.02 if iteration > 2 else 0.1) * model.lobe_height
-                # once thorough, always thorough: contacts that only this search finds
-                # would otherwise appear and disappear for ever
+                # once the search is thorough it remains so: contacts that only this
+                # search finds would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
                 step = _solve_linear(model, state, linear, load, reach, thorough)
                 history.append(step.largest)
@@ -100,7 +106,8 @@ class SolidSolver:
                 longest = 0.5 if _takes_back(step.increment, last) else 1.0
                 damping = min(longest, self.stride * model.lobe_height / step.largest)
                 last = step.increment
-                # a set of contacts that repeats would repeat for ever
+                # a contact set that occurs again would recur for ever if all its
+                # contacts changed as before: then only the worst one changes
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
                 shared = state.shared
@@ -123,10 +130,10 @@ class SolidSolver:
 
 
 def _takes_back(increment: Array, last: Array | None) -> bool:
-    """Whether an increment reverses at least half of the last one.
+    """Whether an increment reverses more than half of the previous one.
 
-    A flexspline that rocks on a crowned wave generator may alternate for ever between
-    two sets of contacts, each of which leads to the other.
+    A flexspline that rocks on a crowned wave generator may otherwise alternate for ever
+    between two contact sets, each of which leads to the other.
     """
     if last is None:
         return False
@@ -138,12 +145,13 @@ class _Step:
     """Solution of one linearised problem."""
 
     found: ToothRows | None
+    """Candidates of tooth contact; None without tooth contact."""
     force: Array
-    """Forces of the candidates (n,) [N]."""
+    """Normal forces of the candidates (n,) [N]."""
     active: NDArray[np.int64]
-    """Candidates that carry force."""
+    """Indices of the candidates that carry force."""
     increment: Array
-    """Increment of the masters in the global frame (N, n) [m]."""
+    """Increment of the coordinates of the sectors in the global frame (N, size) [m]."""
     turn: float
     """Rotation increment of the bore of the diaphragm [rad]."""
     circular_spline_turn: float
@@ -151,14 +159,14 @@ class _Step:
     pressure: Array
     """Forces of the wave generator at the contact points (N, p) [N]."""
     after: Array
-    """Gaps to the wave generator after the step (N, p) [m]."""
+    """Gaps to the wave generator after the undamped step (N, p) [m]."""
     torque: float
-    """Output torque [N·m]."""
+    """Torque T of the output on its load, whole drive [N·m]."""
     holding_torque: float
-    """Torque on the bore of the diaphragm [N·m]."""
+    """External torque on the bore of the diaphragm, whole drive [N·m]."""
     compliance: float
-    """Compliance -d(output)/dT of the whole drive [rad/(N·m)]; NaN without a prescribed
-    torque."""
+    """Tangent compliance -d(output rotation)/dT of the whole drive [rad/(N·m)]; NaN
+    without a prescribed torque."""
 
     @property
     def largest(self) -> float:
@@ -174,7 +182,7 @@ def _solve_linear(
     reach: float,
     thorough: bool,
 ) -> _Step:
-    """Condense the ring to tooth forces and rotations, solve, and expand the result."""
+    """Condense the ring to tooth forces and rotations, solve and expand the result."""
     candidates = None
     if load.teeth:
         candidates = model.teeth.find(
@@ -247,7 +255,11 @@ def _advance(
     *,
     one_at_a_time: bool,
 ) -> tuple[SolidState, bool]:
-    """Move the ring, replace the contact forces and update the touching bore nodes."""
+    """Move the ring, replace the contact forces and update the touching bore nodes.
+
+    Returns:
+        The new state, and whether the contact set of the bore remained the same.
+    """
     bore, masters = linear.bore, model.strip.masters
     local = np.einsum("spp->sp", bore.compliance)
     wrong = np.where(bore.active, -step.pressure * local, -step.after)
@@ -255,7 +267,7 @@ def _advance(
     if bad.any() and one_at_a_time:
         bad &= wrong == wrong[bad].max()
     touching = bore.active ^ bad
-    # shared if the line has no vertex, or also touches far from its vertex
+    # a line shares its contact if it has no vertex or also touches far from it
     nodes, lines = bore.normal.shape[1], bore.found.shape[1]
     apart = (touching & bore.present)[:, :nodes].reshape(len(touching), -1, lines)
     shared = ~bore.found | apart.any(axis=1)
@@ -302,7 +314,7 @@ def _advance(
 def _finished(
     model: SolidSectorModel, state: SolidState, outcome: Outcome, history: list[float]
 ) -> SolidState:
-    """Energy and moments of the whole drive at the last positions."""
+    """The last state with its outcome, ball forces, energy and moments."""
     frames = model.frames(state)
     energy = sum(
         float(energies(segment, frame).sum())

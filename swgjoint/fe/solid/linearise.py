@@ -1,14 +1,16 @@
-r"""Tangent of the ring with the wave generator's contact eliminated in every sector.
+r"""Linearised ring, with the contact of the wave generator eliminated in every sector.
 
-The contact points of a sector are the bore nodes and one vertex in every line of bore
-nodes along the axis. They are coupled to each other and to the masters only through the
-compliance C of the toothed segment, so their forces are condensed sector by sector:
+The contact points of a sector are its bore nodes and at most one vertex per line of
+bore nodes along the axis, see :mod:`swgjoint.fe.solid.across`. Only the compliance C of
+the toothed segment couples them to each other and to the masters, so their forces are
+eliminated sector by sector:
 
-.. math:: \lambda = -W^{-1}(g + B\,\delta q + D F), \quad W = n^T C n,
+.. math:: \lambda = -W^{-1}(g + B\,\delta q + D F), \quad W = n^T C n .
 
-where g are the gaps without the previous forces, B is their derivative by the masters,
-D their derivative by the tooth forces, and F are the tooth forces. The result is a ring
-of small matrices.
+Here g are the gaps that would remain without the previous contact forces, n the
+gradients of the gaps, :math:`\delta q` the increments of the masters, B the derivative
+of the gaps by the masters, F the tooth forces, and D the derivative of the gaps by F.
+The result is a ring of small matrices.
 """
 
 from __future__ import annotations
@@ -37,20 +39,21 @@ from swgjoint.typing import Array, Index, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoreContact:
-    """Contact points on the bore at one state; p of them in each sector.
+    """Contact points on the bore at one state.
 
-    The first b points are the bore nodes, plane after plane. The vertices of the gap
-    over the face width follow, one for every line of nodes along the axis, and then the
-    slopes of the gap at the vertices. The rows of the slopes are active while a vertex
-    carries force, and do no work at equilibrium.
+    Each of the N sectors has b bore nodes in L lines along the axis and p = b + 2 L
+    points: first the bore nodes, plane after plane; then the vertices of the gap over
+    the face width, one per line; then the slopes of the gap at these vertices. A slope
+    is active while its vertex carries force; at equilibrium it does no work.
     """
 
     gap: Array
     """Gaps (N, p) [m]."""
     normal: Array
-    """Gradient of the gap at the nodes in the frames of the teeth (N, b, 3)."""
+    """Gradients of the gaps at the nodes in the frames of the teeth (N, b, 3) [-]."""
     vertex: Array
-    """Weights of the nodes in the vertices and in their slopes (N, p - b, b)."""
+    """Weights of the nodes in the gaps at the vertices and in the slopes there
+    (N, p - b, b) [-]."""
     found: Mask
     """Mask of the lines that have a vertex (N, L)."""
     present: Mask
@@ -58,27 +61,28 @@ class BoreContact:
     active: Mask
     """Mask of the points that touch (N, p)."""
     rows: Array
-    """Derivative B of the gaps by the masters of the teeth in the global frame and by
-    the coordinates of a race (N, p, 3 m)."""
+    """Derivative B of the gaps by the masters of the toothed segment in the global
+    frame, and by the 16 coordinates of a race if there is one (N, p, 3 m) or
+    (N, p, 3 m + 16) [-]."""
     free_gap: Array
-    """Gaps g without the previous forces (N, p) [m]."""
+    """Gaps g without the previous contact forces (N, p) [m]."""
     compliance: Array
     """Compliance W of all points (N, p, p) [m/N]."""
     inverse: Array
-    """Inverse W^-1 of the active points, zero elsewhere (N, p, p) [N/m]."""
+    """Inverse W^-1 over the active points, zero elsewhere (N, p, p) [N/m]."""
 
     def with_vertices(self, nodal: Array, sector: Index) -> Array:
-        """Extend nodal values to all contact points, (n, b) -> (n, p).
+        """Extend values at the bore nodes to all contact points (n, p).
 
         Args:
             nodal: Values at the bore nodes (n, b).
-            sector: Sectors of these values (n,).
+            sector: Sector of each row of values (n,).
         """
         vertex = np.einsum("kvb,kb->kv", self.vertex[sector], nodal)
         return np.concatenate([nodal, vertex], axis=1)
 
     def nodal_force(self, pressure: Array) -> Array:
-        """Nodal forces in the frames of the teeth (N, 3 b) [N].
+        """Force vectors at the bore nodes in the frames of the teeth (N, 3 b) [N].
 
         Args:
             pressure: Forces at all contact points (N, p) [N].
@@ -92,20 +96,22 @@ class BoreContact:
 class SolidLinearised:
     """Ring linearised at one state.
 
-    A sector has n coordinates, three for each master and those of a race.
+    A sector has n coordinates: three per master and, with a race, those of the race.
     """
 
     frames: tuple[SolidFrames, ...]
+    """Frames of the segments, in the order of the strip."""
     gradient: Array
-    """Derivative of the strain energy (N, n) [N]."""
+    """Derivative of the strain energy by the coordinates (N, n) [N]."""
     hessian: Array
     """Tangent, including the condensed contact of the wave generator (N, n, n) [N/m].
     """
     pushed: Array
-    """Forces B^T W^-1 g of the wave generator on undisplaced masters (N, n) [N]."""
+    """Contribution B^T W^-1 g of this contact to the gradient if the coordinates do not
+    move: the negative forces of the wave generator on the coordinates (N, n) [N]."""
     bore: BoreContact
     race: RaceForces | None = None
-    """Forces of a race, already included in gradient and tangent."""
+    """Forces of a race, already included in gradient and tangent; None without."""
 
 
 def linearise(
@@ -116,8 +122,9 @@ def linearise(
     Args:
         model: The 3D model.
         state: The state.
-        kept: Mask of the lines that remain shared if the state shares them, see
-            ``shared`` of :class:`SolidState` (N, L); None for all lines.
+        kept: Mask of the lines whose contact remains shared by several planes if it is
+            shared in the state, see ``shared`` of :class:`SolidState` (N, L); None for
+            all lines.
     """
     frames = model.frames(state)
     n = model.size
@@ -165,13 +172,14 @@ def bore_contact(
     *,
     kept: Mask | None = None,
 ) -> BoreContact:
-    """Contact points of all sectors.
+    """Contact points of all sectors, with their gaps, derivatives and compliance.
 
     Args:
         model: The 3D model.
         state: The state.
         frame: Frames of the toothed segments.
-        kept: Mask of the lines that remain shared, see :func:`linearise` (N, L).
+        kept: Mask of the lines whose contact remains shared, see :func:`linearise`
+            (N, L).
     """
     teeth, first = model.strip.teeth, model.strip.flank_dofs
     n, p = state.touching.shape
@@ -187,7 +195,7 @@ def bore_contact(
         gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
     normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
     vertex, found, bend, covered = _vertices(model, gap, state, kept)
-    # derivative by the masters in the frame: motion of the teeth and of the frame
+    # derivative by the masters in the frame: deformation and rotation of the frame
     carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
     carried = np.einsum("spi,pim->spm", normal, carry)
     m = frame.position.shape[1]
@@ -247,9 +255,10 @@ def _vertices(
     """Vertices of the gap along the axis.
 
     Returns:
-        Weights of the bore nodes in the vertices and in their slopes (N, 2 L, b); mask
-        of the lines that have a vertex (N, L), and its bend (N, L) [m]; mask of the
-        nodes that the vertices replace (N, b).
+        Weights of the bore nodes in the gaps at the vertices and in the slopes there
+        (N, 2 L, b); mask of the lines that have a vertex (N, L); second derivative of
+        the gap at the vertex by the plane number (N, L) [m]; mask of the nodes that the
+        vertices replace (N, b).
     """
     n, b = gap.shape
     planes = model.strip.planes
@@ -260,7 +269,7 @@ def _vertices(
         return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
 
     flat = np.full(n * lines, crown * FLAT if crown else inf)
-    # planes that share a contact keep it until the gap is clearly bent
+    # lines with a shared contact need a larger bend before they get a vertex
     shared = state.shared.ravel()
     flat[shared] *= WIDE
     flat[shared & (True if kept is None else kept.ravel())] = inf

@@ -1,4 +1,4 @@
-"""The ring of strips on the wave generator: geometry, frames, contact points."""
+"""Flexspline of identical strips on the wave generator: coordinates and frames."""
 
 from __future__ import annotations
 
@@ -19,26 +19,31 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidSectorModel:
-    """Flexspline strips around the wave generator."""
+    """The strips of the flexspline around the wave generator, with tooth contact.
+
+    The model has N sectors with n masters each. Neighbouring sectors share the masters
+    on their common face.
+    """
 
     strip: Strip
     wave_generator: WaveGeneratorSurface
     teeth: SolidTeeth
     lobe_height: float
-    """Radial deflection at the lobes [m]."""
+    """Radial deflection of the flexspline at the lobes [m]."""
     half: bool = False
-    """Whether the model is half of the ring, closed by a rotation of 180 deg."""
+    """Whether the model is half of the ring; rotated by 180 deg it is the other half.
+    """
     nonlinear: bool = True
-    """Whether segments rotate by large angles; if not, they rotate only with the
-    output."""
+    """Whether segments may rotate by large angles; if not, their frames rotate only
+    with the bore of the diaphragm."""
     race: SolidRace | None = None
-    """Outer race on balls that replaces the rigid wave generator."""
+    """Outer race on balls that replaces the rigid wave generator; None without."""
 
     def dofs(self, masters: Index) -> Index:
-        """Degrees of freedom of masters in a sector.
+        """Degrees of freedom x, y, z of the given masters within a sector.
 
-        Those of the race's nodes follow the masters of the first face and of the last
-        face.
+        With a race, its coordinates at the first face follow the masters of that face,
+        and its coordinates at the last face are at the end.
         """
         first = 3 * masters
         if self.race is not None:
@@ -47,7 +52,7 @@ class SolidSectorModel:
 
     @cached_property
     def race_dofs(self) -> Index:
-        """Degrees of freedom of the race's nodes at both faces; empty without one."""
+        """Degrees of freedom of the race at both faces; empty without a race."""
         if self.race is None:
             return np.zeros(0, dtype=np.int64)
         ends = 3 * self.strip.masters.face_size, self.size - NODE
@@ -55,23 +60,33 @@ class SolidSectorModel:
 
     @cached_property
     def bore_places(self) -> Array:
-        """Parameters of the bore nodes along the undeformed elements, 0 to 1 (b,)."""
+        """Positions of the bore nodes between both faces of the undeformed sector (b,).
+
+        They range from 0 to 1 and are initial guesses of the parameters at which the
+        nodes face the elements of a race.
+        """
         x, y, _ = self.strip.bore.T
         return np.asarray(0.5 + np.arctan2(-x, y) * self.strip.sectors / (2.0 * pi))
 
     @cached_property
     def contact_dofs(self) -> Index:
-        """Degrees of freedom that move the bore's gap, those of the teeth first."""
+        """Degrees of freedom on which the gaps of the bore depend.
+
+        Those of the toothed segment come first, then those of a race.
+        """
         return np.concatenate([self.dofs(self.strip.teeth.masters), self.race_dofs])
 
     @property
     def size(self) -> int:
-        """Number of degrees of freedom of a sector, including both faces."""
+        """Number of degrees of freedom of a sector, those of both faces included."""
         return 3 * self.strip.masters.size + (0 if self.race is None else 2 * NODE)
 
     @property
     def face_closure(self) -> Array:
-        """Factors of the degrees of freedom of a face that close the ring."""
+        """Factors on the degrees of freedom of a face where the ring closes.
+
+        They convert the first face of the model to the last face of its last sector.
+        """
         of_masters = np.tile(self.closure, self.strip.masters.face_size)
         if self.race is None:
             return of_masters
@@ -79,7 +94,7 @@ class SolidSectorModel:
 
     @property
     def copies(self) -> int:
-        """Number of copies of the model in the drive."""
+        """Number of copies of the model that make up the drive."""
         return 2 if self.half else 1
 
     @property
@@ -89,35 +104,41 @@ class SolidSectorModel:
 
     @cached_property
     def closure(self) -> Array:
-        """Factors of x, y, z that close the ring."""
+        """Factors on x, y, z where the ring closes (3,).
+
+        A half model continues as its first sector rotated by 180 deg.
+        """
         sign = -1.0 if self.half else 1.0
         return np.array([sign, sign, 1.0])
 
     @cached_property
     def place(self) -> Array:
-        """Rotations of the sectors in the undeformed ring (N, 3, 3)."""
+        """Rotations from the sectors' frames to the global frame at rest (N, 3, 3)."""
         return about_z(
             2.0 * pi / self.strip.sectors * np.arange(self.sectors, dtype=float)
         )
 
     @cached_property
     def reference(self) -> Array:
-        """Undeformed masters in the global frame (N, n, 3) [m]."""
+        """Positions of the undeformed masters in the global frame (N, n, 3) [m]."""
         position = self.strip.masters.position
         return np.asarray(np.einsum("sij,aj->sai", self.place, position))
 
     def masters(self, state: SolidState) -> Array:
-        """Positions of all masters per sector (N, n, 3) [m]."""
+        """Positions of the masters by sector in the global frame (N, n, 3) [m]."""
         last = np.roll(state.faces, -1, axis=0)
         last[-1] *= self.closure
         return np.concatenate([state.faces, state.inside, last], axis=1)
 
     def loads(self, state: SolidState) -> Array:
-        """Forces at the loaded degrees of freedom of the teeth (N, n_b) [N]."""
+        """Forces at the loaded degrees of freedom of the toothed segments (N, n_b) [N].
+
+        Those on the flanks come first, then those on the bore.
+        """
         return np.concatenate([state.flank_force, state.bore_force], axis=1)
 
     def frames(self, state: SolidState) -> tuple[SolidFrames, ...]:
-        """Frames of all segments."""
+        """Frames of all segments, in the order of the strip."""
         x, place = self.masters(state), self.place
         if not self.nonlinear:
             place = about_z(np.array(state.rotation)) @ place
@@ -139,11 +160,13 @@ class SolidSectorModel:
         return self.strip.bore + moved.reshape(len(moved), -1, 3)
 
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
-        """Start of a search: a cup whose wall remains straight and does not stretch.
+        """Approximate state of the deflected cup, from which a search can start.
 
-        The displacement is w0 s cos 2 phi radially and -w0 s/2 sin 2 phi tangentially,
-        where s decreases from the teeth to the closed end; the axial displacement
-        follows from zero shear in the wall.
+        The generatrices of the wall remain straight, and the wall does not stretch. At
+        the angle phi from the major axis the radial displacement is w0 s cos 2 phi and
+        the tangential one is -(w0 s/2) sin 2 phi. The factor s decreases linearly along
+        the axis; it is one at mid-face and zero at the closed end. The axial
+        displacement follows from zero shear strain in the wall.
 
         Args:
             alpha: Wave-generator angle [rad].
@@ -179,7 +202,7 @@ class SolidSectorModel:
         race, touching = None, np.zeros((self.sectors, points), bool)
         if self.race is not None:
             race = self.race.initial_guess(alpha, rotation, closed)
-            # only the rim presses the race on its balls
+            # without this initial contact nothing would press the race on its balls
             along = np.arange(self.sectors) * 2.0 * pi / strip.sectors
             at_lobe = np.cos(2.0 * (along + rotation - alpha)) > 0.9
             touching[:, :n_bore] = at_lobe[:, None] & self.race.covers(strip.bore[:, 2])

@@ -13,16 +13,21 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidState(StateFigures):
-    """One equilibrium, or the start of the search for one; global frame, SI units."""
+    """One equilibrium, or the start of the search for one.
+
+    The model has N sectors and N_c teeth of the circular spline. Vectors are in the
+    global frame unless stated otherwise.
+    """
 
     faces: Array
     """Positions of the masters on the first face of each sector (N, n_face, 3) [m]."""
     inside: Array
     """Positions of the masters inside the sectors (N, n_inside, 3) [m]."""
     pressure: Array
-    """Forces of the wave generator per gradient of its gap, at the bore nodes, at the
-    vertices of the gap over the face width and at the slopes of the gap there
-    (N, n_bore + 2 n_lines) [N]."""
+    """Contact forces of the wave generator, each of which does work on its own gap: at
+    the bore nodes, then at the vertices of the gap over the face width, then at the
+    slopes of the gap at these vertices (N, n_bore + 2 n_lines) [N], see
+    :class:`swgjoint.fe.solid.linearise.BoreContact`."""
     touching: Mask
     """Mask of the contact points that touch the wave generator, in the shape of
     ``pressure``."""
@@ -30,21 +35,22 @@ class SolidState(StateFigures):
     """Mask of the lines of bore nodes along the axis whose contact acts in several
     planes of the mesh instead of at a vertex of the gap (N, n_lines)."""
     bore_force: Array
-    """Forces of the wave generator as nodal forces in the frames of the teeth
-    (N, 3 n_bore) [N]."""
+    """Forces of the wave generator at the bore nodes, before they are spread over the
+    face width, in the frames of the teeth (N, 3 n_bore) [N]."""
     flank_force: Array
-    """Tooth forces as nodal forces in the frames of the flexspline's teeth (N, n_flank)
-    [N]."""
+    """Tooth forces at the flank nodes of the flexspline, before they are spread over
+    the face width, in the frames of its teeth (N, n_flank) [N]."""
     circular_spline_force: Array
-    """Tooth forces as nodal forces in the frames of the circular spline's teeth
-    (N_c, n_c) [N]."""
+    """Tooth forces at the flank nodes of the circular spline, before they are spread
+    over the face width, in the frames of its teeth (N_c, n_c) [N]."""
     race: Array | None = None
     """Coordinates of the outer race (N, 2, 4), see
     :class:`swgjoint.fe.solid.wave_generator.race.SolidRace`; None for a rigid wave
     generator."""
     ball_force: Array | None = None
-    """Forces of all balls of the drive (balls,) [N]."""
+    """Forces of all balls of the drive (balls,) [N]; None for a rigid wave generator.
+    """
     held: ToothRows | None = None
-    """Tooth contacts that carry force."""
+    """Tooth contacts that carry force; None before the first search for them."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Normal forces of these contacts (n_contacts,) [N]."""

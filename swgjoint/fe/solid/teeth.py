@@ -1,7 +1,8 @@
 """Tooth contact over the face width: the 2D contact search in every plane of the mesh.
 
-The teeth of the circular spline are straight, so that a point of a flank touches them
-in its own plane. Crowning thins the flexspline's teeth towards both ends.
+The flanks of the circular spline are parallel to the axis, so that a point of a
+flexspline flank touches them in its own plane z = const. Crowning makes the teeth of
+the flexspline thinner towards both ends of the face width.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlankCrowning:
-    """Crowning of the flanks over the face width."""
+    """Crowning of the flexspline's flanks over the face width."""
 
     height: float = 0.0
     """Material removed at the edges of the face width [m]."""
@@ -33,7 +34,11 @@ class FlankCrowning:
     """Whether the crown is a circular arc instead of a parabola."""
 
     def displacement(self, strip: Strip) -> Array:
-        """Inward motion of the flank nodes in their planes (n_planes, 2 n_b, 2) [m]."""
+        """Displacement of the flank nodes that represents the removed material.
+
+        It is in x and y of the frame of a tooth and points into the tooth
+        (n_planes, 2 n_b, 2) [m].
+        """
         stations = strip.mesh.teeth.plane.flank_stations[:-1]
         _, outward, _ = strip.profile.evaluate(stations)
         both = np.concatenate([outward, outward * np.array([-1.0, 1.0])])
@@ -45,23 +50,27 @@ class FlankCrowning:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothRows:
-    """The n candidate contacts of all planes and the 3D derivatives of their gaps."""
+    """The n candidate contacts of all planes and the derivatives of their gaps."""
 
     contacts: Contacts
-    """Contacts in the frames of the planes; ``tooth`` counts the teeth of one plane."""
+    """Candidates as the 2D search finds them in each plane."""
     plane: Index
-    """Planes of the contacts (n,)."""
+    """Plane of each candidate (n,)."""
     weight: Array
-    """Derivative by the flank nodes in the frames of the teeth (n, n_flank)."""
+    """Derivative of the gaps by the displacements of the flexspline's flank nodes, in
+    the frames of its teeth (n, n_flank) [-]."""
     circular_spline_weight: Array
-    """Derivative by the flank nodes of the circular spline (n, n_ring_flank)."""
+    """Derivative of the gaps by the displacements of the circular spline's flank nodes,
+    in the frames of its teeth (n, n_c) [-]."""
     rows: Array
-    """Derivative by the masters of the teeth in the global frame (n, 3 m)."""
+    """Derivative of the gaps by the masters of the toothed segments in the global frame
+    (n, 3 m) [-]."""
     arm: Array
-    """Derivative by a rotation of the whole flexspline (n,) [m]."""
+    """Lever arm of the normals: derivative of the gaps by a rotation of the whole
+    flexspline about the axis of the drive (n,) [m]."""
     circular_spline_arm: Array
-    """Negative derivative by a rotation of the circular spline about its own axis (n,)
-    [m]."""
+    """Lever arm about the axis of the circular spline: negative derivative of the gaps
+    by a rotation of the circular spline (n,) [m]."""
 
     def __len__(self) -> int:
         return len(self.plane)
@@ -78,28 +87,34 @@ class ToothRows:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidTeeth:
-    """Flanks of both members."""
+    """Flanks of both members and the search for contact between them."""
 
     strip: Strip
+    """Condensed strip of the flexspline."""
     circular_spline: CircularSpline
     """Profile of the circular spline and weights of its flank nodes in a plane."""
     elastic_circular_spline: ElasticCircularSpline | None
     """Elastic circular spline; None if it is rigid."""
     circular_spline_teeth: int
-    """Teeth of the circular spline in the model."""
+    """Number of teeth of the circular spline in the model, N_c."""
     crowning: FlankCrowning
     shift: Array | None = None
-    """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    """Shifts of the flexspline's teeth by manufacturing errors, in the frames of the
+    teeth (N, 2) [m]; None for perfect teeth."""
     circular_spline_shift: Array | None = None
-    """Manufacturing errors of the teeth of the circular spline, which must be elastic
-    (N_c, 2) [m]."""
+    """Shifts of the circular spline's teeth by manufacturing errors, in the frames of
+    the teeth (N_c, 2) [m]; None for perfect teeth. They need an elastic circular
+    spline."""
     tilt: Array | None = None
-    """Slope of the circular spline's axis in x and y (2,) [rad]; this axis is fixed and
-    intersects that of the drive in the middle of the face width."""
+    """Slope of the circular spline's axis in x and y (2,) [rad]; None without. This
+    axis is fixed in space and intersects that of the drive at mid-face."""
 
     @property
     def circular_spline_dofs(self) -> int:
-        """Flank degrees of freedom of a circular spline's tooth; zero if rigid."""
+        """Number of flank degrees of freedom of a tooth of the circular spline, n_c.
+
+        It is zero if the circular spline is rigid.
+        """
         return (
             0
             if self.elastic_circular_spline is None
@@ -117,7 +132,7 @@ class SolidTeeth:
         thorough: bool,
         circular_spline_rotation: float = 0.0,
     ) -> ToothRows:
-        """Candidates at a state.
+        """Find the candidate contacts at a state.
 
         Args:
             frame: Frames of the toothed segments.
@@ -126,9 +141,10 @@ class SolidTeeth:
             circular_spline_force: Forces on the flanks of the circular spline
                 (N_c, n_c) [N].
             reach: Largest gap of a candidate [m].
-            held: Contacts of the last iteration that carry force; None without.
+            held: Contacts of the last iteration that carry force; None if there are
+                none.
             thorough: Whether to search between the nodes, see
-                :meth:`ToothContact.search`.
+                :meth:`swgjoint.fe.plane.tooth_contact.ToothContact.search`.
             circular_spline_rotation: Rotation of the circular spline [rad].
         """
         strip = self.strip
@@ -181,7 +197,7 @@ class SolidTeeth:
         return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
 
     def circular_spline_place(self, circular_spline_rotation: float) -> Array:
-        """Angles of the teeth of the circular spline (N_c,) [rad]."""
+        """Angular positions of the teeth of the circular spline (N_c,) [rad]."""
         # tooth j is half a pitch ahead of space j
         pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
         return np.asarray(
@@ -190,7 +206,10 @@ class SolidTeeth:
         )
 
     def _circular_spline_offset(self, circular_spline_rotation: float) -> Array:
-        """Errors of the circular spline's teeth by plane (N_c, n_planes, 2) [m]."""
+        """Displacement of the circular spline's teeth by shift and tilt in every plane.
+
+        It is in the frames of the teeth (N_c, n_planes, 2) [m].
+        """
         planes = self.strip.mesh.teeth.z
         offset = np.zeros((self.circular_spline_teeth, len(planes), 2))
         if self.circular_spline_shift is not None:
@@ -254,7 +273,10 @@ class SolidTeeth:
         )
 
     def compliance(self, found: ToothRows) -> Array:
-        """Compliance between candidates through both members' teeth (n, n) [m/N]."""
+        """Compliance between candidates through the teeth of both members (n, n) [m/N].
+
+        The masters of the flexspline are fixed.
+        """
         flank = self.strip.flank_dofs
         flank_compliance = self.strip.teeth.compliance[:flank, :flank]
         sector = found.contacts.sector
