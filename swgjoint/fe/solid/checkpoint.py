@@ -1,4 +1,4 @@
-"""States of a run in files, from which an interrupted run can resume."""
+"""Files with the states of a run, from which an interrupted run can be resumed."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from swgjoint.store import (
 )
 
 RUN = "run.json"
+"""Name of the file with the settings of the run."""
 _STATE = "state"
 
 
@@ -32,27 +33,29 @@ class Checkpoint:
     """A folder with the states of one run."""
 
     folder: Path
+    """The folder."""
     asked: bool
-    """Whether the user requested to resume; a damaged state is then an error."""
+    """Whether the user asked to resume a run; a damaged state is then an error."""
 
     @classmethod
     def open(
         cls, folder: Path, settings: dict[str, Any], *, resume: bool
     ) -> Checkpoint:
-        """Begin a run in a folder, or resume the same run if the folder holds it.
+        """Begin a run in a folder, or resume the run that the folder contains.
 
         Files in the folder are never removed.
 
         Args:
             folder: Folder of the states.
-            settings: Settings that identify the run: design hash, torque, positions.
-            resume: Whether the folder must already hold the run.
+            settings: Settings that identify the run, such as the hash of the design and
+                the torque.
+            resume: Whether the folder must already contain the run.
 
         Raises:
-            InputError: If the folder holds another run or other files, or no run to
-                resume.
+            InputError: If the folder contains another run or other files, or if there
+                is no run to resume.
         """
-        # changed code may solve the states differently
+        # other versions of the code may compute different states
         settings = json.loads(json_text({"code": code_version()} | settings))
         file = folder / RUN
         try:
@@ -62,15 +65,15 @@ class Checkpoint:
             return cls(folder=folder, asked=resume)
         except (OSError, DamagedError) as error:
             raise InputError(
-                f"{file} does not describe a run that --resume could continue:"
-                f" {one_line(error)}; accepted: another --out"
+                f"{file} is not the description of a run: {one_line(error)}; accepted:"
+                " another --out"
             ) from None
         if there != settings:
             keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
             raise InputError(
-                f"the run in {folder} differs in {', '.join(keys)}; accepted: the same"
-                " design, options and version to resume it (--resume), or another"
-                " --out"
+                f"the run in {folder} has different settings ({', '.join(keys)});"
+                " accepted: the same design, options and version to resume it (--resume),"
+                " or another --out"
             )
         return cls(folder=folder, asked=resume)
 
@@ -85,21 +88,25 @@ class Checkpoint:
         )
         if foreign:
             raise InputError(
-                f"{folder} holds {foreign[0]!r}, but no {RUN} of a run that --resume"
-                " could continue; accepted: another --out"
+                f"{folder} contains {foreign[0]!r} but no {RUN}: there is no run that"
+                " --resume could continue; accepted: another --out"
             )
         write_whole(folder / RUN, json_file(settings))
 
     @property
     def count(self) -> int:
-        """Number of states in the folder."""
+        """Number of states that the folder contains."""
         return len(list(self.folder.glob("*.npz")))
 
     def read(self, name: str) -> SolidState | None:
-        """A state by name; None if the run did not reach it or its file is ignored.
+        """Read a state by its name.
+
+        Returns:
+            The state; None if the run did not reach it, or if its file is damaged and
+            was ignored with a warning.
 
         Raises:
-            InputError: If the file is damaged and the user requested to resume.
+            InputError: If the file is damaged and the user asked to resume.
         """
         path = self.folder / f"{name}.npz"
         try:
@@ -108,21 +115,21 @@ class Checkpoint:
                 raise DamagedError("the file does not contain a state")
         except FileNotFoundError:
             return None
-        except Exception as error:  # a file may be anything
+        except Exception as error:  # a damaged file can raise any error
             if self.asked:
                 raise InputError(
                     f"--resume: {path}: {one_line(error)}; remove the file to compute"
-                    " its state again"
+                    " this state again"
                 ) from None
             warn_ignored(path, error)
             return None
         return state
 
     def write(self, name: str, state: SolidState) -> None:
-        """Write a state, completely or not at all.
+        """Write a state; an interruption leaves no incomplete file of that name.
 
         Args:
-            name: Name of the state.
+            name: Name of the state, without the extension of its file.
             state: The state.
         """
         data = arrays_file(pack(state, _STATE))

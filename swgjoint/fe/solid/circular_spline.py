@@ -1,4 +1,4 @@
-"""The elastic 3D circular spline: linear, with a fixed outer surface."""
+"""The elastic circular spline in 3D: small displacements, fixed outer surface."""
 
 from __future__ import annotations
 
@@ -20,46 +20,52 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 REACH = 4
-"""Teeth on either side of a loaded tooth that it displaces; with a fixed outer surface
-the displacement of others is less than 0.1 %."""
+"""Number of teeth on either side of a loaded tooth that are displaced with it. Since
+the outer surface is fixed, teeth farther away move by less than 0.1 % of its
+displacement."""
 WINDOW = 12
-"""Teeth of the ring in which the response to one loaded tooth is computed."""
+"""Number of teeth of the closed ring in which the response to one loaded tooth is
+computed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ElasticCircularSpline:
-    """Response of the flanks to forces on them, by the offset between teeth.
+    """Response of all teeth to forces on the flanks of one tooth.
 
-    Forces and displacements are in x and y of the frames of the teeth, plane after
-    plane, right flank before left flank. Forces are spread over a part of the face
-    width, and flank displacements are averaged over it.
+    Forces and displacements at the flanks have the components x and y in the frames of
+    the teeth, plane after plane, the right flank before the left one. Forces are spread
+    over patches of a fixed axial length, and the displacements of the flanks are
+    averaged over the same patches.
     """
 
     mesh: StripMesh
+    """Mesh of one tooth sector."""
     body: Solid
+    """Stiffness and stress of this mesh."""
     offsets: Index
     """Offsets between a loaded tooth and the teeth that it displaces (n_offsets,)."""
     flank: Array
     """Compliance G of the flanks (n_offsets, n_b, n_b) [m/N]."""
     nodal: Array
-    """Displacement of all nodes of a tooth per flank force (n_offsets, 3 n_nodes, n_b)
-    [m/N]."""
+    """Displacement of all nodes of a sector per flank force
+    (n_offsets, 3 n_nodes, n_b) [m/N]."""
 
     def displacement(self, force: Array) -> Array:
         """Flank displacements (N_c, n_b) [m] under flank forces (N_c, n_b) [N]."""
         return respond(self.offsets, self.flank, force)
 
     def nodal_displacement(self, force: Array) -> Array:
-        """Displacements of all nodes (N_c, n_nodes, 3) [m] under flank forces."""
+        """Displacements of all nodes (N_c, n_nodes, 3) [m] under flank forces [N]."""
         return respond(self.offsets, self.nodal, force).reshape(len(force), -1, 3)
 
     def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
         """Compliance between contact points (n, n) [m/N].
 
         Args:
-            tooth: Teeth of the contact points (n,).
-            weight: Derivatives of the gaps by the flank nodes (n, n_b).
-            teeth: Teeth of the circular spline in the model.
+            tooth: Tooth of each contact point (n,).
+            weight: Derivatives of the gaps by the displacements of the flank nodes
+                (n, n_b) [-].
+            teeth: Number of teeth of the circular spline in the model.
         """
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
@@ -67,11 +73,11 @@ class ElasticCircularSpline:
 def condense_circular_spline(
     design: Design, profile: ToothProfile, mesh: StripMesh
 ) -> ElasticCircularSpline:
-    """Condense the circular spline of a design.
+    """Condense the circular spline of a design to its flanks.
 
     Args:
         design: The drive.
-        profile: Flank of the circular spline.
+        profile: Tooth profile of the circular spline.
         mesh: Mesh of :func:`swgjoint.fe.solid.strip.mesh.circular_spline_strip`.
 
     Raises:

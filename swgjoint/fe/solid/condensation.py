@@ -19,22 +19,26 @@ from swgjoint.typing import Array
 class Condensed:
     """The linearised ring condensed to its n tooth contacts and two rotations.
 
-    The unknowns are the tooth forces and the rotations of the diaphragm's bore and of
-    the circular spline. The results are the gaps and the negative moments on both; with
-    these signs the matrix is symmetric.
+    The unknowns are the n tooth forces and the increments of two rotations: that of the
+    bore of the diaphragm and that of the circular spline. The results are the n gaps
+    and the two moments that these members exert on their supports. With these signs the
+    matrix is symmetric. Forces and moments are those of the model, which is half of the
+    drive in a half model.
     """
 
     system: Array
-    """Matrix from unknowns to results (n + 2, n + 2)."""
+    """Matrix from unknowns to results (n + 2, n + 2) in SI units."""
     offset: Array
-    """Results without tooth forces and rotations (n + 2,)."""
+    """Results if all unknowns are zero (n + 2,) [m] and [N·m]."""
     coupling: Array
-    """Derivative of the gaps to the wave generator by the tooth forces (n, p) [m/N]."""
+    """Derivative of the gaps to the wave generator in the sector of each tooth contact
+    by its force (n, p) [m/N]."""
     base: Array
-    """Motion of the masters without tooth forces and rotations (N, size) [m]."""
+    """Increment of the coordinates of the sectors if all unknowns are zero (N, size)
+    [m]."""
     response: Array
-    """Derivative of this motion by the tooth forces and the rotation of the diaphragm's
-    bore (N, size, n + 1)."""
+    """Derivative of this increment by the tooth forces and the rotation of the bore of
+    the diaphragm (N, size, n + 1) in SI units."""
 
 
 def condense(
@@ -50,15 +54,16 @@ def condense(
         model: The 3D model.
         state: State at which the ring is linearised.
         linear: The linearised ring.
-        found: Tooth contacts; None without.
-        rotation: Rotation to which the bore of the diaphragm is brought [rad]; None
-            keeps that of the state.
+        found: Tooth contacts; None if there are none.
+        rotation: Rotation of the bore of the diaphragm to which its unknown is relative
+            [rad]; None for the rotation of the state.
     """
     masters, bore, strip = model.strip.masters, linear.bore, model.strip
     teeth_dofs, held = model.dofs(strip.teeth.masters), model.dofs(masters.held)
     n_sectors, size = linear.gradient.shape
     n = 0 if found is None else len(found)
-    # prescribed motions of the diaphragm's bore: to its position, and by a rotation
+    # two prescribed motions of the diaphragm's bore: to that rotation, and by a unit
+    # rotation from there
     rotation = state.rotation if rotation is None else rotation
     target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), model.reference)
     value = np.zeros((n_sectors, size, 2))
@@ -67,7 +72,7 @@ def condense(
     around = np.stack([-target[..., 1], target[..., 0], 0.0 * target[..., 2]], axis=-1)
     value[:, held, 1] = around[:, masters.held].reshape(n_sectors, -1)
 
-    # rows of the candidates with the wave generator's contact condensed
+    # derivatives of the tooth gaps, with the contact of the wave generator condensed
     rows, local, gap = np.zeros((n, size)), np.zeros((n, n)), np.zeros(n)
     coupling = np.zeros((n, bore.gap.shape[1]))
     if found is not None and n:
@@ -118,7 +123,7 @@ def condense(
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
 
-    # gaps, and the torques on the bore of the diaphragm and on the circular spline
+    # gaps, and the moments of the bore of the diaphragm and of the circular spline
     system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     lever = value[:, held, 1]
     into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
@@ -128,7 +133,7 @@ def condense(
         seen = np.einsum("ki,kil->kl", rows, response[found.contacts.sector])
         system[:n, : n + 1] = seen
         system[:n, :n] += local
-        # turning the circular spline towards the teeth closes the gap by the lever arm
+        # a rotation of the circular spline changes the gaps by their lever arms
         system[:n, n + 1] = system[n + 1, :n] = -found.circular_spline_arm
         offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
     system[n], offset[n] = -system[n], -offset[n]
@@ -138,7 +143,7 @@ def condense(
 
 
 def _solve_sectors(model: SolidSectorModel, matrix: Array, columns: Array) -> Array:
-    """Solve with the last face of a half model in the frame of the first face."""
+    """Solve the ring; a half model is closed by the factors of its last face."""
     sign = model.face_closure
     size = len(sign)
     matrix[-1, -size:] *= sign[:, None]

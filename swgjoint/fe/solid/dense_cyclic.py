@@ -13,14 +13,14 @@ class DenseCyclicFactor:
     """Factorised ring of symmetric sector matrices.
 
     It solves the same systems as :class:`swgjoint.fe.common.cyclic.CyclicFactor`, but
-    sector by sector in dense blocks and without pivoting across blocks. For faces of a
-    hundred degrees of freedom it is several times faster than a banded solver, with
-    half of the fill. The interiors are eliminated first, then the faces one after the
-    other; the last face is coupled to all others.
+    in dense blocks, sector by sector, and without pivoting across blocks. For faces
+    with a hundred degrees of freedom it is several times faster than a banded solver
+    and has half of its fill. It first eliminates the interiors, then the faces one
+    after the other. The elimination couples the last face to all others.
     """
 
     def __init__(self, blocks: Array, face: int) -> None:
-        """Factorise.
+        """Factorise the matrices of a ring.
 
         Args:
             blocks: Symmetric matrices of at least three sectors (N, n, n), with degrees
@@ -29,7 +29,7 @@ class DenseCyclicFactor:
             face: Number of degrees of freedom of a face.
 
         Raises:
-            SingularCyclicError: If a pivot vanishes.
+            SingularCyclicError: If a pivot is zero.
         """
         self._last = last = len(blocks) - 1
         self._insides = Insides(blocks, face)
@@ -57,7 +57,8 @@ class DenseCyclicFactor:
         """Solve for k right-hand sides.
 
         Args:
-            rhs: Contributions of each sector (N, n, k), which add up on shared faces.
+            rhs: Right-hand sides by sector (N, n, k); contributions of two sectors to
+                their shared face are added.
 
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).

@@ -9,25 +9,29 @@ from swgjoint.memory import INTERPRETER, require_memory
 BYTES = 8
 """Memory of a floating-point number [B]."""
 FILL = 28.0
-"""Entries of a segment's sparse factor over its unknowns to the power 4/3 [-]; 27 for
-the toothed segment in the mesh of the thesis."""
+"""Entries of a segment's sparse factor divided by the number of unknowns to the power
+4/3 [-]; 27 for the toothed segment in the mesh of the thesis."""
 CONTACTS = 400
-"""Tooth contact points of an iteration, more than observed in any run."""
+"""Number of tooth contact points in an iteration; no observed run had more."""
 COPIES = 4
-"""Simultaneous arrays of the size of the system or of its right-hand sides."""
+"""Number of arrays of the size of the system or of its right-hand sides that are in
+memory at the same time."""
 OFFSETS = 9
-"""Teeth of the circular spline that a loaded tooth displaces, itself included."""
+"""Number of teeth of the circular spline that a loaded tooth displaces, itself
+included."""
 
 
 def required_memory(
     strip: StripMesh, circular_spline: StripMesh | None, sectors: int, orders: Orders
 ) -> float:
-    """Estimate of the peak memory [B]; measured peaks are 50 to 100 % of it.
+    """Estimate the peak memory of a model and its solution [B].
+
+    Measured peaks are 50 to 100 % of the estimate.
 
     Args:
-        strip: Mesh of the flexspline.
-        circular_spline: Mesh of the circular spline; None if it is rigid.
-        sectors: Teeth of the flexspline in the model.
+        strip: Mesh of a sector of the flexspline.
+        circular_spline: Mesh of a sector of the circular spline; None if it is rigid.
+        sectors: Number of sectors of the flexspline in the model.
         orders: Polynomial degrees of the displacements of faces and sections.
     """
     nodes = strip.teeth.segment.mesh.p.shape[1]
@@ -59,8 +63,8 @@ def require_solid_memory(name: str, required: float) -> None:
         required: Memory that the model needs [B].
 
     Raises:
-        ComputationError: If the model does not fit; the message states required and
-            available memory and how to reduce the former.
+        ComputationError: If the model does not fit; the message states the required and
+            the available memory and how to need less.
     """
     require_memory(
         f"{name}: the 3d model",
