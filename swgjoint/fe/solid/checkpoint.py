@@ -72,8 +72,8 @@ class Checkpoint:
             keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
             raise InputError(
                 f"the run in {folder} has different settings ({', '.join(keys)});"
-                " accepted: the same design, options and version to resume it (--resume),"
-                " or another --out"
+                " accepted: the same design, options and version to resume it"
+                " (--resume), or another --out"
             )
         return cls(folder=folder, asked=resume)
 

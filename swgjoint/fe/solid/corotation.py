@@ -1,14 +1,15 @@
 r"""Corotational 3D segments: large rotations, small strains within a segment.
 
-Each segment of each sector has a frame R, the best-fit rotation of its masters (polar
-decomposition of :math:`\sum x_i X_i^T`). With :math:`d = R^T x - X` the energy is
-:math:`\tfrac12 d^T \hat K d`. To first order, a motion :math:`\delta y` in the frame
-rotates it by :math:`\omega = G\,\delta y` and deforms the segment by
-:math:`P\,\delta y`, :math:`P = I - S G`, :math:`S\omega = \omega\times y`.
+Each segment of each sector has a frame R, which is the best-fit rotation of its masters
+from the reference positions X to the positions x (polar decomposition of
+:math:`\sum x_i X_i^T`). With :math:`d = R^T x - X` the strain energy is
+:math:`\tfrac12 d^T \hat K d`. To first order, a motion :math:`\delta y` of the masters
+in the frame rotates the frame by :math:`\omega = G\,\delta y` and deforms the segment
+by :math:`P\,\delta y`, where :math:`P = I - S G` and :math:`S\omega = \omega\times y`.
 
 The gradient is exact. The tangent omits the moment of the forces about the frame, which
-is of second order in d. Newton's method therefore converges linearly, with a factor of
-the order of the strain, about 1e-3.
+is of second order in d. Newton's method therefore converges linearly; each iteration
+reduces the error by a factor of the order of the strain, about 1e-3.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ LEVI[0, 2, 1] = LEVI[2, 1, 0] = LEVI[1, 0, 2] = -1.0
 
 
 def spin(vectors: Array) -> Array:
-    """Matrices of the cross product v x (..., 3, 3)."""
+    """Matrices (..., 3, 3) of the cross product v x with vectors v (..., 3)."""
     return np.asarray(np.einsum("ijk,...j->...ik", LEVI, vectors))
 
 
 def about_z(angle: Array) -> Array:
-    """Rotations about the axis of the drive (..., 3, 3)."""
+    """Matrices of rotations about the axis of the drive by angles [rad] (..., 3, 3)."""
     cos, sin = np.cos(angle), np.sin(angle)
     matrix = np.zeros((*np.shape(angle), 3, 3))
     matrix[..., 0, 0] = matrix[..., 1, 1] = cos
@@ -51,15 +52,17 @@ class SolidFrames:
     """Positions y of the masters in the frames, relative to their mean (N, m, 3) [m].
     """
     centre: Array
-    """Mean of the masters minus the mean of X, in the frames (N, 3) [m]."""
+    """Mean of d: mean of the masters' positions in the frames minus the mean of X
+    (N, 3) [m]."""
     deformation: Array
-    """Deformation d without its mean (N, 3 m) [m]."""
+    """Displacement d without its mean (N, 3 m) [m]."""
     gradient: Array
-    """Derivative G of the rotation by the masters in the frame (N, 3, 3 m) [1/m]."""
+    """Derivative G of the rotation of the frames by the masters in the frames
+    (N, 3, 3 m) [1/m]."""
 
     @property
     def displacement(self) -> Array:
-        """Deformation d including its mean (N, 3 m) [m]."""
+        """Displacement d of the masters in the frames (N, 3 m) [m]."""
         n, m = self.position.shape[:2]
         return self.deformation + np.tile(self.centre, (1, m)).reshape(n, 3 * m)
 
@@ -67,14 +70,14 @@ class SolidFrames:
 def segment_frames(
     segment: StripSegment, x: Array, place: Array, *, fitted: bool = True
 ) -> SolidFrames:
-    """Best-fit frames of a segment in all sectors.
+    """Frames of a segment in all sectors, fitted to its masters.
 
     Args:
         segment: The condensed segment.
         x: Positions of its masters in the global frame (N, m, 3) [m].
         place: Rotations of the sectors in the undeformed ring (N, 3, 3).
-        fitted: Whether the frames follow the masters; False keeps the rotations
-            ``place`` (linear level).
+        fitted: Whether the frames follow the masters; if not, they remain at
+            ``place`` (linear model).
     """
     reference = segment.position - segment.position.mean(axis=0)
     mean = x.mean(axis=1)
@@ -101,7 +104,9 @@ def segment_frames(
 
 
 def energies(segment: StripSegment, frames: SolidFrames) -> Array:
-    """Strain energy of the masters' displacements in each sector (N,) [J].
+    """Strain energy d^T K d/2 of a segment in each sector (N,) [J].
+
+    The energy of loads on the segment is not included.
 
     Args:
         segment: The condensed segment.
@@ -112,11 +117,11 @@ def energies(segment: StripSegment, frames: SolidFrames) -> Array:
 
 
 def project_to_frames(frames: SolidFrames, force: Array) -> Array:
-    """Gradient P^T f by the masters in the frames (N, 3 m) [N].
+    """Gradient P^T f of the energy by the masters in the frames (N, 3 m) [N].
 
     Args:
         frames: Frames of a segment.
-        force: Forces f on its masters in the frames (N, 3 m) [N].
+        force: Gradient f of the energy by the displacements d (N, 3 m) [N].
     """
     n, m = frames.position.shape[:2]
     moment = np.cross(frames.position, force.reshape(n, m, 3)).sum(axis=1)
@@ -124,7 +129,7 @@ def project_to_frames(frames: SolidFrames, force: Array) -> Array:
 
 
 def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
-    r"""Second derivative by the masters in the frames, to first order in d.
+    r"""Second derivative of the energy by the masters in the frames, first order in d.
 
     .. math:: T = P^T \hat K P + H G + (H G)^T - G^T \mathrm{sym}(H^T S) G, \quad
         H\omega = \omega \times f
@@ -132,8 +137,8 @@ def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
     Args:
         segment: The condensed segment.
         frames: Its frames, see :func:`segment_frames`.
-        force: Forces f on the masters in the frames, including those of loads (N, 3 m)
-            [N].
+        force: Gradient f of the energy by the displacements d, including that of the
+            loads (N, 3 m) [N].
 
     Returns:
         Symmetric matrices (N, 3 m, 3 m) [N/m].
@@ -154,7 +159,7 @@ def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
 
 
 def rotate_to_global(frames: SolidFrames, rows: Array) -> Array:
-    """Rotate vectors per master from the frames to the global frame (N, 3 m).
+    """Rotate one vector per master from the frames to the global frame (N, 3 m).
 
     Args:
         frames: Frames of a segment.

@@ -36,33 +36,42 @@ class SolidSetup:
     """One of the equilibria before the first wave-generator position."""
 
     name: str
-    """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
+    """``wave_generator`` (no tooth contact), ``meshed`` (teeth in contact, no torque)
+    or ``torque``."""
     state: SolidState
+    """The equilibrium."""
     stress: SolidMaxima
+    """Its largest stresses."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidStep(Position):
-    """Results of the 3D model at one position."""
+    """Results of the 3D model at one wave-generator position."""
 
     stress: SolidMaxima | None = None
+    """Largest stresses; None where the solve failed."""
     state: SolidState | None = None
+    """The equilibrium; None where the solve failed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidRun(Positions):
-    """A 3D simulation of meshing."""
+    """Results of a 3D simulation of meshing."""
 
     design: Design
     model: SolidSectorModel
     torque: float
+    """Torque T of the output on its load [N·m]."""
     steps: tuple[SolidStep, ...]
+    """Results at the wave-generator positions."""
     setup: tuple[SolidSetup, ...]
+    """The equilibria before the first position."""
     wall_s: float
+    """Elapsed time of the simulation [s]."""
 
     @property
     def nodes(self) -> int:
-        """Nodes of the deformable members before condensation."""
+        """Number of nodes of the deformable members before condensation."""
         total = _nodes(self.model)
         gear = self.model.teeth.elastic_circular_spline
         if gear is not None:
@@ -72,7 +81,7 @@ class SolidRun(Positions):
 
     @property
     def elements(self) -> int:
-        """Elements of the deformable members before condensation."""
+        """Number of elements of the deformable members before condensation."""
         total = self.model.strip.mesh.elements * self.model.sectors
         gear = self.model.teeth.elastic_circular_spline
         if gear is not None:
@@ -80,7 +89,7 @@ class SolidRun(Positions):
         return total
 
     def to_json(self) -> dict[str, Any]:
-        """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
+        """The JSON object that ``swgjoint meshing`` prints for a 3D model."""
         solved = [step.stress for step in self.steps if step.stress is not None]
         elastic = self.model.teeth.elastic_circular_spline is not None
         gear = f"elastic, outside {self.design.circular_spline.outer_rim}"
@@ -143,28 +152,33 @@ def simulate_solid_meshing(
     keep: Path | None = None,
     resume: bool = False,
 ) -> SolidRun:
-    """Simulate meshing in 3D, see :func:`swgjoint.fe.meshing.simulate_meshing`.
+    """Simulate meshing in 3D, as :func:`swgjoint.fe.meshing.simulate_meshing` in 2D.
 
     Args:
-        design: The drive, with a cup.
-        torque: Torque T that the drive exerts on the output [N·m].
-        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1; None chooses
-            :func:`swgjoint.fe.meshing_phases.default_steps`.
-        turn: Turns of the input.
-        nonlinear: Whether segments rotate by large angles.
-        half: Whether to use the half model, which needs even tooth counts.
-        elastic_circular_spline: Whether the circular spline deforms.
-        throw: Whether a position that cannot be solved raises an error.
+        design: The drive, with a ``[cup]``.
+        torque: Torque T of the output on its load [N·m].
+        steps: Number of positions of the input, at k turn/steps with k = 0 to
+            steps - 1; None for :func:`swgjoint.fe.meshing_phases.default_steps`.
+        turn: Rotation of the input that the positions divide [turns].
+        nonlinear: Whether segments may rotate by large angles.
+        half: Whether to use the half model, which requires a drive that is symmetric
+            under a rotation by 180 deg.
+        elastic_circular_spline: Whether the circular spline is elastic instead of
+            rigid.
+        throw: Whether a position that cannot be solved raises an error; if not, its
+            results are NaN or None.
         progress: Called with the stage, the number of finished steps and their total.
-        keep: Folder for the state of every position; None keeps none. If it holds an
-            interrupted run of the same settings and code, that run is resumed with
-            bit-identical results.
-        resume: Whether that folder must already hold a run to resume.
+        keep: Folder in which the state of every position is stored; None stores
+            nothing. If it contains an interrupted run with the same settings and code,
+            that run is resumed with bit-identical results.
+        resume: Whether that folder must already contain a run to resume.
 
     Raises:
-        DesignError: If the design cannot be built or has features that the model lacks.
+        DesignError: If the design cannot be built or has features that the model lacks,
+            or if the half model does not apply.
         ComputationError: If a solve fails or the model does not fit in memory.
-        InputError: If the folder holds another run or other files, or no run to resume.
+        InputError: If the folder contains another run or other files, or if there is no
+            run to resume.
     """
     begin = time.perf_counter()
     check_modelled(design)
@@ -184,7 +198,7 @@ def simulate_solid_meshing(
         }
         kept = Checkpoint.open(keep, settings, resume=resume)
         if kept.count:
-            # three states of the set-up, then all positions but the first
+            # three states of the set-up; the first position is the last of them
             stage = f"resuming the run in {keep}: finished states"
             progress(stage, kept.count, steps + 2)
     model = solid_sector_model(
@@ -279,7 +293,7 @@ def _step(
 
 
 def _nodes(model: SolidSectorModel) -> int:
-    """Nodes of the flexspline; those on a face count for one sector."""
+    """Number of nodes of the flexspline; nodes on common faces are counted once."""
     face = sum(len(segment.mesh.first) for segment in model.strip.segments)
     rows = [s.begin.shape[1] for s in model.strip.mesh.cup if s.begin is not None]
     return int((model.strip.mesh.nodes - face + sum(rows)) * model.sectors)
@@ -294,7 +308,7 @@ def _place(place: StressPlace) -> dict[str, Any]:
 
 
 def _parts(solved: list[SolidMaxima]) -> dict[str, dict[str, float]]:
-    """Means of the per-step maxima of the flexspline by segment [MPa]."""
+    """Mean over the positions of the flexspline's largest stresses by segment [MPa]."""
     if not solved:
         return {}
     return {

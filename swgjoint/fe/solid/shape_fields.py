@@ -1,7 +1,8 @@
-"""Fields of solved 3D positions, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
+"""Fields of 3D equilibria for display, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
 
-The surface runs along the bore of the open edge, over the teeth at both edges of the
-face width, and down the outside of the cup, with one row of nodes per section.
+The displayed surface starts at the bore of the open edge, follows the outline of the
+teeth at both edges of the face width and continues along the outside of the cup, with
+one row of nodes per section between segments.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from swgjoint.typing import Index
 
 
 def solid_surface(model: SolidSectorModel) -> ShapeSurface:
-    """Outer surface of a sector; nodes are numbered segment after segment."""
+    """Displayed surface of a sector; its nodes are numbered segment after segment."""
     strip = model.strip.mesh
     bore, outline = outline_rows(strip.teeth.plane)
     open_edge, back = strip.teeth.nodes[0], strip.teeth.nodes[-1]
@@ -41,15 +42,15 @@ def solid_surface(model: SolidSectorModel) -> ShapeSurface:
 def solid_fields(
     model: SolidSectorModel, state: SolidState, surface: ShapeSurface
 ) -> SectorFields:
-    """Fields of an equilibrium of the 3D model.
+    """Displacements, stresses and contact forces of a 3D equilibrium by sector.
 
     Args:
         model: The 3D model.
         state: The equilibrium.
-        surface: Surface of a sector, see :func:`solid_surface`.
+        surface: Displayed surface of a sector, see :func:`solid_surface`.
     """
     loads, frames = model.loads(state), model.frames(state)
-    # frames of the undeformed teeth, rotated with the flexspline
+    # frames of the undeformed teeth, rotated with the bore of the diaphragm
     stood = about_z(np.array(state.rotation)) @ model.place
     moved = []
     for number, (segment, frame) in enumerate(

@@ -1,4 +1,4 @@
-"""Stress recovery at the nodes of all sectors of the 3D model."""
+"""Nodal stresses of all sectors of the 3D model, and their maxima."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from swgjoint.typing import Array, Index
 def flexspline_stresses(model: SolidSectorModel, state: SolidState) -> dict[str, Array]:
     """Stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa].
 
-    Stresses are in the frames of the segments. Nodes on the faces have the mean of
-    their two sectors, nodes on the sections that of their two segments.
+    Stresses are in the frames of the segments. At nodes on a face the stresses of both
+    sectors are averaged, at nodes on a section those of both segments.
 
     Args:
         model: The 3D model.
@@ -47,14 +47,17 @@ def flexspline_stresses(model: SolidSectorModel, state: SolidState) -> dict[str,
 def circular_spline_stresses(
     model: SolidSectorModel, state: SolidState
 ) -> Array | None:
-    """Stresses of the circular spline as by :func:`flexspline_stresses`.
+    """Stress xx, yy, zz, xy, yz, zx at the nodes of the circular spline.
+
+    At nodes on a face the stresses of both teeth are averaged.
 
     Args:
         model: The 3D model.
         state: The equilibrium.
 
     Returns:
-        Stress in the frames of its teeth (N_c, n_nodes, 6) [Pa]; None if it is rigid.
+        Stress in the frames of the teeth (N_c, n_nodes, 6) [Pa]; None for a rigid
+        circular spline.
     """
     gear = model.teeth.elastic_circular_spline
     if gear is None:
@@ -74,16 +77,17 @@ def circular_spline_stresses(
 def average_faces(
     stress: Array, turn: Array, first: Index, last: Index, closure: Array
 ) -> None:
-    """Average the stress on a face over the sectors that share it, in place.
+    """Average the stress on every face over the two sectors that share it, in place.
 
     Args:
         stress: Stress by sector and node in the frames of the sectors (N, n_nodes, 6)
             [Pa].
         turn: Rotations of these frames (N, 3, 3).
         first: Nodes on the first face.
-        last: Nodes on the last face, which is the first face of the next sector.
-        closure: Factors of x, y, z between the last sector and the first one, see
-            :class:`SolidSectorModel` (3,).
+        last: Nodes on the last face, which is the first face of the next sector, in the
+            same order.
+        closure: Factors on x, y, z where the ring closes, see
+            :class:`swgjoint.fe.solid.sector_model.SolidSectorModel` (3,).
     """
     after = np.roll(turn, -1, axis=0)
     after[-1] *= closure[:, None]
@@ -99,12 +103,12 @@ def average_faces(
 def average_sections(
     one: Array, other: Array, turns: tuple[Array, Array], sections: tuple[Index, Index]
 ) -> None:
-    """Average the stress on a section over the segments that share it, in place.
+    """Average the stress on a section over the two segments that share it, in place.
 
     Args:
         one: Stress by sector and node in the frames of a segment (N, n_nodes, 6) [Pa].
-        other: Stress of the next segment in its frames (N, n_nodes, 6) [Pa].
-        turns: Rotations of the frames of both segments (N, 3, 3).
+        other: Stress of the next segment in its own frames (N, n_nodes, 6) [Pa].
+        turns: Rotations of the frames of both segments, each (N, 3, 3).
         sections: Nodes of the section in both segments, in the same order.
     """
     end, begin = sections
@@ -115,11 +119,11 @@ def average_sections(
 
 
 def turned_stress(stress: Array, turn: Array) -> Array:
-    """Stress R sigma R^T in frames in which the original ones are rotated by R.
+    """Rotate stresses to other frames, R sigma R^T (N, n, 6) [Pa].
 
     Args:
-        stress: Components xx, yy, zz, xy, yz, zx (N, n, 6) [Pa].
-        turn: Rotations R (N, 3, 3).
+        stress: Components xx, yy, zz, xy, yz, zx in the original frames (N, n, 6) [Pa].
+        turn: Rotations R from the original frames to the other ones (N, 3, 3).
     """
     tensor = np.empty((*stress.shape[:-1], 3, 3))
     for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
@@ -133,11 +137,12 @@ class StressPlace:
     """Location of the largest von Mises stress of the flexspline."""
 
     part: str
-    """Segment, or part of the toothed segment: ``tooth``, ``root``, ``bore`` or ``back
-    edge``."""
+    """Name of the segment, or part of the toothed segment: ``tooth``, ``root``,
+    ``bore`` or ``back edge``."""
     sector: int
+    """Number of the sector."""
     position: tuple[float, float, float]
-    """Undeformed position in the frame of the tooth [m]."""
+    """Undeformed position x, y, z in the frame of the tooth [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,13 +151,15 @@ class SolidMaxima:
 
     flexspline: StressMaxima
     circular_spline: StressMaxima | None
+    """Largest stresses of the circular spline; None if it is rigid."""
     by_part: dict[str, StressMaxima]
-    """Stress maxima of the flexspline by segment."""
+    """Largest stresses of the flexspline by segment."""
     place: StressPlace
+    """Location of the largest von Mises stress of the flexspline."""
 
     @classmethod
     def from_state(cls, model: SolidSectorModel, state: SolidState) -> SolidMaxima:
-        """Recover the stresses of a state.
+        """Recover the largest stresses of a state.
 
         Args:
             model: The 3D model.
@@ -180,7 +187,7 @@ class SolidMaxima:
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:
-        """Values in MPa by member, null for a rigid circular spline."""
+        """Largest stresses by member [MPa]; None for a rigid circular spline."""
         circular = self.circular_spline
         return {
             "flexspline": self.flexspline.to_json(),
@@ -194,7 +201,7 @@ def _largest(maxima: tuple[Array, Array, Array]) -> StressMaxima:
 
 
 def _place(model: SolidSectorModel, part: str, sector: int, node: int) -> StressPlace:
-    """Location of a node, with the name of its part."""
+    """Location of a node in a segment, with the name of its part."""
     strip = model.strip
     number = [segment.name for segment in strip.segments].index(part)
     mesh = strip.mesh.segments[number].mesh

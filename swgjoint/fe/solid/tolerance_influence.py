@@ -1,7 +1,7 @@
-"""Influence of the gap of every tooth on the output of the 3D drive.
+"""Influence of every tooth gap on the output of the 3D drive.
 
-Tooth contacts may open and close anywhere over the face width; the bore nodes that
-touch the wave generator remain those of the perfect drive.
+Tooth contacts may open and close anywhere over the face width, but the bore nodes that
+touch the wave generator are always those of the perfect drive.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Mask
 
 REACH = 0.03
-"""Gap up to which a contact may close, in lobe heights [-]. Additional points along the
-flanks, which the 2D model needs, change nothing here."""
+"""Largest gap of a contact that may close, in lobe heights [-]. The 2D model also needs
+additional points along the flanks; here they do not change the result."""
 
 
 def influence(
     model: SolidSectorModel, state: SolidState, *, circular_spline_is_output: bool
 ) -> Influence:
-    """Condense a drive with perfect teeth at an equilibrium.
+    """Linearise the influence of the tooth gaps at an equilibrium of a perfect drive.
 
     Args:
-        model: Model of all sectors with an elastic circular spline, without errors of
-            teeth and axis.
+        model: Model of all sectors, with an elastic circular spline and without errors
+            of teeth or axis.
         state: The equilibrium.
-        circular_spline_is_output: Whether the circular spline is the output.
+        circular_spline_is_output: Whether the circular spline is the output; if not,
+            the output is the bore of the diaphragm.
 
     Raises:
-        ValueError: If the model does not meet these conditions, or no tooth carries
+        ValueError: If the model does not meet these conditions, or if no tooth carries
             force at the equilibrium.
     """
     teeth = model.teeth
@@ -49,7 +50,7 @@ def influence(
     contacts, carries = _tooth_contacts(model, linear, state)
     n = len(contacts)
     condensed = condense(model, state, linear, contacts)
-    # the other member is fixed: the bore of the diaphragm or the circular spline
+    # the member that is not the output is fixed
     used = np.append(np.arange(n), n + 1 if circular_spline_is_output else n)
     offset = condensed.offset[used]
     offset[n] -= state.torque
@@ -89,7 +90,7 @@ def _gaps(
 def _tooth_contacts(
     model: SolidSectorModel, linear: SolidLinearised, state: SolidState
 ) -> tuple[ToothRows, Mask]:
-    """Possible contact points, and a mask of those that carry force at the state."""
+    """Contact points within reach, and a mask of those that carry force."""
     held = state.held
     if held is None or not len(held):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
