@@ -1,1 +1,1 @@
-"""The condensed strip of the flexspline: one sector over the face width."""
+"""The condensed strip of the flexspline: one tooth sector from open end to boss."""

@@ -1,4 +1,4 @@
-"""Linear elasticity of solids on hexahedra: forms and stress recovery."""
+"""Linear elasticity of solids on hexahedra: stiffness and stress recovery."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ ROWS, COLUMNS = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
 
 
 def solid_basis(mesh: MeshHex) -> Basis:
-    """Vector basis of incompatible-mode hexahedra with 2 x 2 x 2 Gauss points."""
+    """Vector basis of hexahedra with incompatible modes and 2 x 2 x 2 Gauss points."""
     return Basis(mesh, ElementVector(ElementHexIncompatible()), intorder=3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid:
-    """Stiffness and stress of a mesh in terms of its nodal displacements.
+    """Stiffness and stress of a mesh with n nodes in terms of nodal displacements.
 
-    Degrees of freedom list x, y, z of node after node; the incompatible modes are
-    eliminated element by element.
+    The degrees of freedom are x, y, z of one node after the other. The incompatible
+    modes are eliminated element by element.
     """
 
     stiffness: sparse.csr_matrix
     """Stiffness (3 n, 3 n) [N/m]."""
     stress: sparse.csr_matrix
-    """Nodal stress per displacement (6 n, 3 n) [Pa/m]; rows 6 i to 6 i + 5 are the
-    components at node i."""
+    """Nodal stress per displacement (6 n, 3 n) [Pa/m]; rows 6 i to 6 i + 5 contain the
+    components xx, yy, zz, xy, yz, zx at node i."""
 
 
 def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
-    r"""Assemble a mesh.
+    r"""Assemble stiffness and stress recovery of a mesh.
 
     .. math:: a(u, v) = \int \sigma(u) : \varepsilon(v), \quad
         \sigma = 2\mu\varepsilon + \lambda\,\mathrm{tr}\,\varepsilon\,I
 
     Args:
-        mesh: Hexahedra.
+        mesh: Mesh of hexahedra.
         youngs_modulus: Young's modulus [Pa].
         poisson_ratio: Poisson's ratio [-].
     """
@@ -82,8 +82,8 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
 def _stress_operator(basis: Basis, mu: float, lame: float) -> sparse.csr_matrix:
     """Nodal stress as a linear operator on all degrees of freedom.
 
-    Stress is evaluated at the 2 x 2 x 2 Gauss points, extrapolated trilinearly to the
-    corners of each element and averaged over the elements of a node with equal weights.
+    Stress is evaluated at the 2 x 2 x 2 Gauss points and extrapolated trilinearly to
+    the corners of each element. At a node all its elements have the same weight.
     """
     mesh = basis.mesh
     corners = np.asarray(mesh.elem.doflocs).T  # (3, 8)
@@ -123,10 +123,14 @@ def _stress_operator(basis: Basis, mu: float, lame: float) -> sparse.csr_matrix:
 
 
 def stress_maxima(stress: Array) -> tuple[Array, Array, Array]:
-    """Largest tensile and compressive (as a magnitude) and von Mises stress [Pa].
+    """Extreme principal stresses and von Mises stress at every point [Pa].
 
     Args:
         stress: Stress with components xx, yy, zz, xy, yz, zx in the last axis [Pa].
+
+    Returns:
+        Largest tensile stress, largest compressive stress as a magnitude, and von Mises
+        stress, all without the last axis of ``stress``.
     """
     tensor = np.empty((*stress.shape[:-1], 3, 3))
     for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):

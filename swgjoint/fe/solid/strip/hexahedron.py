@@ -13,7 +13,7 @@ from swgjoint.fe.common.element import IncompatibleModes
 class ElementHexIncompatible(IncompatibleModes, ElementHex1):  # type: ignore[misc]
     """Eight-node hexahedron with three incompatible modes per component.
 
-    The thesis uses the same class of element (C3D8I).
+    The thesis uses an element of the same type (C3D8I).
     """
 
     corners = 8

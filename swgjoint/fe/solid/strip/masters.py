@@ -1,16 +1,17 @@
 r"""Master nodes: a few points whose displacements define those of faces and sections.
 
-Through the wall the displacement of a face is a straight line plus a parabola and
-higher degrees. The coefficients are polynomials along the meridian of each segment,
-those of the parabola and above of a lower degree. On a section between segments they
-are polynomials around the sector. A plate in bending expands on one side and contracts
-on the other, so its parabola follows the bending moment, which varies less along the
-wall than the displacement. Without the parabola the cup was 0.5 % too stiff; its low
-degree costs 0.01 %.
+Through the wall the displacement of a face is the sum of a linear part, a parabola and
+polynomials of higher degree. Their coefficients are polynomials along the meridian of
+each segment. On a section between segments the coefficients are polynomials around the
+sector. The parabola describes a plate in bending, which contracts through its thickness
+on the side in tension and expands on the other side. It follows the bending moment,
+which varies less along the wall than the displacement. The coefficients of the parabola
+and of higher degrees through the wall are therefore of a lower degree along it. Without
+the parabola the cup was 0.5 % too stiff; its low degree causes an error of 0.01 %.
 
-These displacements contain every linear field and their weights add up to one, so that
-master nodes rotate like points of a body. The corotational model therefore needs only
-their positions.
+These displacements include every linear field, and the weights of the masters add up to
+one, so that masters rotate like points of a rigid body. The corotational model
+therefore needs only their positions.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
-    """Degrees of the polynomials, limited to those that the nodes of a mesh resolve.
+    """Degrees of the polynomials; a mesh with few nodes limits them further.
 
     With the default degrees (176 masters) the compliance of an improved reference cup
     under given forces is within 0.02 % of that with all nodes of faces and sections as
@@ -34,25 +35,26 @@ class Orders:
     """
 
     teeth: int = 10
-    """Degree along the face width of the straight lines through the rim; with 8 the
-    largest tensile stress, at the back edge of the teeth, is 3 % higher."""
+    """Degree along the toothed segment of the part that is linear through the rim; with
+    8 the largest tensile stress, at the back edge of the teeth, is 3 % higher."""
     cup: int = 4
-    """Degree along each segment of the cup of the straight lines through the wall."""
-    at_teeth: int = 4
-    """Degree around the sector where the cup meets the teeth, between which the rim
-    bends."""
-    around: int = 2
-    """Degree around the sector at the other sections."""
-    rim: int = 3
-    """Degree through the rim between two teeth."""
-    wall: int = 2
-    """Degree through the wall of the cup, at most that through the rim."""
-    rim_bending: int = 3
-    """Degree along the face width of the parabola and higher degrees through the rim.
+    """Degree along each segment of the cup of the part that is linear through the wall.
     """
+    at_teeth: int = 4
+    """Degree around the sector of the linear part on the section where the cup joins
+    the toothed segment, whose rim bends between the teeth."""
+    around: int = 2
+    """Degree around the sector of the linear part on all other sections."""
+    rim: int = 3
+    """Degree through the rim on the faces, which are midway between two teeth."""
+    wall: int = 2
+    """Degree through the wall of the cup; at most ``rim``."""
+    rim_bending: int = 3
+    """Degree along the toothed segment of the parts that are not linear through the
+    rim."""
     wall_bending: int = 1
-    """Degree along a segment and around a section of the parabola and higher degrees
-    through the wall."""
+    """Degree along each segment of the cup, and around each section, of the parts that
+    are not linear through the wall."""
 
     def __post_init__(self) -> None:
         most = len(THROUGH) - 1
@@ -62,28 +64,30 @@ class Orders:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentMasters:
-    """Boundary of one segment in terms of the masters of the strip."""
+    """Faces and sections of one segment in terms of the masters of the strip."""
 
     boundary: Index
-    """Node numbers of faces and sections (n_boundary,)."""
+    """Numbers of the nodes on faces and sections (n_boundary,)."""
     masters: Index
-    """Numbers of the strip's masters that move this segment (n_m,)."""
+    """Numbers of the masters of the strip that move these nodes (n_m,)."""
     weight: Array
-    """Weights of these masters in the boundary's displacement (n_boundary, n_m)."""
+    """Weights of these masters in the displacements of the nodes (n_boundary, n_m) [-].
+    """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Masters:
-    """Master nodes of a strip: first face, sections, last face."""
+    """Master nodes of a strip in the order first face, sections, last face."""
 
     position: Array
     """Positions in the frame of the tooth (n, 3) [m]."""
     face_size: int
     """Number of masters on a face."""
     segments: tuple[SegmentMasters, ...]
+    """Faces and sections of the segments, the toothed one first."""
     held: Index
-    """Masters at the bore of the diaphragm, which are those of the strip's end section.
-    """
+    """Numbers of the masters at the bore of the diaphragm, the last section of the
+    strip."""
 
     @property
     def size(self) -> int:
@@ -92,18 +96,18 @@ class Masters:
 
 
 def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
-    """Masters of a strip and the weights of its segments.
+    """Place the masters of a strip and compute their weights in every segment.
 
     Args:
         strip: Mesh of the strip.
-        orders: Degrees of the polynomials; None for the default ones.
+        orders: Degrees of the polynomials; None for the default degrees.
     """
     orders = orders or Orders()
     segments = strip.segments
     degrees = [_degrees(strip, k, orders) for k in range(len(segments))]
     faces, ends, count = list[Patch](), list[Index](), 0
     for k, along in enumerate(degrees):
-        # where it meets the cup, the rim has no higher degrees than the wall
+        # at the section to the cup the degree through the rim is that of the wall
         kept = min(len(part) for part in degrees[k : k + 2])
         points, numbers = [], []
         for level, degree in enumerate(along):
@@ -134,7 +138,7 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         for level, degree in enumerate(around):
             on_first = int(ends[k][level])
             points += [(level, station) for station in range(degree + 1)]
-            on_last = on_first - face_size  # counts from the end
+            on_last = on_first - face_size  # negative: counted from the last master
             numbers += [on_first, *range(count, count + degree - 1), on_last]
             count += degree - 1
         sections[k] = Patch(
@@ -173,7 +177,7 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
 
 
 def _degrees(strip: StripMesh, number: int, orders: Orders) -> tuple[int, ...]:
-    """Degrees along a segment, by level through its wall."""
+    """Degrees along a segment, one per master through its wall."""
     segment = strip.segments[number]
     line, bent, most = orders.cup, orders.wall_bending, orders.wall
     if number == 0:
@@ -185,7 +189,7 @@ def _degrees(strip: StripMesh, number: int, orders: Orders) -> tuple[int, ...]:
 
 
 def _inside(section: Index, patch: Patch, narrow: float, size: int) -> dict[int, Array]:
-    """Weights of the nodes of a section between the faces."""
+    """Weights of the masters at the nodes of a section that are not on a face."""
     n_phi, n_wall = section.shape
     around = np.linspace(0.0, 1.0, n_phi)[1:-1]
     depth = narrow + (1.0 - narrow) * np.linspace(0.0, 1.0, n_wall)
@@ -194,10 +198,10 @@ def _inside(section: Index, patch: Patch, narrow: float, size: int) -> dict[int,
 
 
 def _place(segment: SegmentMesh, follow: SegmentMasters, position: Array) -> None:
-    """Set the positions of new masters so that they interpolate the boundary at rest.
+    """Place new masters so that they interpolate the undeformed boundary.
 
-    Those of the faces are set first, because they must lie in the faces, which the
-    neighbouring sectors share.
+    Masters on the faces are placed first: they must lie in the faces, because the
+    neighbouring sectors share them.
     """
     points = np.asarray(segment.mesh.p).T[follow.boundary]
     faces = np.isin(follow.boundary, np.concatenate([segment.first, segment.last]))

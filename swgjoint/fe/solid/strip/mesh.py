@@ -1,9 +1,10 @@
 """3D mesh of one tooth sector of a member: a strip of segments along the axis.
 
-z points from the open end to the closed one and is zero in the middle of the face
-width. The strip of the flexspline consists of the teeth, three lengths of cylinder, the
-fillet and two lengths of diaphragm (thesis figures 3.21 to 3.23); that of the circular
-spline has only the teeth. Each segment has its own rotation in the corotational model.
+The axis z points from the open end to the closed end and is zero in the middle of the
+face width. The strip of the flexspline consists of the teeth, three segments of the
+cylinder, the fillet and two segments of the diaphragm (thesis figures 3.21 to 3.23).
+That of the circular spline consists of the teeth alone. In the corotational model each
+segment has its own rotation.
 """
 
 from __future__ import annotations
@@ -28,44 +29,50 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
-# elements of the thesis along the face width; with it the cup has 24 stations of 33
-# nodes
 FACE_WIDTH = 10
+"""Number of elements of the thesis mesh along the face width."""
+# elements of the thesis mesh along the parts of the cup: with a refinement of one a
+# sector of the cup has 24 stations of 33 nodes behind the teeth
 CYLINDER, FILLET, DIAPHRAGM = (2, 3, 4, 3), 4, (4, 4)
 # relative lengths of the parts of cylinder and diaphragm, from the teeth to the bore;
-# the first part belongs to the toothed segment, so that no section cuts its back edge
+# the first part belongs to the toothed segment, so that no section is at the back edge
+# of the teeth
 CYLINDER_PARTS, DIAPHRAGM_PARTS = (0.05, 0.15, 0.5, 0.3), (0.3, 0.7)
 LARGEST_WALL = 0.9
-"""Largest wall of the cup over the rim [-]; the rest of the rim has two rows of
-elements."""
+"""Largest thickness of the lower rim, which the cup continues, relative to that of the
+rim [-]; the layers of elements below the roots need the rest of the rim."""
 SMALLEST_INNER_FILLET = 0.1
-"""Smallest inner radius of the fillet over the wall thickness that can be meshed [-].
-"""
+"""Smallest ratio of inner fillet radius to wall thickness that can be meshed [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentMesh:
-    """One segment of a strip, in the frame of its tooth (tooth on +y).
+    """One segment of a strip, in the frame of its tooth, which is on +y.
 
-    Sections hold node numbers by position around the sector, from the first face to the
-    last face, and by position through the wall, from the outside to the bore side.
+    Sections are arrays of node numbers. Their first axis runs around the sector from
+    the first face to the last face, their second axis through the wall from the outside
+    to the bore side.
     """
 
     name: str
+    """Name of the segment in results."""
     mesh: MeshHex
+    """Mesh of the segment [m]."""
     first: Index
-    """Nodes of the clockwise face (n,)."""
+    """Numbers of the nodes on the clockwise face (n,)."""
     last: Index
-    """Nodes of the counter-clockwise face, in the same order (n,)."""
+    """Numbers of the nodes on the counter-clockwise face, in the same order (n,)."""
     position: Array
-    """Relative positions of the face nodes between both ends, 0 to 1 (n,) [-]."""
+    """Relative positions of the face nodes along the meridian, from 0 at the end
+    closer to the open end of the strip to 1 (n,) [-]."""
     depth: Array
-    """Relative depths of the face nodes from the outside to the bore side, 0 to 1 (n,)
-    [-]."""
+    """Relative depths of the face nodes, from 0 at the outside to 1 at the bore side
+    (n,) [-]."""
     begin: Index | None
-    """Section towards the teeth (n_phi, n_wall); None at a free end."""
+    """Section towards the teeth (n_phi, n_wall); None for the toothed segment."""
     end: Index | None
-    """Section towards the bore of the diaphragm (n_phi, n_wall); None at a free end."""
+    """Section towards the bore of the diaphragm (n_phi, n_wall); None if the strip is
+    only the toothed segment."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,15 +81,16 @@ class TeethMesh:
 
     segment: SegmentMesh
     plane: SectorMesh
-    """The extruded section."""
+    """The 2D mesh that is extruded over the face width."""
     z: Array
-    """Coordinates z of the planes (n_planes,) [m]."""
+    """Coordinates z of the planes of nodes, starting at the open end (n_planes,) [m].
+    """
     nodes: Index
-    """Node numbers by plane and node of the section (n_planes, n_plane_nodes)."""
+    """Node numbers by plane and node of the 2D mesh (n_planes, n_plane_nodes)."""
 
     @property
     def flank(self) -> Index:
-        """Nodes of right and then left flank, except on faces (n_planes, n_b)."""
+        """Nodes of the right, then the left flank, except on faces (n_planes, n_b)."""
         plane = self.plane
         return self.nodes[:, np.r_[plane.flank_right[:-1], plane.flank_left[:-1]]]
 
@@ -94,10 +102,11 @@ class TeethMesh:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StripMesh:
-    """Segments from the open end to the bore of the diaphragm."""
+    """Segments of a strip from the open end to the bore of the diaphragm."""
 
     teeth: TeethMesh
     cup: tuple[SegmentMesh, ...] = ()
+    """Segments behind the toothed one; empty for a ring without a cup."""
 
     @property
     def segments(self) -> tuple[SegmentMesh, ...]:
@@ -106,7 +115,7 @@ class StripMesh:
 
     @property
     def narrow(self) -> float:
-        """Depth of the cup's outside below the roots of the teeth, in rims [-]."""
+        """Depth of the outside of the cup below the root circle, in rims [-]."""
         end = self.teeth.segment.end
         if end is None:
             return 0.0
@@ -115,7 +124,7 @@ class StripMesh:
 
     @property
     def nodes(self) -> int:
-        """Number of nodes; sections between segments count once, faces count twice."""
+        """Number of nodes; a section between segments counts once, both faces count."""
         shared = sum(seg.begin.size for seg in self.cup if seg.begin is not None)
         return int(sum(seg.mesh.p.shape[1] for seg in self.segments) - shared)
 
@@ -126,17 +135,17 @@ class StripMesh:
 
 
 def cup_wall(design: Design) -> float:
-    """Thickness of the cup, thesis eq. (3.50) [m]."""
+    """Wall thickness of the cup, thesis eq. (3.50) [m]."""
     assert design.cup is not None
     return design.cup.thickness_coefficient * design.flexspline.rim_mm * mm
 
 
 def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
-    """Strip of the flexspline; without a ``[cup]`` only the toothed ring.
+    """Mesh a strip of the flexspline; without a ``[cup]`` only the toothed segment.
 
     Args:
         design: The drive.
-        profile: Flank of the flexspline.
+        profile: Tooth profile of the flexspline.
 
     Raises:
         DesignError: If the fillet is too small for the wall or the cup too short.
@@ -152,11 +161,11 @@ def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
 
 
 def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
-    """Strip of the circular spline: the teeth over the face width.
+    """Mesh a strip of the circular spline: the toothed segment over the face width.
 
     Args:
         design: The drive.
-        profile: Flank of the circular spline.
+        profile: Tooth profile of the circular spline.
     """
     rim, n = design.circular_spline.rim_mm * mm, design.mesh.refinement
     plane = sector_mesh(profile, rim, n)
@@ -166,12 +175,12 @@ def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
 def teeth_mesh(
     plane: SectorMesh, width: float, n: float, apron: SegmentMesh | None = None
 ) -> TeethMesh:
-    """Extrude a section over the face width and join the first part of the cup.
+    """Extrude a 2D mesh over the face width and join the first part of the cup.
 
     Args:
-        plane: The section.
+        plane: The 2D mesh.
         width: Face width [m].
-        n: Mesh refinement, a factor on the number of elements.
+        n: Mesh refinement, a factor on the number of elements per direction [-].
         apron: First part of the cup; None without a cup.
     """
     z = np.linspace(-0.5 * width, 0.5 * width, refine_count(FACE_WIDTH, n) + 1)
@@ -211,7 +220,11 @@ def teeth_mesh(
 
 
 def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
-    """Join two meshes at coincident nodes; new node numbers of the second mesh."""
+    """Join two meshes at coincident nodes.
+
+    Returns:
+        The joined mesh, and the numbers of the second mesh's nodes in it.
+    """
     first, second = np.asarray(mesh.p).T, np.asarray(more.p).T
     apart, nearest = cKDTree(first).query(second)
     new = apart > 1e-9
@@ -224,13 +237,13 @@ def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
 def cup_segments(
     design: Design, plane: SectorMesh, width: float, n: float
 ) -> tuple[SegmentMesh, ...]:
-    """Segments of cylinder, fillet and diaphragm or flange.
+    """Mesh the segments of cylinder, fillet and diaphragm or flange.
 
     Args:
         design: The drive, with a ``[cup]``.
-        plane: Section of the teeth, whose lower rim the cup continues.
+        plane: 2D mesh of the teeth, whose lower rim the cup continues.
         width: Face width [m].
-        n: Mesh refinement, a factor on the number of elements.
+        n: Mesh refinement, a factor on the number of elements per direction [-].
 
     Raises:
         DesignError: If the fillet is too small for the wall or the cup too short.
@@ -260,7 +273,7 @@ def cup_segments(
     rows = refine_count(LOWER_RIM, n) + 1
     at_teeth = np.hypot(*face)[-rows:]
     across = np.linspace(1.0, 0.0, rows)  # outside to bore side
-    # meridian: (r, z) of outside and bore side at every station of every part
+    # meridian of every part: r and z by station and position through the wall
     parts = []
     straight = z1 - fillet - z0
     start = z0
@@ -298,11 +311,11 @@ def cup_segments(
 
 
 def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
-    """A structured segment between two sections.
+    """Structured mesh of a segment between two sections.
 
     Args:
         name: Name of the segment.
-        r: Radii by station and position across the wall (n_s, n_w) [m].
+        r: Radii by station and position through the wall (n_s, n_w) [m].
         z: Coordinates z of the same points (n_s, n_w) [m].
         phi: Angles clockwise from the tooth axis, starting at the first face (n_phi,)
             [rad].
@@ -318,7 +331,7 @@ def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
         for b in (0, 1)
         for c in (0, 1)
     ]
-    # quadrilateral of the section, then that of the next station
+    # a quadrilateral at a station, then the opposite one at the next station
     cells = np.stack([corner[k].ravel() for k in (0, 1, 3, 2, 4, 5, 7, 6)])
     middle = np.hypot(np.diff(r.mean(axis=1)), np.diff(z.mean(axis=1)))
     along = np.concatenate([[0.0], np.cumsum(middle)])
@@ -336,11 +349,11 @@ def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
 
 
 def _hexahedra(points: Array, cells: Index) -> MeshHex:
-    """Mesh from cells that list a quadrilateral and the opposite one."""
-    # corners of the unit cube in scikit-fem's order
+    """Mesh from cells that list the corners of two opposite quadrilaterals."""
+    # scikit-fem's numbers of the corners (0,0,0) (1,0,0) (1,1,0) (0,1,0) of the unit
+    # cube, which is the order in the cells, and of the same corners at z = 1
     cube = np.array([7, 4, 1, 5, 6, 2, 0, 3])
     sorted_cells = np.empty_like(cells)
-    # order of the cells: (0,0,0) (1,0,0) (1,1,0) (0,1,0), then the same at z = 1
     sorted_cells[[7, 4, 1, 5, 6, 2, 0, 3]] = cells
     a, b, d, e = (points[cells[k]] for k in (0, 1, 3, 4))
     volume = np.einsum("ei,ei->e", np.cross(b - a, d - a), e - a)

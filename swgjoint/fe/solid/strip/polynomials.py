@@ -11,27 +11,30 @@ from numpy.polynomial import Legendre
 from swgjoint.typing import Array, Index
 
 THROUGH = (0.0, 1.0, 0.5, 0.25, 0.75)
-"""Relative depths of the masters through the wall, from the outside [-]; each master
-raises the degree by one."""
+"""Relative depths of the masters through the wall, from the outside [-]. The first
+k + 1 masters define a polynomial of degree k."""
 
 
 @cache
 def lobatto(order: int) -> Array:
-    """Gauss-Lobatto points from 0 to 1, between which interpolation does not oscillate.
+    """Gauss-Lobatto points from 0 to 1, on which interpolation does not oscillate.
 
     Args:
-        order: Degree of the polynomials; there is one point more.
+        order: Degree of the interpolating polynomials.
+
+    Returns:
+        Increasing points (order + 1,).
     """
     inner = np.asarray(Legendre.basis(order).deriv().roots(), dtype=np.float64)
     return np.concatenate([[0.0], 0.5 * (1.0 + np.sort(inner)), [1.0]])
 
 
 def lagrange(points: Array, x: Array) -> Array:
-    """Values of the Lagrange polynomials of some points (n_x, n_points).
+    """Values of the Lagrange polynomials on given points (n_x, n_points).
 
     Args:
         points: Interpolation points (n_points,).
-        x: Places of evaluation (n_x,).
+        x: Points of evaluation (n_x,).
     """
     weights = np.empty((len(x), len(points)))
     for k, point in enumerate(points):
@@ -41,12 +44,12 @@ def lagrange(points: Array, x: Array) -> Array:
 
 
 def newton_polynomial(level: int, depth: Array) -> Array:
-    """Newton's polynomial that is one at a point of ``THROUGH``, zero at earlier ones.
+    """Polynomial that is one at a point of :data:`THROUGH` and zero at earlier points.
 
-    The first two are straight lines.
+    The first two are straight lines, each of which is zero at the other's point.
 
     Args:
-        level: Number of the point in ``THROUGH``.
+        level: Index of the point in :data:`THROUGH`.
         depth: Relative depths of evaluation, 0 to 1 [-].
     """
     before = THROUGH[:2] if level < 2 else THROUGH[:level]
@@ -62,17 +65,20 @@ class Patch:
     """Polynomials on a face of a segment or on a section, and their masters."""
 
     degrees: tuple[int, ...]
-    """Degrees along the face or section, by level through the wall."""
+    """Degrees along the face or section, one per point of :data:`THROUGH` that has
+    masters."""
     points: tuple[tuple[int, int], ...]
-    """Level and station of every master."""
+    """Level and station of every master: index of its depth in :data:`THROUGH`, and
+    number of its Gauss-Lobatto point along the patch."""
     masters: Index
-    """Numbers of the masters; those of the last face count from the end."""
+    """Numbers of the masters; on the last face they are negative and count from the
+    end."""
     narrow: float = 0.0
-    """Relative depth at which the outside of the segment begins at the first station
-    [-]."""
+    """Relative depth of the outside of the patch at its first station, where the wall
+    of the cup is thinner than the rim [-]."""
 
     def rows(self, along: Array, depth: Array, size: int, first: int = 0) -> Array:
-        """Weights of all masters of a strip at points (n, size).
+        """Weights of all masters of a strip at points of the patch (n, size) [-].
 
         Args:
             along: Relative positions of the points along the patch, 0 to 1 (n,).
@@ -83,7 +89,7 @@ class Patch:
         """
         stations = np.array([lobatto(self.degrees[j])[k] for j, k in self.points])
         deep = np.array([THROUGH[j] for j, _ in self.points])
-        # at the teeth the outside of the wall lies between the masters
+        # at the teeth the wall is thinner than the rim to which these masters belong
         outer = np.array([k == 0 for _, k in self.points]) & (self.narrow > 0.0)
         deep[outer] = (deep[outer] - self.narrow) / (1.0 - self.narrow)
         values = np.linalg.solve(
@@ -94,7 +100,7 @@ class Patch:
         return rows
 
     def _basis(self, along: Array, depth: Array) -> Array:
-        """Basis functions at points, before the transformation to nodal ones."""
+        """Products of Lagrange and Newton polynomials at points (n, n_masters)."""
         columns = []
         for level, station in self.points:
             curve = lagrange(lobatto(self.degrees[level]), along)[:, station]

@@ -18,13 +18,13 @@ from swgjoint.typing import Array, Index
 class StripSegment:
     r"""One condensed segment in the frame of its tooth.
 
-    With the displacements d of its masters and forces F on the loaded surfaces, the
-    displacements of these surfaces and the forces of the masters are
+    With the displacements d of its masters and the forces F on its loaded surfaces, the
+    displacements of these surfaces and the forces on the masters are
 
     .. math:: u_b = A d + C F, \quad f = \hat K d - A^T F,
 
-    and all nodes move by :math:`u = N d + N_F F`. Vectors list x, y, z point after
-    point.
+    and all nodes move by :math:`u = N d + N_F F`. Vectors contain x, y, z of one point
+    after the other.
     """
 
     name: str
@@ -32,22 +32,23 @@ class StripSegment:
     masters: Index
     """Numbers of its masters in the strip (n_m,)."""
     position: Array
-    """Reference positions of its masters (n_m, 3) [m]."""
+    """Reference positions X of its masters (n_m, 3) [m]."""
     stiffness: Array
     """Stiffness K hat (3 n_m, 3 n_m) [N/m]."""
     loaded: Index
-    """Loaded degrees of freedom among those of the nodes (n_b,); empty for a cup."""
+    """Loaded degrees of freedom among those of all nodes (n_b,); empty for segments of
+    the cup."""
     spread: sparse.csr_matrix
-    """Matrix S from the forces F to nodal forces; u_b are averages with its transpose
-    (n_b, n_b)."""
+    """Matrix S from the forces F to nodal forces; its transpose averages nodal
+    displacements to u_b (n_b, n_b) [-]."""
     loaded_from_masters: Array
-    """Matrix A from masters to loaded surfaces (n_b, 3 n_m)."""
+    """Matrix A from masters to loaded surfaces (n_b, 3 n_m) [-]."""
     compliance: Array
-    """Compliance C of the loaded surfaces (n_b, n_b) [m/N]."""
+    """Compliance C of the loaded surfaces with fixed masters (n_b, n_b) [m/N]."""
     nodal: Array
-    """Matrix N from masters to all nodes (3 n_nodes, 3 n_m)."""
+    """Matrix N from masters to all nodes (3 n_nodes, 3 n_m) [-]."""
     nodal_from_force: Array
-    """Displacement N_F of all nodes per force (3 n_nodes, n_b) [m/N]."""
+    """Displacement N_F of all nodes per force F (3 n_nodes, n_b) [m/N]."""
     stress: sparse.csr_matrix
     """Nodal stress per nodal displacement (6 n_nodes, 3 n_nodes) [Pa/m]."""
 
@@ -64,7 +65,7 @@ class StripSegment:
 
         Args:
             d: Displacements of the masters in n sectors (n, 3 n_m) [m].
-            force: Forces F on the loaded surfaces (n, n_b) [N]; None without.
+            force: Forces F on the loaded surfaces (n, n_b) [N]; None if unloaded.
         """
         u = d @ self.nodal.T
         if force is not None:
@@ -75,7 +76,7 @@ class StripSegment:
         """Stress xx, yy, zz, xy, yz, zx at the nodes (n, n_nodes, 6) [Pa].
 
         Args:
-            u: Displacements of :meth:`displacement` (n, n_nodes, 3) [m].
+            u: Displacements of all nodes, see :meth:`displacement` (n, n_nodes, 3) [m].
         """
         stress = self.stress @ u.reshape(len(u), -1).T
         return np.asarray(stress.T).reshape(len(u), -1, 6)
@@ -100,9 +101,12 @@ def condense_segment(
         position: Positions of all masters of the strip (n, 3) [m].
         youngs_modulus: Young's modulus [Pa].
         poisson_ratio: Poisson's ratio [-].
-        loaded: Degrees of freedom at which forces may act (n_b,); None for none.
-        spread: Matrix S of :class:`StripSegment`; None if forces are not spread.
-        held: Fixed nodes in addition to the boundary; None for none.
+        loaded: Degrees of freedom at which forces may act (n_b,); None if there are
+            none.
+        spread: Matrix S of :class:`StripSegment` (n_b, n_b); None if the forces are not
+            spread.
+        held: Numbers of nodes that are fixed in space, in addition to those that follow
+            the masters; None if there are none.
     """
     body = solid(mesh.mesh, youngs_modulus, poisson_ratio)
     return _condensed(mesh, body, masters, position, loaded, spread, held)
@@ -146,8 +150,8 @@ def _condensed(
     stiffness += pull.T @ solved[:, :n]
     stiffness = 0.5 * (stiffness + stiffness.T)
     if held is None:
-        # strips move a thousand times more than they deform: rigid translation must
-        # cause no force to the last digit, not only to the accuracy of the solver
+        # strips move a thousand times more than they deform: a rigid translation must
+        # cause no forces within rounding, not only within the accuracy of the solver
         count = n // 3
         move = np.tile(np.eye(3), (count, 1)) / np.sqrt(count)
         strain = np.eye(n) - move @ move.T

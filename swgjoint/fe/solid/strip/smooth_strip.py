@@ -26,9 +26,10 @@ from swgjoint.units import mm
 
 
 def smooth_strip(design: Design) -> StripMesh:
-    """Strip whose first segment is the rim without its tooth.
+    """Mesh a strip whose first segment is the rim without its tooth.
 
-    The rows of elements are those of the toothed strip, so that the same cup joins it.
+    The lower rim has the rows of elements of the toothed strip, so that the same cup
+    can be joined to it.
     """
     n, rim = design.mesh.refinement, design.flexspline.rim_mm * mm
     side = refine_count(BORE, n)

@@ -21,18 +21,21 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Strip:
-    """One condensed tooth sector of the flexspline; the teeth are the first segment.
+    """One condensed tooth sector of the flexspline.
 
-    Forces act at flank nodes, plane after plane, right flank before left flank, and
-    then at bore nodes, plane after plane. All of them are spread over a part of the
-    face width.
+    Forces act at the flank nodes, plane after plane with the right flank before the
+    left one, and then at the bore nodes, plane after plane. All of them are spread over
+    patches of a fixed axial length.
     """
 
     sectors: int
+    """Number of sectors in the whole flexspline."""
     mesh: StripMesh
     masters: Masters
     segments: tuple[StripSegment, ...]
+    """Condensed segments, the toothed one first."""
     profile: ToothProfile
+    """Tooth profile of the flexspline."""
 
     @property
     def teeth(self) -> StripSegment:
@@ -46,12 +49,15 @@ class Strip:
 
     @property
     def planes(self) -> int:
-        """Number of mesh planes over the face width."""
+        """Number of planes of nodes over the face width."""
         return len(self.mesh.teeth.z)
 
     @cached_property
     def spline(self) -> CubicSpline:
-        """Weights of the flank nodes of a plane as functions of the arc length."""
+        """Weights of the nodes of a flank in its averaged displacement.
+
+        They are functions of the arc length [m] along the profile.
+        """
         return average_spline(self.mesh.teeth.plane.flank_stations[:-1])
 
     @property
@@ -61,13 +67,13 @@ class Strip:
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Range of arc length over which a flank can touch, between the lands [m]."""
+        """Range of arc length in which a flank can touch, between the lands [m]."""
         low, high = self.profile.contact_range
         return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
 
     @cached_property
     def flank(self) -> Array:
-        """Reference positions of the flank nodes (n_planes, 2 n_b, 3) [m]."""
+        """Reference positions of the nodes of both flanks (n_planes, 2 n_b, 3) [m]."""
         points = np.asarray(self.mesh.teeth.segment.mesh.p).T
         return np.ascontiguousarray(points[self.mesh.teeth.flank])
 
@@ -89,9 +95,10 @@ def flexspline(
 
     Args:
         design: The drive.
-        profile: Flank of the flexspline.
+        profile: Tooth profile of the flexspline.
         mesh: Mesh of :func:`swgjoint.fe.solid.strip.mesh.flexspline_strip`.
-        orders: Polynomial degrees of the displacements of faces and sections.
+        orders: Polynomial degrees of the displacements of faces and sections; None for
+            the default degrees.
     """
     masters = strip_masters(mesh, orders)
     material = design.material_of("flexspline")
