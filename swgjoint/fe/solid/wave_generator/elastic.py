@@ -1,21 +1,22 @@
 r"""Cup on an elastic wave generator: lobe force, deflection and tooth clearance.
 
-An elastic wave generator presses its lobes outward with springs instead of setting
-their height. With the deflection w of a lobe, the height :math:`w_0` of the lobes of
-the drive, the stiffness k and the force :math:`F_0` of a lobe at that height,
+An elastic wave generator does not prescribe the height of its lobes but presses them
+outward with springs. The force F of a lobe follows from its deflection w, the lobe
+height :math:`w_0` of the drive, the stiffness k of the springs and their force
+:math:`F_0` at that height. Without tooth contact the cup balances it:
 
 .. math:: F = F_0 + k\,(w_0 - w) = F_{cup}(w).
 
-:math:`F_{cup}` is the force of two opposite loads with large rotations
+:math:`F_{cup}` is the force of two opposite radial loads on a cup with large rotations
 (:mod:`swgjoint.fe.solid.figures.pinched_cup`); to first order it is the radial
-stiffness times w. The limit :math:`k \to \infty` is a rigid wave generator, k = 0 a
-soft one with preload.
+stiffness times w. In the limit :math:`k \to \infty` the wave generator is rigid; with
+k = 0 its force is constant.
 
-The play of the teeth is the rotation of the unloaded output between the contacts of its
-two directions, with undeformed teeth. It decreases as w increases. Beyond the take-up
-deflection, at which it vanishes, the teeth carry the force of the springs in excess of
-:math:`F_{cup}` (:mod:`swgjoint.fe.solid.wave_generator.lobe_pads`, with an elastic
-circular spline).
+The play of the teeth is the angle by which the unloaded output can rotate between tooth
+contact in both directions, with undeformed teeth. It decreases as w increases and is
+zero at the take-up deflection. Beyond it the teeth carry the part of the spring force
+that exceeds :math:`F_{cup}` (:mod:`swgjoint.fe.solid.wave_generator.lobe_pads`, with an
+elastic circular spline).
 """
 
 from __future__ import annotations
@@ -44,40 +45,43 @@ HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
 """Approximate deflections at which the cup is solved, in lobe heights of the drive [-].
 """
 BEYOND = (0.02, 0.05, 0.1, 0.15)
-"""Deflections beyond the take-up at which teeth are solved, in lobe heights [-]."""
+"""Deflections beyond the take-up at which tooth contact is solved, in lobe heights of
+the drive [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ElasticWaveGenerator:
-    """Springs behind two lobes."""
+    """Springs that press two lobes outward."""
 
     stiffness: float
-    """Stiffness of each lobe, infinite if rigid [N/m]."""
+    """Stiffness k of the spring of each lobe [N/m]; infinite for a rigid wave
+    generator."""
     preload: float
-    """Force of each lobe at the lobe height of the drive [N]; unused if rigid."""
+    """Spring force of each lobe at the lobe height of the drive [N]; unused for a rigid
+    wave generator."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkingPoint:
-    """Equilibrium of an elastic wave generator and a cup without torque."""
+    """Equilibrium of an elastic wave generator and a cup without output torque."""
 
     deflection: float
     """Outward deflection of a lobe [m]."""
     force: float
     """Force of a lobe [N]."""
     on_teeth: float
-    """Part of the force that presses the teeth into the tooth spaces [N]."""
+    """Part of this force that the teeth carry [N]; zero before the take-up."""
     play: float
-    """Play of the output [rad]; zero if the teeth are pressed, NaN if the lobes are so
-    low that teeth next to them overlap."""
+    """Play of the output [rad]; zero from the take-up on, NaN if the lobes are so low
+    that teeth next to them overlap."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LobeCharacteristic:
-    """Force and play of a cup over the deflection of two lobes."""
+    """Force of two opposite lobes on a cup, and play of its teeth, over deflection."""
 
     height: float
-    """Height of the lobes of the drive [m]."""
+    """Lobe height of the drive [m]."""
     deflection: Array
     """Deflections of a lobe, increasing from zero (n,) [m]."""
     force: Array
@@ -86,25 +90,26 @@ class LobeCharacteristic:
     """Play of the output (n,) [rad], see :mod:`swgjoint.fe.solid.figures.tooth_play`.
     """
     pressed_deflection: Array
-    """Deflections from the take-up on (m,) [m]; empty without a take-up."""
+    """Deflections with tooth contact, starting at the take-up (m,) [m]; empty if the
+    play does not vanish."""
     pressed_force: Array
-    """Parts of the force of a lobe that the teeth carry at these deflections,
-    increasing from zero (m,) [N]."""
+    """Part of the force of a lobe that the teeth carry at these deflections, increasing
+    from zero (m,) [N]."""
 
     def force_at(self, deflection: float) -> float:
-        """Force of a lobe without tooth contact [N].
+        """Force of a lobe without tooth contact [N] at a deflection [m].
 
         Raises:
-            InputError: If the deflection [m] is outside the range that was solved.
+            InputError: If the deflection is outside the solved range.
         """
         self._check(deflection)
         return float(CubicSpline(self.deflection, self.force)(deflection))
 
     def deflection_at(self, force: float) -> float:
-        """Deflection of a lobe without tooth contact [m].
+        """Deflection of a lobe without tooth contact [m] under a force [N].
 
         Raises:
-            InputError: If the force [N] is outside the range that was solved.
+            InputError: If the force is outside the solved range.
         """
         if not self.force[0] <= force <= self.force[-1]:
             raise InputError(
@@ -113,7 +118,11 @@ class LobeCharacteristic:
         return float(CubicSpline(self.force, self.deflection)(force))
 
     def play_at(self, deflection: float) -> float:
-        """Play of the output [rad]; NaN outside the deflections with a finite play."""
+        """Play of the output [rad] at a deflection [m]; NaN where it is not finite.
+
+        Raises:
+            InputError: If the deflection is outside the solved range.
+        """
         self._check(deflection)
         finite = np.isfinite(self.play)
         w, play = self.deflection[finite], self.play[finite]
@@ -123,7 +132,10 @@ class LobeCharacteristic:
 
     @property
     def take_up(self) -> float:
-        """Deflection at which the play vanishes [m]; infinite if beyond the range."""
+        """Take-up deflection, at which the play vanishes [m].
+
+        It is infinite if the play does not vanish within the solved range.
+        """
         finite = np.isfinite(self.play)
         w, play = self.deflection[finite], self.play[finite]
         free = np.flatnonzero(play > 0.0)
@@ -134,17 +146,17 @@ class LobeCharacteristic:
         return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
 
     def tooth_force_at(self, deflection: float) -> float:
-        """Part of the force of a lobe that the teeth carry [N].
+        """Part of the force of a lobe that the teeth carry [N] at a deflection [m].
 
         Raises:
-            InputError: If the deflection [m] is outside the range that was solved.
+            InputError: If the deflection is outside the solved range.
         """
         self._check(deflection)
         if not deflection > self.take_up:
             return 0.0
         if deflection > self.highest:
             raise InputError(
-                f"deflection = {deflection / mm:.4g} mm: expected at most"
+                f"lobe deflection = {deflection / mm:.4g} mm: expected at most"
                 f" {self.highest / mm:.4g} mm with teeth in contact"
             )
         through = PchipInterpolator(self.pressed_deflection, self.pressed_force)
@@ -152,7 +164,7 @@ class LobeCharacteristic:
 
     @property
     def highest(self) -> float:
-        """Largest deflection with known forces of lobe and teeth [m]."""
+        """Largest deflection for which the forces of cup and teeth are known [m]."""
         last = float(self.deflection[-1])
         if isinf(self.take_up):
             return last
@@ -162,7 +174,7 @@ class LobeCharacteristic:
         """Equilibrium of springs, cup and teeth.
 
         Raises:
-            InputError: If the equilibrium is outside the range that was solved.
+            InputError: If the equilibrium is outside the solved range.
         """
         k, w = generator.stiffness, self.height
         if not isinf(k):
@@ -191,8 +203,8 @@ class LobeCharacteristic:
         low, high = self.deflection[0], self.deflection[-1]
         if not low <= deflection <= high:
             raise InputError(
-                f"deflection = {deflection / mm:.4g} mm: expected {low / mm:.4g} to"
-                f" {high / mm:.4g} mm"
+                f"lobe deflection = {deflection / mm:.4g} mm: expected"
+                f" {low / mm:.4g} to {high / mm:.4g} mm"
             )
 
 
@@ -203,7 +215,9 @@ def lobe_characteristic(
     heights: Sequence[float] = HEIGHTS,
     progress: Progress = silent,
 ) -> LobeCharacteristic:
-    """Force and play of a design's flexspline pressed apart by two lobes.
+    """Compute force and play of a flexspline that two opposite lobes press outward.
+
+    Deflections beyond the take-up for which no equilibrium is found are omitted.
 
     Args:
         design: The drive, with a ``[cup]``.
@@ -221,7 +235,7 @@ def lobe_characteristic(
     cup, height = cup_of(model, design), lobe_height(design)
     stiffness = cup.pull(1.0, place).stiffness
     total = len(heights) + len(BEYOND)
-    rows = [(0.0, 0.0, nan)]  # undeflected, the teeth of every drive overlap
+    rows = [(0.0, 0.0, nan)]  # without deflection the teeth of every drive overlap
     for k, share in enumerate(heights):
         pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
         frame = cup.frames(pulled.masters, nonlinear=True)[0]
@@ -259,7 +273,7 @@ def lobe_characteristic(
 
 
 def cup_of(model: SolidSectorModel, design: Design) -> PinchedCup:
-    """The flexspline of a half model, with loads on its bore.
+    """Cup that consists of the condensed flexspline of a half model.
 
     Args:
         model: Half model of the drive.

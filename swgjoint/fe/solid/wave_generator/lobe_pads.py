@@ -1,9 +1,10 @@
-"""Two opposite pads in the bore that prescribe a lobe height against the teeth.
+"""Two opposite pads in the bore that prescribe the lobe height with teeth in contact.
 
-Prescribed loads leave the deflection free, so that touching teeth would only limit it.
-A pad over one pitch of the bore prescribes the deflection that the loads cause in every
-plane, and the solver of the drive finds the contacts. The teeth carry the difference of
-the pad's force with and without them.
+If forces were prescribed instead, contact of the teeth would reduce the deflection.
+Each pad covers one pitch of the bore and prescribes in every plane the deflection that
+the forces of two lobes cause without tooth contact. The solver of the drive then finds
+the contacts. The force that the teeth carry is the difference between the forces of a
+pad with and without tooth contact.
 """
 
 from __future__ import annotations
@@ -21,30 +22,30 @@ from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 from swgjoint.typing import Array
 
 NEAR = 0.49
-"""Half of the width of a pad, which covers the nodes of one tooth [pitches]."""
+"""Half of the width of a pad [pitches]; the pad covers the bore nodes of one tooth."""
 AWAY = 1.0
-"""Gap outside the pads [m]."""
+"""Gap of points outside the pads [m]; any value that prevents contact would do."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LobePads(WaveGeneratorSurface):
-    """Two cylindrical pads on the y axis in the planes of a load."""
+    """Two cylindrical pads on the y axis, in the mesh planes that carry a load."""
 
     planes: Array
     """Coordinates z of the loaded planes (n,) [m]."""
     radius: Array
     """Radii of the pads in these planes, from the axis of the drive (n,) [m]."""
     half: float
-    """Half of the width of a pad [m]."""
+    """Half of the width of a pad along x [m]."""
     reach: float
-    """Half of the length of a pad in each plane, along z [m]."""
+    """Half of the length of a pad along z on either side of each plane [m]."""
 
     def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
-        """Gap, its gradient and curvature, see :meth:`WaveGeneratorSurface.gap`.
+        """Gap, its gradient and curvature, as in :meth:`WaveGeneratorSurface.gap`.
 
         Args:
             points: Positions in the global frame (n, 3) [m].
-            alpha: Angle of the wave generator [rad]; ignored, the pads are at zero.
+            alpha: Angle of the wave generator [rad]; unused, the pads do not rotate.
         """
         x, y, z = points.T
         radius = np.hypot(x, y)
@@ -58,17 +59,17 @@ class LobePads(WaveGeneratorSurface):
 def with_pads(
     model: SolidSectorModel, share: Array, deflection: Array
 ) -> SolidSectorModel:
-    """The drive with pads instead of its wave generator.
+    """The same model with pads instead of its wave generator.
 
     Args:
         model: Half model of the drive.
-        share: Part of the load in every plane (n_planes,) [-], see
+        share: Share of the load in every plane (n_planes,) [-], see
             :meth:`swgjoint.fe.solid.figures.pinched_cup.PinchedCup.share`.
         deflection: Deflection of the lobe in every plane (n_planes,) [m].
     """
     bore = float(np.hypot(model.strip.bore[:, 0], model.strip.bore[:, 1]).min())
     z, loaded = model.strip.mesh.teeth.z, share > 0.0
-    # contact acts on displacements averaged over a part of the width
+    # contact acts on displacements that are averaged over patches
     deflection = spread_forces(z, 1).T @ deflection
     pads = LobePads(
         outline=model.wave_generator.outline,
@@ -90,7 +91,7 @@ def force_on_teeth(
     Args:
         model: Half model of the drive.
         ratio: Signed ratio i [-].
-        share: Part of the load in every plane (n_planes,) [-].
+        share: Share of the load in every plane (n_planes,) [-].
         deflection: Deflection of the lobe in every plane (n_planes,) [m].
 
     Raises:
@@ -104,10 +105,10 @@ def force_on_teeth(
 
 
 def pad_force(model: SolidSectorModel, state: SolidState) -> float:
-    """Outward force of a pad on the half model [N].
+    """Outward force of one pad on the flexspline [N].
 
     Args:
-        model: Half model with pads.
+        model: Half model with pads, which contains one pad.
         state: Its equilibrium.
     """
     turn = model.frames(state)[0].turn

@@ -1,18 +1,18 @@
-"""The 3D bearing of the wave generator: its outer race on its balls.
+"""The bearing of the wave generator in 3D: its outer race on its balls.
 
-In its plane the race bends and stretches like the nonlinear ring of
-:mod:`swgjoint.fe.rings`, on Hertz balls with clearance on the cam. Its outside
-(:mod:`swgjoint.fe.solid.wave_generator.race_outside`) is straight over its width and
-rolls about the circumferential direction
-(:mod:`swgjoint.fe.solid.wave_generator.race_roll`), by u(s) at its edges.
+In its plane the race bends and stretches as the nonlinear ring of
+:mod:`swgjoint.fe.rings`. It rests on balls in Hertzian contact, with clearance, on the
+cam. The outside of the race (:mod:`swgjoint.fe.solid.wave_generator.race_outside`) is
+straight over its width. Its sections roll about the circumferential direction
+(:mod:`swgjoint.fe.solid.wave_generator.race_roll`), which displaces the edges by u(s).
 
 All balls are assumed to roll in the middle plane of race and face width, in grooves
-that transmit no moment about the circumferential direction. Along the axis the grooves
-leave the race free (normal clearances allow tenths of a millimetre, and the race may
-warp) or hold it (no warping, and sixteen times the roll stiffness at two lobes). These
-are two bounds. The axial motion does not shift the outside. A slope of the wave
-generator does not apply to the race, which adopts the slope of the bore; a crown is
-ground on its outside.
+that transmit no moment about the circumferential direction. Two bounds are available
+for the axial motion. A free race may warp, since normal clearances allow tenths of a
+millimetre. A held race cannot warp, and its roll stiffness with two lobes is sixteen
+times as large. The axial motion does not shift the outside. The slope of the wave
+generator does not apply, because the race adopts the slope of the bore. The crown of
+the wave generator is ground on the outside of the race.
 """
 
 from __future__ import annotations
@@ -31,32 +31,43 @@ from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array, Mask
 
 KINDS = ("x", "y", "roll", "axial")
-"""Coordinates of a node: values, then derivatives by the parameter of an element."""
+"""Functions along the race; a node has their values and then their derivatives by the
+parameter of an element."""
 NODE = 2 * len(KINDS)
+"""Number of coordinates of a node."""
 SIGN = np.tile([-1.0, -1.0, 1.0, 1.0], 2)
-"""Factors that close half a ring."""
-# of both nodes of an element: value and derivative, first and last
+"""Factors on the coordinates of a node where half a race closes."""
+# coordinates of an element: values and derivatives at its first node, then at its last
 PLANE = np.array([0, 1, 4, 5, 8, 9, 12, 13])
 ROLL = np.array([2, 6, 10, 14])
 AXIAL = np.array([3, 7, 11, 15])
 ANCHOR = 1e-11
-"""Stiffness added to every step against unconstrained motions, relative to the largest
-one [-]. At 1e-9 the race of size 25 and ratio 100 halved its error at every step."""
+"""Stiffness added to the tangent against unconstrained motions, relative to its largest
+entry [-]. It slows Newton's method: with 1e-9 an iteration only halved the error of the
+race of size 25 and ratio 100."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidRace:
-    """Outer race, balls and cam around the sectors of a model.
+    """Outer race, balls and cam, with one element of the race per sector of a model.
 
-    Coordinates form an array (sectors, 2, 4) [m] of nodes at the first faces of the
-    sectors, value or derivative, and x and y of the mean line, u or w.
+    The coordinates of the race are an array (sectors, 2, 4) [m]. Its axes are the
+    nodes, which are on the first faces of the sectors; value and derivative by the
+    parameter of the element; and x and y of the mean line, the roll displacement u of
+    the edges and the axial displacement w.
     """
 
     on_balls: RaceOnBalls
+    """The race in its plane, with balls and cam."""
     half: bool
+    """Whether the model is half of the race; rotated by 180 deg it is the other half.
+    """
     outside: RaceOutside
+    """Outer surface of the race."""
     roll: RaceRoll
+    """Out-of-plane stiffness of the race."""
     axially_free: bool = True
+    """Whether the grooves leave the race free along the axis."""
     phase: float = 0.0
     """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
 
@@ -95,12 +106,15 @@ class SolidRace:
         return self.outside.covers(z)
 
     def initial_guess(self, alpha: float, rotation: float, closed: float) -> Array:
-        """Start of a search: a race deflected by the lobes and pressed on their balls.
+        """Approximate coordinates of the deflected race (sectors, 2, 4) [m].
+
+        The race has two lobes that are 1 % higher than on unloaded balls, and it rolls
+        with the coning of the bore.
 
         Args:
             alpha: Wave-generator angle [rad].
             rotation: Rotation of race and flexspline [rad].
-            closed: Coordinate z at which the coned bore meets the undeformed one [m].
+            closed: Coordinate z at which the coned wall is not deflected [m].
         """
         on_balls = self.on_balls
         w0 = 1.01 * (on_balls.lobe_height + 0.5 * on_balls.bearing.clearance)
@@ -115,14 +129,14 @@ class SolidRace:
 
     @property
     def _still(self) -> Array:
-        """Undeformed coordinates of every node in the frame of its tooth (2, 4) [m]."""
+        """Undeformed coordinates of a node in the frame of its sector (2, 4) [m]."""
         still = np.zeros((2, len(KINDS)))
         still[:, :2] = self.on_balls.race.reference[0]
         still[:, :2] = rotate(still[:, :2], -0.5 * self.pitch)
         return still
 
     def displacements(self, race: Array, rotation: float) -> Array:
-        """Displacements of the nodes in frames that rotate with the flexspline.
+        """Displacements of the nodes in the rotated frames of the teeth (N, 2, 4) [m].
 
         Args:
             race: Coordinates (N, 2, 4) [m].
@@ -133,10 +147,10 @@ class SolidRace:
         return np.concatenate([flat, race[..., 2:]], axis=-1) - self._still
 
     def coordinates(self, displaced: Array, rotation: float) -> Array:
-        """Coordinates (N, 2, 4) [m], the inverse of :meth:`displacements`.
+        """Coordinates in the global frame, the inverse of :meth:`displacements`.
 
         Args:
-            displaced: Displacements in the frames of the teeth (N, 2, 4) [m].
+            displaced: Displacements in the rotated frames of the teeth (N, 2, 4) [m].
             rotation: Rotation of the flexspline [rad].
         """
         race = displaced + self._still
@@ -145,7 +159,7 @@ class SolidRace:
         return np.concatenate([flat, race[..., 2:]], axis=-1)
 
     def elements(self, race: Array) -> Array:
-        """Coordinates of both nodes of the elements (N, 16)."""
+        """Coordinates of both nodes of every element (N, 16) [m]."""
         nodes = race.reshape(len(race), NODE)
         last = np.roll(nodes, -1, axis=0)
         if self.half:
@@ -153,7 +167,7 @@ class SolidRace:
         return np.concatenate([nodes, last], axis=1)
 
     def forces(self, race: Array, alpha: float) -> RaceForces:
-        """Forces of race and balls.
+        """Forces, tangent and energy of race and balls.
 
         Args:
             race: Coordinates (N, 2, 4) [m].
@@ -203,14 +217,18 @@ class SolidRace:
         )
 
     def _feet(self, race: Array, alpha: float) -> Array:
-        """Approximate feet of the balls on the race, element number plus parameter."""
+        """Approximate positions of the balls along the race, in elements (balls,)."""
         centre = self.on_balls.balls(alpha, self.phase)[0]
         angle = np.arctan2(-centre[:, 0], centre[:, 1])
         begin = np.arctan2(-race[0, 0, 0], race[0, 0, 1])
         return np.asarray(np.mod(angle - begin, 2.0 * pi) / self.pitch)
 
     def _fixed(self, race: Array) -> Mask:
-        """Mask of fixed coordinates: node 0 prevents rotation and axial motion."""
+        """Mask of fixed coordinates (N, 16).
+
+        One coordinate of node 0 prevents the rotation of the race and another one its
+        axial motion. In a held race all axial coordinates are fixed.
+        """
         fixed = np.zeros((len(race), 2 * NODE), dtype=bool)
         x, y = race[0, 0, :2]
         first = [0 if abs(y) > abs(x) else 1, 3]
@@ -225,12 +243,12 @@ class SolidRace:
 
         Args:
             race: Coordinates (N, 2, 4) [m].
-            points: Points of every sector in the global frame (N, b, 3) [m].
-            start: Initial guess of their parameters on the elements (b,).
+            points: Bore nodes of every sector in the global frame (N, b, 3) [m].
+            start: Initial guess of their parameters on the elements, 0 to 1 (b,) [-].
 
         Returns:
-            Gap (N, b) [m], derivatives by the points (N, b, 3) and by the coordinates
-            of both nodes of the elements (N, b, 16).
+            Gap (N, b) [m], and its derivatives by the points (N, b, 3) [-] and by the
+            coordinates of both nodes of the elements (N, b, 16) [-].
         """
         elements = self.elements(race)
         line = elements[:, PLANE].reshape(-1, 4, 2)

@@ -1,10 +1,12 @@
 r"""Outer surface of the wave generator's outer race, which supports the rim's bore.
 
-The surface is straight over its width except for a crown c, and rolls by u at its
-edges. With z from its middle, the gap of a bore at a distance d from the mean line of a
-race of thickness t and width b is
+The surface is straight over its width except for a crown of depth c(z). Roll of the
+race moves its edge at z = b/2 outward by u and the other edge inward. A point of the
+bore at a distance d from the mean line of a race of thickness t and width b has the gap
 
-.. math:: g = d - \tfrac12 t + c(z) - \frac{2z}{b}\,u .
+.. math:: g = d - \tfrac12 t + c(z) - \frac{2z}{b}\,u ,
+
+where z is measured from the middle of the race.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from swgjoint.units import mm, um
 
 @dataclass(frozen=True, kw_only=True)
 class RaceOutside:
-    """Surface that supports the bore, in SI units."""
+    """Outer surface of the race."""
 
     thickness: float
     """Thickness t of the race [m]."""
@@ -57,17 +59,18 @@ class RaceOutside:
     ) -> tuple[Array, ...]:
         """Gap of points to the outside, and its derivatives.
 
+        The cubic of an element is extrapolated to points beyond its ends.
+
         Args:
-            line: Mean line: values and derivatives by the parameter at both nodes of
-                the elements, in x and y (N, 4, 2) [m].
+            line: Mean line by element: x and y of value and derivative by the parameter
+                at the first node, then at the last node (N, 4, 2) [m].
             edge: Roll displacements u in the same order (N, 4) [m].
             points: Points of every sector in the global frame (N, b, 3) [m].
-            start: Initial guess of their parameters on the elements (b,).
+            start: Initial guess of their parameters on the elements, 0 to 1 (b,) [-].
 
         Returns:
-            Gap (N, b) [m], derivatives by the points (N, b, 3), by the mean line
-            (N, b, 4, 2) and by u (N, b, 4). The cubic of an element is extended to
-            points beyond its ends.
+            Gap (N, b) [m], and its derivatives by the points (N, b, 3), by the mean
+            line (N, b, 4, 2) and by u (N, b, 4) [-].
         """
         flat, z = points[..., :2], points[..., 2]
         xi = np.broadcast_to(start, z.shape).copy()
@@ -91,7 +94,7 @@ class RaceOutside:
         rolls = np.einsum("sba,sa->sb", first, edge) / (length * spread)
         lowered, by_z = crown(z, self.crowning, self.face_width, circular=self.circular)
         gap = distance - 0.5 * self.thickness + lowered - lever * roll
-        # along the outside: the foot moves by u_t + d beta
+        # roll varies along the race: the foot of a point moves by u_t + d beta
         along = (lever * rolls)[..., None]
         by_point = np.empty(points.shape)
         by_point[..., :2] = normal - along * tangent

@@ -24,25 +24,26 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RaceRoll:
-    """Out-of-plane stiffness of the elements of a ring, in SI units."""
+    """Out-of-plane stiffness of the elements of a race."""
 
     model: HermiteRing
+    """The race in its plane, with radius r of the mean line."""
     width: float
     """Width b of the race [m]."""
     rolling: float
-    """Out-of-plane bending stiffness E I_z [N m^2]."""
+    """Out-of-plane bending stiffness E I_z [N·m²]."""
     twisting: float
-    """Torsional stiffness G J [N m^2]."""
+    """Torsional stiffness G J [N·m²]."""
 
     @classmethod
     def from_bearing(cls, bearing: BallBearing, model: HermiteRing) -> RaceRoll:
-        """Out-of-plane stiffness of a bearing's race.
+        """Out-of-plane stiffness of the outer race of a bearing.
 
-        The groove reduces J but not I_z.
+        The groove is assumed to reduce J but not I_z.
 
         Args:
             bearing: The bearing.
-            model: Its outer race in the plane.
+            model: The outer race in its plane.
         """
         t, b, steel = bearing.race_thickness, bearing.race_width, bearing.material
         torsion = bearing.groove_inertia_factor * b * t**3 / 3.0 * (1.0 - 0.63 * t / b)
@@ -56,7 +57,10 @@ class RaceRoll:
 
     @cached_property
     def stiffness(self) -> Array:
-        """Stiffness of an element for u and w of its nodes (8, 8) [N/m]."""
+        """Stiffness of an element for u, then w, at both nodes (8, 8) [N/m].
+
+        Each has value and derivative at the first node, then at the last node.
+        """
         points, weights = np.polynomial.legendre.leggauss(4)
         value, first, second = hermite(0.5 * (points + 1.0))
         h, r, per_u = self.model.step, self.model.radius, 2.0 / self.width

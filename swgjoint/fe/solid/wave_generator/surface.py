@@ -1,11 +1,11 @@
 r"""Surface of the wave generator over the face width: crowning and slope.
 
 Crowning lowers the surface towards both edges by :math:`c (2 z/b)^2` (parabolic) or by
-a circular arc through the same points. Slope raises the edge at the open end (z < 0) by
-s at the major axis and lowers it at the minor axis, :math:`-s\,(2 z/b) \cos 2\varphi`.
-With positive s the surface follows the cone of the deflected cup (thesis figure 7.27;
-the description of its figure 7.33 has the opposite sign). There is no surface beyond
-the edges.
+a circular arc with the same depth c at the edges. A slope s raises the surface by
+:math:`-s\,(2 z/b) \cos 2\varphi`: by s at the major axis of the open end (z < 0), and
+by -s at its minor axis. With positive s the surface follows the coning of the deflected
+cup (thesis figure 7.27; the description of figure 7.33 in the thesis has the opposite
+sign). The surface supports the bore only over the face width.
 """
 
 from __future__ import annotations
@@ -53,14 +53,15 @@ class WaveGeneratorSurface:
         )
 
     def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
-        """Gap, its gradient and its curvature along the outline.
+        """Gap of points to the surface, its gradient and its curvature.
 
         Args:
             points: Positions in the global frame (n, 3) [m].
             alpha: Angle of the wave generator [rad].
 
         Returns:
-            Gap (n,) [m], gradient (n, 3), curvature (n,) [1/m].
+            Gap (n,) [m], its gradient in the global frame (n, 3) [-], and curvature of
+            the curve parallel to the outline through each point (n,) [1/m].
         """
         flat = rotate(points[:, :2], -alpha)
         if self.offset is not None:
@@ -94,8 +95,8 @@ def crown(
         z: Positions from the middle of the face width (n,) [m].
         height: Depth at the edges [m].
         width: Face width [m].
-        circular: Whether the crown is a circular arc through the same points instead of
-            a parabola.
+        circular: Whether the crown is a circular arc instead of a parabola with the
+            same depth at the edges.
     """
     if not height:
         return np.zeros_like(z), np.zeros_like(z)
