@@ -1,1 +1,1 @@
-"""Figures of the 3D model: fatigue, radial stiffness, torsion, load cases."""
+"""Figures from the 3D model: fatigue, radial stiffness, torsion, coning, tooth play."""

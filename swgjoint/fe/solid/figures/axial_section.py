@@ -1,8 +1,9 @@
 """Axial sections of the deflected flexspline and the coning of its teeth.
 
-A cup held at its boss cannot follow the wave generator equally at both ends of its
-teeth: the open edge moves farther than the closed edge. Sections pass through the axes
-of the teeth closest to the major and the minor axis.
+Since the cup is held at its boss, its teeth do not follow the wave generator equally at
+both edges of the face width: the open edge moves farther than the closed edge. This is
+called coning. The sections pass through the axes of the teeth closest to the major and
+the minor axis.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
 ON_AXIS = 1e-9
-"""Distance from the section plane below which a node is in it [m]."""
+"""Distance from the section plane up to which a node counts as in it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AxialSection:
-    """One segment cut through the axis of a tooth."""
+    """Axial section of one segment through the axis of its tooth."""
 
     cells: Index
-    """Point numbers of the section's quadrilaterals (n_cells, 4)."""
+    """Quadrilaterals of the section as indices of its points (n_cells, 4)."""
     rest: Array
     """Coordinate z and radius of the undeformed points (n, 2) [m]."""
     moved: Array
-    """Coordinate z and radius of the deflected points (n, 2) [m]."""
+    """Coordinate z and radius of the displaced points (n, 2) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +46,7 @@ class Coning:
     """Outward displacement at the tooth closest to the minor axis (n_planes,) [m]."""
 
     def to_json(self) -> dict[str, dict[str, float]]:
-        """Displacements of both edges at both axes [mm]."""
+        """Displacements of both edges at the major and the minor axis [mm]."""
         return {
             axis: {"open_edge": float(u[0]) / mm, "closed_edge": float(u[-1]) / mm}
             for axis, u in (("major", self.major), ("minor", self.minor))
@@ -53,7 +54,7 @@ class Coning:
 
 
 def axis_sectors(model: SolidSectorModel, state: SolidState) -> tuple[int, int]:
-    """Sectors whose teeth are closest to the major and the minor axis.
+    """Numbers of the sectors closest to the major axis and to the minor axis.
 
     Args:
         model: The 3D model.
@@ -68,7 +69,7 @@ def axis_sectors(model: SolidSectorModel, state: SolidState) -> tuple[int, int]:
 def sector_points(
     model: SolidSectorModel, state: SolidState, sector: int
 ) -> list[Array]:
-    """Deflected nodes of a sector's segments in the global frame, each (n, 3) [m].
+    """Displaced nodes of a sector by segment, each in the global frame (n, 3) [m].
 
     Args:
         model: The 3D model.
@@ -89,7 +90,7 @@ def sector_points(
 def axial_sections(
     model: SolidSectorModel, state: SolidState, sector: int
 ) -> tuple[AxialSection, ...]:
-    """All segments of a sector, cut through the axis of its tooth.
+    """Axial sections of all segments of a sector through the axis of its tooth.
 
     Args:
         model: The 3D model.
@@ -115,7 +116,7 @@ def axial_sections(
 
 
 def coning(model: SolidSectorModel, state: SolidState) -> Coning:
-    """Radial displacement of the bore along the face width at both axes.
+    """Evaluate the coning at the major and the minor axis.
 
     Args:
         model: The 3D model.

@@ -1,15 +1,16 @@
 r"""Fatigue of the flexspline from the stresses of a 3D equilibrium.
 
-A point of the flexspline passes all phases of the wave generator in half a turn. At one
-position of the wave generator the corresponding points of all sectors are at these
-phases, so that together they give the stress history of one point. Teeth are in contact
-at as many phases of the mesh.
+A point of the flexspline passes all phases of the wave generator in half a turn. At a
+single position of the wave generator the corresponding points of all sectors are at
+different phases, so that their stresses together are the stress history of one point.
+Tooth contact is sampled in the same way.
 
-Nominal stress is that of the article's shell theory: in the section between two teeth,
-from the middle of the root land to the bore, it is the membrane and bending part of the
-stress (linearised over the wall) at the root. The article's stress concentration
-factors apply to it. For comparison, half of the largest range of the von Mises stress
-of the meshed fillet is reported without any factor.
+The assessment is that of the article "stress and fatigue", see
+:mod:`swgjoint.gear.shell_theory`. Its nominal stress is a shell stress, to which it
+applies stress concentration factors. Here the nominal stress is linearised over the
+wall between two teeth, from the middle of the root land to the bore: the sum of its
+membrane and bending parts at the root. For comparison, half of the largest range of the
+von Mises stress in the meshed root fillet is reported without any factor.
 """
 
 from __future__ import annotations
@@ -40,10 +41,12 @@ from swgjoint.units import MPa, mm
 
 @dataclass(frozen=True, kw_only=True)
 class FatigueLimits:
-    """Endurance limits of the material [Pa]."""
+    """Endurance limits of a material."""
 
     bending: float
+    """Endurance limit in reversed bending [Pa]."""
     torsion: float
+    """Endurance limit in reversed torsion [Pa]."""
 
     @classmethod
     def from_design(cls, design: Design) -> FatigueLimits:
@@ -68,15 +71,18 @@ class FatigueLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class SectionFatigue:
-    """Nominal stress over a turn at the root of one section."""
+    """Nominal stress at the root in one plane of the mesh, and its safety factor.
+
+    Amplitudes and means are those over a turn of the wave generator.
+    """
 
     z: float
-    """Coordinate z of the section, zero in the middle of the face width [m]."""
+    """Coordinate z of the plane, zero in the middle of the face width [m]."""
     normal_amplitude: float
     """Amplitude of the circumferential normal stress [Pa]."""
     normal_mean: float
-    """Mean of the circumferential normal stress, which the article's formulas omit
-    [Pa]."""
+    """Mean of the circumferential normal stress [Pa], which the formulas of the article
+    omit."""
     axial_amplitude: float
     """Amplitude of the axial normal stress [Pa]."""
     shear_amplitude: float
@@ -84,9 +90,10 @@ class SectionFatigue:
     shear_mean: float
     """Mean of the shear stress [Pa]."""
     safety: SafetyFactor
+    """Safety factors of the article for these stresses."""
 
     def to_json(self) -> dict[str, float]:
-        """Values in mm and MPa."""
+        """Coordinate [mm], stresses [MPa] and safety factors [-]."""
         return {
             "z_mm": self.z / mm,
             "normal_amplitude_MPa": self.normal_amplitude / MPa,
@@ -102,35 +109,38 @@ class SectionFatigue:
 
 @dataclass(frozen=True, kw_only=True)
 class Fatigue:
-    """Safety factors at one torque."""
+    """Fatigue of a flexspline at one torque."""
 
     torque: float
     """Output torque [N·m]."""
     sections: tuple[SectionFatigue, ...]
-    """Sections from the open edge to the back edge of the teeth."""
+    """Nominal stress by plane, from the open edge to the back edge of the teeth."""
     amplitude: Mapping[str, float]
-    """Half of the largest range of von Mises stress by part [Pa]; ``root`` is the
-    region between the teeth, ``root, mid-face`` its middle of the face width."""
+    """Half of the largest range of the von Mises stress by part [Pa]. The toothed
+    segment is evaluated up to 0.3 rim thicknesses above the root land, without the
+    upper parts of the teeth: ``root`` in all planes, ``root, mid-face`` in the plane
+    closest to the middle of the face width. Other parts are whole segments."""
     shell: SafetyFactor
-    """Safety factor of the closed forms."""
+    """Safety factors from the closed forms of the article alone."""
     limits: FatigueLimits
+    """Endurance limits of the material."""
 
     @property
     def worst(self) -> SectionFatigue:
-        """Section with the smallest safety factor."""
+        """Plane with the smallest combined safety factor."""
         return min(self.sections, key=lambda section: section.safety.combined)
 
     @property
     def middle(self) -> SectionFatigue:
-        """Section in the middle of the face width."""
+        """Plane closest to the middle of the face width."""
         return min(self.sections, key=lambda section: abs(section.z))
 
     def local(self, part: str) -> float:
-        """Bending limit over the amplitude of a part, without further factors [-]."""
+        """Bending limit divided by the amplitude of a part, without any factors [-]."""
         return self.limits.bending / self.amplitude[part]
 
     def to_json(self) -> dict[str, Any]:
-        """Worst and middle section, peaks of the meshed stress and closed forms."""
+        """Worst and middle plane, amplitudes of the meshed stress and closed forms."""
         return {
             "torque_Nm": self.torque,
             "worst_section": self.worst.to_json(),
@@ -148,16 +158,16 @@ class Fatigue:
 def fatigue(
     design: Design, torques: Sequence[float], *, progress: Progress = silent
 ) -> list[Fatigue]:
-    """Safety factors of a drive on its wave generator at several torques.
+    """Compute the fatigue of a drive on its rigid wave generator at several torques.
 
     Args:
         design: The drive, with a ``[cup]`` and endurance limits.
-        torques: Torques T that the drive exerts on the output, followed in this order
-            [N·m].
+        torques: Torques T of the output on its load, solved in this order [N·m].
         progress: Called after every equilibrium.
 
     Raises:
-        DesignError: If the design cannot be built or lacks endurance limits.
+        DesignError: If the design cannot be built, has features that the 3D model
+            lacks, or does not state both endurance limits.
         ComputationError: If a solve fails or the model does not fit in memory.
     """
     limits, shell = (
@@ -195,15 +205,15 @@ def assess(
     limits: FatigueLimits,
     shell: ShellDimensions,
 ) -> Fatigue:
-    """Safety factors from the stresses of all sectors.
+    """Assess the fatigue from the stresses of all sectors.
 
     Args:
         strip: Mesh of a sector.
         stresses: Stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6)
-            [Pa] in the sectors of half a turn or of a whole turn.
+            [Pa], in the sectors of half of the flexspline or of all of it.
         torque: Output torque [N·m].
         limits: Endurance limits of the material.
-        shell: Dimensions for the closed forms.
+        shell: Dimensions and material for the closed forms.
     """
     nominal = root_stress(strip, stresses[strip.teeth.segment.name])
     low, high = nominal.min(axis=0), nominal.max(axis=0)
@@ -246,11 +256,12 @@ def root_stress(strip: StripMesh, stress: Array) -> Array:
     .. math:: \sigma = \frac1h\int\sigma\,dr
         + \frac6{h^2}\int\sigma\,(r - \bar r)\,dr
 
-    integrated over the wall on the face of a sector and evaluated at its outer surface.
+    The integrals extend over the wall of thickness h on the first face of a sector, and
+    the result applies to the outer surface of the wall.
 
     Args:
         strip: Mesh of a sector.
-        stress: Stress of the toothed segment (N, n_nodes, 6) [Pa].
+        stress: Stress of the toothed segment in its frames (N, n_nodes, 6) [Pa].
 
     Returns:
         Circumferential, axial and shear stress (N, n_planes, 3) [Pa].
@@ -265,7 +276,7 @@ def root_stress(strip: StripMesh, stress: Array) -> Array:
     parts = np.stack(
         [x**2 * xx + y**2 * yy + 2.0 * x * y * xy, zz, x * zx + y * yz], axis=-1
     )
-    # from the outside to the bore: linear between the nodes
+    # trapezoidal rule from the outside to the bore
     height, middle = r[0] - r[-1], 0.5 * (r[0] + r[-1])
     step = -np.diff(r)
     weight = np.zeros_like(r)
@@ -298,7 +309,10 @@ def _amplitudes(strip: StripMesh, stresses: Mapping[str, Array]) -> dict[str, fl
 
 
 def half_range(stress: Array) -> Array:
-    """Half of the largest von Mises stress of the differences between two times [Pa].
+    """Half of the largest von Mises range of a periodic stress history [Pa].
+
+    The range is the von Mises stress of the difference between the stress tensors at
+    two times; all pairs of times are considered.
 
     Args:
         stress: Stress by time in the first axis, with components xx, yy, zz, xy, yz, zx

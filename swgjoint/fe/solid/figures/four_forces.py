@@ -1,11 +1,12 @@
-r"""Load case of the article on stress and fatigue: four forces, no wave generator.
+r"""Load case of the article "stress and fatigue": four forces, no wave generator.
 
-Four small areas of the bore, at :math:`\pm\beta` from both ends of the major axis, are
-pressed outward until the largest radial displacement of the teeth is w_0. The torque
-acts through equal tangential forces on 11 teeth around each end instead of tooth
-contact. The areas keep their displacement while the torque rises. With constant forces
-instead, the teeth would move by twice w_0 at 60 N·m; the article reports 0.001 mm per
-N·m. Deflections are small, so that load cases superpose.
+Forces on four small areas of the bore, at :math:`\pm\beta` from both ends of the major
+axis, press the cup outward until the largest radial displacement of the teeth is
+:math:`w_0`. Equal tangential forces on 11 teeth around each end of the major axis
+replace tooth contact and carry the torque. While the torque rises, the displacement of
+the areas remains constant. If the forces remained constant instead, the teeth would
+move by twice :math:`w_0` at 60 N·m, whereas the article reports 0.001 mm per N·m.
+Deflections are assumed to be small, so that the load cases superpose.
 """
 
 from __future__ import annotations
@@ -23,26 +24,33 @@ from swgjoint.units import deg
 ANGLE = 25.0 * deg
 """Angle beta of the article [rad]."""
 TEETH = 11
-"""Teeth around each end that carry the torque; the article uses 11 nodes."""
+"""Number of teeth around each end of the major axis that carry the torque; the article
+uses 11 nodes."""
 HALF_WIDTH, HALF_LENGTH = 2.5 * deg, 0.2
-"""Half sizes of the areas, around [rad] and along the axis in face widths [-]; the
-article only calls them small."""
+"""Half of the size of the areas around the bore [rad] and along the axis, in face
+widths [-]. The article states only that the areas are small."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FourForces:
-    """Response of a cup to four forces and a torque, in the frames of the teeth."""
+    """Response of half a cup to four forces and a torque, in the frames of the teeth.
+
+    The other half responds equally.
+    """
 
     force: Array
-    """Forces of the areas after and before the major axis, without torque (2,) [N]."""
+    """Outward forces on the areas at beta and at pi - beta from the major axis, without
+    torque (2,) [N]."""
     force_by_torque: Array
     """Derivative of these forces by the torque (2,) [N/(N·m)]."""
     radial: Array
-    """Outward displacement of the nodes of the teeth, without torque (N, n) [m]."""
+    """Outward displacement of the nodes of the toothed segments, without torque
+    (N, n_nodes) [m]."""
     radial_by_torque: Array
-    """Derivative of this displacement by the torque (N, n) [m/(N·m)]."""
+    """Derivative of this displacement by the torque (N, n_nodes) [m/(N·m)]."""
     stress: Mapping[str, Array]
-    """Nodal stress by segment, without torque (N, n_nodes, 6) [Pa]."""
+    """Stress xx, yy, zz, xy, yz, zx at the nodes by segment, without torque
+    (N, n_nodes, 6) [Pa]."""
     stress_by_torque: Mapping[str, Array]
     """Derivative of this stress by the torque (N, n_nodes, 6) [Pa/(N·m)]."""
 
@@ -91,7 +99,7 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
 
     responses = [cup.respond(case) for case in cases]
     radial = np.array([np.einsum("sni,ni->sn", u, out) for u, _ in responses])
-    # mean displacement of each area, weighted as its load
+    # mean displacement of each area, weighted with its load
     moved = np.array(
         [
             [np.sum(case * u[:, nodes].reshape(cup.sectors, -1)) for u, _ in responses]

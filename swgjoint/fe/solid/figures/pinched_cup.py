@@ -1,11 +1,12 @@
 r"""A cup with a clamped boss between two opposite radial loads.
 
-Loads of constant direction act outward on the bore of one tooth sector, over one pitch
-around, and of the opposite sector. The local indentation of a solid under a point load
-grows without limit on finer meshes. The deflection is therefore the mean over the wall
-above the load, from the bore to the roots of the teeth, where it is negligible.
+The loads act outward on the bore of two opposite tooth sectors, each over one pitch,
+and keep their direction. On ever finer meshes the local indentation of a solid under a
+point load grows without limit. The deflection is therefore defined as the mean over the
+wall above the load, from the bore to the root circle, in which the indentation is
+negligible.
 
-The potential of a load is exact; its point moves with the corotational segment:
+The potential of a load F is exact; its point moves with the corotational segment:
 
 .. math:: \Pi = \sum\tfrac12 d^T\hat K d - F\cdot x_p, \quad
     x_p = R\,(X_p + A d + C R^T F)
@@ -45,12 +46,14 @@ from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
 PLACES = ("mid_face", "open_edge", "face_width")
-"""Axial positions of the load; ``face_width`` spreads it evenly over the teeth."""
+"""Axial positions of the load; ``face_width`` spreads it evenly over the face width."""
 MAX_ITERATIONS = 40
+"""Largest number of iterations of Newton's method."""
 STEP_TOLERANCE = 1e-10
-"""Displacement increment at which the iteration ends [m]."""
+"""Largest displacement increment of a converged iteration [m]."""
 CLOSURE = np.array([-1.0, -1.0, 1.0])
-"""Factors of x, y, z that close the half model."""
+"""Factors on x, y, z where the half model closes, see
+:attr:`swgjoint.fe.solid.sector_model.SolidSectorModel.closure`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,10 +65,10 @@ class Pinched:
     deflection: float
     """Mean outward displacement of the wall above the load [m]."""
     under_load: float
-    """Mean outward displacement of the loaded points [m]."""
+    """Mean outward displacement of the loaded points, indentation included [m]."""
     of_planes: Array
-    """Mean outward displacement of the wall above the loaded sector by plane, starting
-    at the open edge (n_planes,) [m]."""
+    """Mean outward displacement of the wall in the loaded sector by plane, starting at
+    the open edge (n_planes,) [m]."""
     masters: Array
     """Positions of the masters in the global frame (N, n, 3) [m]."""
     load: Array
@@ -73,34 +76,41 @@ class Pinched:
     energy: float
     """Strain energy of the whole cup [J]."""
     iterations: int
+    """Number of iterations of Newton's method."""
 
     @property
     def stiffness(self) -> float:
-        """Force of a lobe over its deflection [N/m]."""
+        """Secant stiffness: force of a load divided by the deflection [N/m]."""
         return self.force / self.deflection
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PinchedCup:
-    """Half of a flexspline, closed by its symmetry, with loads on the bore."""
+    """Half of a flexspline with loads at points of its toothed segments.
+
+    The other half is the same, rotated by 180 deg.
+    """
 
     name: str
+    """Name of the drive."""
     sectors: int
     """Number of sectors in the half model."""
     strip: StripMesh
+    """Mesh of a sector."""
     masters: Masters
+    """Masters of a sector."""
     segments: tuple[StripSegment, ...]
+    """Condensed segments of a sector, the toothed one first."""
     root: float
-    """Outer radius of the wall below the teeth [m]."""
+    """Radius of the root circle, the outside of the wall below the teeth [m]."""
     bore: int
     """Number of loaded points on the bore, which are listed plane after plane."""
     first: int = 0
-    """Number of loaded points on the flanks that precede those of the bore; others may
-    follow."""
+    """Number of loaded points that precede those on the bore; others may follow."""
 
     @cached_property
     def reference(self) -> Array:
-        """Undeformed masters in the global frame (N, n, 3) [m]."""
+        """Positions of the undeformed masters in the global frame (N, n, 3) [m]."""
         return np.asarray(np.einsum("sij,aj->sai", self._place, self.masters.position))
 
     @cached_property
@@ -119,7 +129,7 @@ class PinchedCup:
         return slice(self.first, self.first + self.bore)
 
     def share(self, place: str) -> Array:
-        """Part of a load at one of :data:`PLACES` in every plane (n_planes,) [-]."""
+        """Share of a load at one of :data:`PLACES` in every plane (n_planes,) [-]."""
         z = self.strip.teeth.z
         share = np.zeros(len(z))
         if place == "mid_face":
@@ -145,10 +155,10 @@ class PinchedCup:
         Args:
             force: Outward force of each load [N].
             place: Axial position of the loads, one of :data:`PLACES`.
-            nonlinear: Whether segments rotate by large angles.
+            nonlinear: Whether segments may rotate by large angles.
 
         Raises:
-            ComputationError: If Newton's method fails.
+            ComputationError: If Newton's method does not converge.
         """
         share = self.share(place)
         count = self.bore // len(share)
@@ -170,11 +180,11 @@ class PinchedCup:
         )
 
     def frames(self, x: Array, *, nonlinear: bool) -> tuple[SolidFrames, ...]:
-        """Frames of all segments.
+        """Frames of all segments, in the order of the strip.
 
         Args:
             x: Positions of the masters in the global frame (N, n, 3) [m].
-            nonlinear: Whether segments rotate by large angles.
+            nonlinear: Whether segments may rotate by large angles.
         """
         return tuple(
             segment_frames(
@@ -184,7 +194,7 @@ class PinchedCup:
         )
 
     def _points(self, frame: SolidFrames, load: Array) -> Array:
-        """Deflected loaded points of the first sector in its frame (p, 3) [m]."""
+        """Displaced loaded points of the first sector in its frame (p, 3) [m]."""
         teeth = self.segments[0]
         rest = np.asarray(teeth.mesh.mesh.p).T[teeth.loaded[::3] // 3]
         moved = teeth.loaded_from_masters @ frame.displacement[0]
@@ -194,11 +204,11 @@ class PinchedCup:
     def _row(
         self, frame: SolidFrames, weight: Array, force: float
     ) -> tuple[Array, Array]:
-        """Derivative of the loaded points' outward motion, and the forces on them.
+        """Derivative of the mean outward motion of the loaded points, and their forces.
 
         Returns:
-            Derivative by the masters of sector 0's teeth in the global frame (3 m,),
-            and forces in the frame of the sector (3 p,) [N].
+            Derivative by the masters of the toothed segment of the first sector, in the
+            global frame (3 m,) [-], and forces in the frame of this segment (3 p,) [N].
         """
         teeth = self.segments[0]
         outward = frame.turn[0, 1]  # the global y axis in the frame
@@ -220,8 +230,8 @@ class PinchedCup:
             frames: Frames of all segments.
             loads: Forces at the loaded points of the first k sectors, in their frames
                 (k, 3 p) [N].
-            pushed: These forces on the masters of the teeth, in the global frame
-                (k, 3 m) [N].
+            pushed: The same forces transferred to the masters of the toothed segments,
+                in the global frame (k, 3 m) [N].
         """
         n, few = 3 * self.masters.size, len(loads)
         out = np.zeros((self.sectors, n))
@@ -243,9 +253,10 @@ class PinchedCup:
         matrix[:, held], matrix[:, :, held] = 0.0, 0.0
         matrix[:, held, held] = scale
         out[:, held] = 0.0
-        if not len(held):  # the loads balance: the constraint of rigid motion is idle
+        if not len(held):
+            # springs against rigid motion carry no force, because the loads balance
             matrix[0, [0, 2], [0, 2]] += scale
-        # the last face of the half in the frame of the first one
+        # the half model closes with the factors of its last face
         size = 3 * self.masters.face_size
         sign = np.tile(CLOSURE, self.masters.face_size)
         matrix[-1, -size:] *= sign[:, None]
@@ -256,15 +267,15 @@ class PinchedCup:
         return np.asarray(solved)
 
     def respond(self, loads: Array) -> tuple[Array, dict[str, Array]]:
-        """Small deflections under forces at the loaded points of all sectors.
+        """Linear response to forces at the loaded points of all sectors.
 
         Args:
             loads: Forces in the frames of the teeth (N, 3 p) [N].
 
         Returns:
-            Displacements of the nodes of the teeth (N, n_nodes, 3) [m], and stress xx,
-            yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa], both in the
-            frames of the teeth.
+            Displacements of the nodes of the toothed segments (N, n_nodes, 3) [m], and
+            stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa],
+            both in the frames of the teeth.
         """
         frames = self.frames(self.reference, nonlinear=False)
         carried = loads @ self.segments[0].loaded_from_masters
@@ -319,17 +330,17 @@ class PinchedCup:
 def pinched_cup(
     design: Design, *, toothless: bool = False, orders: Orders | None = None
 ) -> PinchedCup:
-    """Condense the flexspline of a design.
+    """Condense the flexspline of a design to a half model with loads on its bore.
 
     Args:
         design: The drive; without a ``[cup]`` its flexspline is a free ring.
-        toothless: Whether a smooth wall of the rim's thickness replaces the teeth.
+        toothless: Whether to omit the teeth and keep only the rim.
         orders: Polynomial degrees of the displacements of faces and sections; None for
-            the default ones.
+            the default degrees.
 
     Raises:
-        DesignError: If it cannot be meshed or has an odd number of teeth, so that no
-            two of them are opposite.
+        DesignError: If the design cannot be meshed or has an odd number of teeth, so
+            that no two of them are opposite.
         ComputationError: If the model does not fit in the memory of the machine.
     """
     name, teeth = design.drive.name, design.drive.teeth_flexspline
@@ -377,7 +388,7 @@ def pitch_points(strip: StripMesh, profile: ToothProfile) -> Index:
 
     Args:
         strip: Mesh of the flexspline's strip.
-        profile: Flank of the flexspline.
+        profile: Tooth profile of the flexspline.
     """
     plane = strip.teeth.plane
     points = np.asarray(plane.mesh.p)

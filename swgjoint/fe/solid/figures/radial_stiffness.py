@@ -1,4 +1,4 @@
-"""Radial stiffness of a flexspline, its dependence on the load and its error."""
+"""Radial stiffness of a flexspline, its dependence on the load, and error estimates."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from swgjoint.progress import Progress, silent
 from swgjoint.units import mm
 
 COARSEST = 0.5
-"""Least refinement of a mesh [-]."""
+"""Smallest refinement of the coarser mesh [-]."""
 SMALL = 1.0
-"""Load of the linear model, whose stiffness does not depend on it [N]."""
+"""Load of the linear model [N]; its stiffness does not depend on the load."""
 FINER = replace(
     Orders(),
     teeth=Orders().teeth + 2,
@@ -24,38 +24,45 @@ FINER = replace(
     at_teeth=Orders().at_teeth + 2,
     around=Orders().around + 2,
 )
-"""Higher degrees of the displacements of faces and sections, to estimate the error."""
+"""Polynomial degrees increased by two, from which the error of the default degrees is
+estimated."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RadialStiffness:
-    """Force of a lobe over its deflection with a clamped boss [N/m]."""
+    """Radial stiffness of a cup with a clamped boss between two opposite loads.
+
+    Stiffness is the force of a load divided by the deflection, see
+    :mod:`swgjoint.fe.solid.figures.pinched_cup`.
+    """
 
     mid_face: float
     """Linear stiffness for a load in the middle of the face width [N/m]."""
     open_edge: float
-    """Linear stiffness for a load at the open end [N/m]."""
+    """Linear stiffness for a load at the open edge of the teeth [N/m]."""
     face_width: float
     """Linear stiffness for a load spread evenly over the face width [N/m]."""
     outward: float
-    """Secant stiffness with large rotations for a load pulling apart at mid-face, at
-    about the deflection of the lobes [N/m]."""
+    """Secant stiffness at mid-face with large rotations under outward loads ``force``
+    [N/m]; the deflection is about the lobe height."""
     inward: float
-    """Secant stiffness with large rotations for a load pressing together at mid-face
+    """Secant stiffness at mid-face with large rotations under inward loads ``force``
     [N/m]."""
     force: float
-    """Load of the secant stiffnesses [N]."""
+    """Magnitude of the loads of the secant stiffnesses [N]: linear stiffness times lobe
+    height."""
     finer: float
-    """Linear stiffness at mid-face with higher degrees of the displacements of faces
-    and sections on the same mesh [N/m]."""
+    """Linear stiffness at mid-face with the polynomial degrees :data:`FINER` on the
+    same mesh [N/m]."""
     coarser: float
-    """Linear stiffness at mid-face with half of the elements per direction [N/m]."""
+    """Linear stiffness at mid-face with half of the elements per direction, but with a
+    refinement of at least :data:`COARSEST` [N/m]."""
     shell: float
-    """Closed form of a smooth cup with the wall thickness of the cup, at mid-face
-    [N/m]."""
+    """Closed-form stiffness at mid-face of a smooth cup with the wall thickness of the
+    cup, see :func:`smooth_cup_stiffness` [N/m]."""
 
     def to_json(self) -> dict[str, Any]:
-        """Stiffnesses [N/mm] with a description of load and deflection."""
+        """Stiffnesses except that at mid-face [N/mm], and a description of the load."""
         scale = 1e3
         return {
             "load": "two opposite radial forces at mid-face, outward on the bore over"
@@ -81,7 +88,7 @@ def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialSt
         progress: Called after every part.
 
     Raises:
-        DesignError: If it cannot be meshed or has an odd number of teeth.
+        DesignError: If the design cannot be meshed or has an odd number of teeth.
         ComputationError: If a solve fails or the model does not fit in memory.
     """
     stage, parts = "radial stiffness", 4
@@ -119,7 +126,7 @@ def smooth_cup_stiffness(design: Design, *, open_edge: bool = False) -> float:
 
     Args:
         design: The drive, with a ``[cup]``.
-        open_edge: Whether the load acts at the open end instead of mid-face.
+        open_edge: Whether the loads act at the open edge instead of mid-face.
     """
     assert design.cup is not None
     shell = ShellDimensions.from_design(design)

@@ -1,4 +1,7 @@
-"""Figures of a specification sheet beyond those of a map: radial stiffness, fatigue."""
+"""Figures of a specification sheet that a map does not contain.
+
+These are the radial stiffness and the fatigue safety factor.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +19,15 @@ from swgjoint.progress import Progress, silent
 
 @dataclass(frozen=True, kw_only=True)
 class SolidFigures:
-    """Computed figures, in the units of their keys."""
+    """Figures of a specification sheet from the 3D model."""
 
     values: dict[str, float] = field(default_factory=dict)
-    """Figures by key."""
+    """Computed figures by key, in the unit that the key states."""
     missing: dict[str, str] = field(default_factory=dict)
-    """Reasons, by key, why a figure is not available for this design."""
+    """Reasons why figures are not available for this design, by key."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Load case, location and error estimates of ``radial_stiffness`` and ``fatigue``.
-    """
+    """Load cases, locations and error estimates, by ``radial_stiffness`` and
+    ``fatigue``."""
 
 
 def solid_figures(
@@ -36,14 +39,15 @@ def solid_figures(
 ) -> SolidFigures:
     """Compute ``radial_stiffness_N_mm`` and ``fatigue_safety_factor``.
 
-    The safety factor is the smallest one of all sections over the face width. Each
-    figure takes up to several minutes and is stored in the user's cache.
+    The safety factor is the smallest one over the face width. A figure can take several
+    minutes to compute and is stored in the user's cache.
 
     Args:
         design: The drive.
-        keys: Keys of the sheet; only these figures are computed, and keys other than
-            the two above are ignored.
-        torque: Torque at which fatigue is assessed, the rated one [N·m].
+        keys: Keys of the sheet. Only figures with these keys are computed; other keys
+            are ignored.
+        torque: Output torque at which fatigue is assessed, usually the rated torque
+            [N·m].
         progress: Called during the computation.
 
     Raises:

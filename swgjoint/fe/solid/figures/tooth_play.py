@@ -1,4 +1,4 @@
-"""Play of the teeth of a deflected flexspline: the free rotation of the output."""
+"""Tooth play of a deflected flexspline: the free rotation of the output."""
 
 from __future__ import annotations
 
@@ -12,34 +12,35 @@ from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.typing import Array
 
 REACH = 0.5
-"""Largest gap of teeth that count [modules]; without such a gap the teeth pass each
-other."""
+"""Largest gap that is considered [modules]. If no gap closes within this reach, the
+teeth can pass each other."""
 FLAT = 0.1
-"""Lever arm over the pitch radius below which a contact belongs to neither side [-]."""
+"""Ratio of lever arm to pitch radius below which a contact does not limit the rotation
+in either direction [-]."""
 TURNS = 12
-"""Largest number of rotations until a tooth touches."""
+"""Largest number of rotations towards the contact of one direction."""
 TOUCHES = 1e-10
-"""Rotation below which a tooth touches [rad]."""
+"""Rotation below which a tooth counts as touching [rad]."""
 
 
 def play(
     model: SolidSectorModel, frame: SolidFrames, load: Array, ratio: float
 ) -> float:
-    r"""Rotation of the output between the contacts of its two directions [rad].
+    r"""Free rotation of the output between tooth contact in both directions.
 
-    The deflected flexspline is rotated as a whole until a tooth touches. This rotates
-    the lobes as well. For fixed lobes the rotation of the output is :math:`1 - 1/i`
-    times as large.
+    The deflected flexspline is rotated as a rigid body, first forward and then
+    backward, until a tooth touches. This also rotates the lobes. With fixed lobes the
+    rotation of the output is :math:`1 - 1/i` times as large.
 
     Args:
         model: Model of half of the drive or of the whole drive.
         frame: Frames of its toothed segments without tooth contact.
-        load: Forces at their loaded degrees of freedom (N, n_b) [N].
-        ratio: Signed ratio i [-].
+        load: Forces at the loaded degrees of freedom of these segments (N, n_b) [N].
+        ratio: Signed gear ratio i [-].
 
     Returns:
-        Play [rad]; negative if flanks overlap, infinite if no flanks are close, NaN if
-        teeth overlap that no rotation can separate.
+        Play [rad]. It is negative if flanks overlap, infinite if no flanks are within
+        reach, and NaN if teeth overlap that no rotation can separate.
     """
     profile = model.strip.profile
     reach = REACH * 2.0 * profile.pitch_radius / profile.teeth

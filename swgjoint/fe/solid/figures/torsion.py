@@ -19,37 +19,38 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 SMALL = 0.01
-"""Part of the first torque that takes up the clearance [-]."""
+"""Torque that takes up the clearance, relative to the first torque [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolidTorsion:
-    """Equilibria over the torque at a position with a lobe on a tooth.
+    """Torsion curve of a drive with a lobe of the locked wave generator on a tooth.
 
-    At this position the drive under the opposite torque is the mirror image (ball 0 is
-    on the lobe). The mid-line of a loop therefore begins at zero, and with clearance of
-    the teeth the loaded side begins at half of the play.
+    Ball 0, if there is a bearing, is on this lobe too. In this position the drive under
+    the opposite torque is the mirror image of the drive. The torsion curve is therefore
+    odd, and if the teeth have clearance it begins at half of the play.
     """
 
     torque: Array
     """Torques T, increasing (n,) [N·m]."""
     torsion: Array
-    """Torsion including that of the springs in series with cup and teeth (n,) [rad]."""
+    """Torsion, including that of the springs in series with cup and teeth (n,) [rad].
+    """
     compliance: Array
-    """Tangent compliance including the springs in series (n,) [rad/(N·m)]."""
+    """Tangent compliance, including the springs in series (n,) [rad/(N·m)]."""
     tooth_centre: Array
-    """Axial centre of the normal forces of the teeth, from the middle of the face width
-    towards the closed end, in face widths (n,) [-]."""
+    """Axial centre of the normal tooth forces in face widths, positive from mid-face
+    towards the closed end (n,) [-]."""
     tooth_force: Array
-    """Sum of the normal forces of the teeth (n,) [N]."""
+    """Sum of the normal tooth forces of the whole drive (n,) [N]."""
     bore_centre: Array
-    """Axial centre of the forces of wave generator or race on the bore, in the same
-    measure (n,) [-]."""
+    """Axial centre of the forces on the bore in face widths, positive from mid-face
+    towards the closed end (n,) [-]."""
     balls: Array
     """Number of loaded balls; zero for a rigid wave generator (n,)."""
     half_play: float
-    """Torsion extrapolated to zero torque by the tangent at 1 % of the first torque
-    [rad]."""
+    """Half of the play: torsion at 1 % of the first torque, extrapolated to zero torque
+    with the tangent compliance [rad]."""
 
 
 def solid_torsion(
@@ -59,11 +60,13 @@ def solid_torsion(
     bearing: Bearing | None = None,
     progress: Progress = silent,
 ) -> SolidTorsion:
-    """Load a 3D drive; the half model is used wherever the symmetry allows it.
+    """Compute the torsion curve of a 3D drive.
+
+    The half model is used if the symmetry of the drive allows it.
 
     Args:
-        design: The drive, with a cup.
-        torques: Torques T, positive and increasing [N·m].
+        design: The drive, with a ``[cup]``.
+        torques: Torques T of the output on its load, positive and increasing [N·m].
         bearing: Axial support of the outer race, see
             :func:`swgjoint.fe.solid.drive3d.solid_sector_model`; None for a rigid wave
             generator.
@@ -71,7 +74,7 @@ def solid_torsion(
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.
-        ComputationError: If a solve fails.
+        ComputationError: If a solve fails or the model does not fit in memory.
     """
     model = solid_sector_model(design, half="auto", bearing=bearing)
     follow = SolidContinuation(
@@ -112,7 +115,7 @@ def solid_torsion(
 
 
 def _tooth_centre(model: SolidSectorModel, state: SolidState) -> float:
-    """Axial centre of the tooth forces [m]."""
+    """Axial centre of the tooth forces [m]; NaN without tooth contact."""
     if state.held is None:
         return float("nan")
     z = model.strip.mesh.teeth.z[state.held.plane]
@@ -120,7 +123,9 @@ def _tooth_centre(model: SolidSectorModel, state: SolidState) -> float:
 
 
 def bore_centre(model: SolidSectorModel, state: SolidState) -> float:
-    """Axial centre of the forces on the bore [m].
+    """Axial centre of the wave generator's forces on the bore [m].
+
+    The forces are weighted with their magnitudes.
 
     Args:
         model: The 3D model.
