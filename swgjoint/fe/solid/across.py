@@ -43,7 +43,7 @@ bodies have then flattened each other and touch in several planes, as straight s
 always do."""
 WIDE = 3.0
 """Factor on :data:`FLAT` for lines whose contact is already shared by several planes
-[-]; the hysteresis prevents that they alternate."""
+[-]. This hysteresis keeps them from alternating."""
 
 
 def spread_forces(z: Array, nodes: int) -> sparse.csr_matrix:

@@ -71,7 +71,10 @@ def solid_sector_model(
     if bearing is not None:
         check_bearing(design, half=half)
     if half and not can_halve(design, bearing=False):
-        raise DesignError(f"{name}: the half model does not apply; omit --half")
+        raise DesignError(
+            f"{name}: a half model needs even tooth counts, no tolerances and a wave"
+            " generator that is symmetric under a rotation by 180 deg; omit --half"
+        )
     profile = tooth_profile(design, "flexspline")
     facing = tooth_profile(design, "circular_spline")
     orders = orders or Orders()
@@ -91,8 +94,8 @@ def solid_sector_model(
     if has_errors(design):
         if gear is None:
             raise DesignError(
-                f"{name}: tolerances: the 3d model supports them only with an elastic"
-                " circular spline"
+                f"{name}: the 3d model supports tolerances only with an elastic circular"
+                " spline"
             )
         errors = {
             "shift": tooth_errors(design, "flexspline").shift,

@@ -106,8 +106,8 @@ class SolidRun(Positions):
                 "springs_Nm_rad": springs_of(self.design),
                 "tolerances": has_errors(self.design) or None,
                 "micro_geometry": any(shapes.values()),
-                "stress": "largest nodal value; edges and the step from rim to cup"
-                " do not converge with the mesh",
+                "stress": "largest nodal value; at edges and at the step from rim to"
+                " cup it does not converge with mesh refinement",
                 "left_out": "wave_generator.bearing" if bearing else None,
                 "positions": self.unspread,
             },

@@ -31,8 +31,8 @@ class SolidSectorModel:
     lobe_height: float
     """Radial deflection of the flexspline at the lobes [m]."""
     half: bool = False
-    """Whether the model is half of the ring; rotated by 180 deg it is the other half.
-    """
+    """Whether the model is half of the ring; the other half is a copy rotated by
+    180 deg."""
     nonlinear: bool = True
     """Whether segments may rotate by large angles; if not, their frames rotate only
     with the bore of the diaphragm."""
@@ -165,8 +165,9 @@ class SolidSectorModel:
         The generatrices of the wall remain straight, and the wall does not stretch. At
         the angle phi from the major axis the radial displacement is w0 s cos 2 phi and
         the tangential one is -(w0 s/2) sin 2 phi. The factor s decreases linearly along
-        the axis; it is one at mid-face and zero at the closed end. The axial
-        displacement follows from zero shear strain in the wall.
+        the axis; it is one at mid-face and zero at the closed end. Without a cup it is
+        one everywhere. The axial displacement follows from zero shear strain in the
+        wall.
 
         Args:
             alpha: Wave-generator angle [rad].

@@ -1,9 +1,10 @@
 r"""Fatigue of the flexspline from the stresses of a 3D equilibrium.
 
-A point of the flexspline passes all phases of the wave generator in half a turn. At a
-single position of the wave generator the corresponding points of all sectors are at
-different phases, so that their stresses together are the stress history of one point.
-Tooth contact is sampled in the same way.
+A point of the flexspline passes all phases of the deflection while the wave generator
+makes half a turn relative to it. At a single position of the wave generator the
+corresponding points of all sectors are at different phases, so that their stresses
+together are the stress history of one point. The phases of tooth contact are sampled in
+the same way.
 
 The assessment is that of the article "stress and fatigue", see
 :mod:`swgjoint.gear.shell_theory`. Its nominal stress is a shell stress, to which it
@@ -73,7 +74,8 @@ class FatigueLimits:
 class SectionFatigue:
     """Nominal stress at the root in one plane of the mesh, and its safety factor.
 
-    Amplitudes and means are those over a turn of the wave generator.
+    Amplitudes and means are those over one turn of the wave generator relative to the
+    flexspline.
     """
 
     z: float

@@ -88,7 +88,7 @@ class Pinched:
 class PinchedCup:
     """Half of a flexspline with loads at points of its toothed segments.
 
-    The other half is the same, rotated by 180 deg.
+    The other half is a copy rotated by 180 deg.
     """
 
     name: str

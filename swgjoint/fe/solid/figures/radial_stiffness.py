@@ -65,8 +65,8 @@ class RadialStiffness:
         """Stiffnesses except that at mid-face [N/mm], and a description of the load."""
         scale = 1e3
         return {
-            "load": "two opposite radial forces at mid-face, outward on the bore over"
-            " one pitch; deflection: mean over the wall above; boss clamped",
+            "load": "two opposite outward forces at mid-face, each on one pitch of the"
+            " bore; deflection: mean over the wall above the force; boss clamped",
             "open_edge_N_mm": self.open_edge / scale,
             "spread_over_face_width_N_mm": self.face_width / scale,
             "large_rotations": {

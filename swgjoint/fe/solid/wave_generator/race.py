@@ -60,8 +60,8 @@ class SolidRace:
     on_balls: RaceOnBalls
     """The race in its plane, with balls and cam."""
     half: bool
-    """Whether the model is half of the race; rotated by 180 deg it is the other half.
-    """
+    """Whether the model is half of the race; the other half is a copy rotated by
+    180 deg."""
     outside: RaceOutside
     """Outer surface of the race."""
     roll: RaceRoll
