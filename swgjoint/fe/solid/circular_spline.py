@@ -96,6 +96,7 @@ def condense_circular_spline(
     def dofs(nodes: Index) -> Index:
         return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
+    # condense a sector to its faces, with forces on the flanks
     outside = teeth.nodes[:, teeth.plane.bore].ravel()
     inside = ~np.isin(segment.first, outside)
     first, last = dofs(segment.first[inside]), dofs(segment.last[inside])
@@ -121,10 +122,12 @@ def condense_circular_spline(
     turn[n // 2 :, n // 2 :] = np.kron(np.eye(n // 6), pitch)
     stiffness = turn.T @ stiffness @ turn
     load = turn.T @ (-pull.T @ solved[:, n:])
+    # close a ring of sectors and load the first tooth
     rhs = np.zeros((WINDOW, n, len(flank)))
     rhs[0] = load
     blocks = np.broadcast_to(0.5 * (stiffness + stiffness.T), (WINDOW, n, n))
     faces = turn @ DenseCyclicFactor(blocks, n // 2).solve(rhs)
+    # displacement of all nodes of the teeth within reach
     offsets = np.arange(-REACH, REACH + 1)
     nodal = np.zeros((len(offsets), size, len(flank)))
     for k, offset in enumerate(offsets):

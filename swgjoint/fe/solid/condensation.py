@@ -101,6 +101,7 @@ def condense(
         gap = found.contacts.gap - old
         gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
 
+    # solve the ring for its own imbalance, the tooth forces and a unit rotation
     out_of = linear.gradient + linear.pushed
     columns = np.zeros((n_sectors, size, n + 2))
     columns[:, :, 0] = -out_of

@@ -167,12 +167,15 @@ class SolidContinuation(Follower[SolidState]):
         rotation: float,
         circular_spline_rotation: float,
     ) -> SolidState:
+        """State at other angles; its displacement field stays on the wave generator."""
+        # motion of the wave generator relative to the flexspline, in sectors
         model, strip = self.model, self.model.strip
         d_alpha = alpha - state.wave_generator_angle
         shift = (d_alpha - (rotation - state.rotation)) / (2.0 * pi / strip.sectors)
         teeth = model.teeth.circular_spline.profile.teeth
         size = strip.masters.face_size
         last = strip.masters.size - size
+        # shift the displacements in the frames of the teeth around the ring
         still = strip.masters.position[:last]
         there = about_z(np.array(state.rotation)) @ model.place
         local = np.concatenate([state.faces, state.inside], axis=1)

@@ -94,8 +94,8 @@ def solid_sector_model(
     if has_errors(design):
         if gear is None:
             raise DesignError(
-                f"{name}: the 3d model supports tolerances only with an elastic circular"
-                " spline"
+                f"{name}: the 3d model supports tolerances only with an elastic"
+                " circular spline"
             )
         errors = {
             "shift": tooth_errors(design, "flexspline").shift,

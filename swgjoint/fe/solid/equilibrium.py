@@ -183,6 +183,7 @@ def _solve_linear(
     thorough: bool,
 ) -> _Step:
     """Condense the ring to tooth forces and rotations, solve and expand the result."""
+    # candidates of tooth contact, and the condensed problem
     candidates = None
     if load.teeth:
         candidates = model.teeth.find(
@@ -196,6 +197,7 @@ def _solve_linear(
         )
     condensed = condense(model, state, linear, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
+    # unknowns: forces of the candidates and, under a torque, the output rotation
     n = 0 if candidates is None else len(candidates)
     used, output = np.arange(n), n if load.rotation is None else n + 1
     if load.torque is not None:
@@ -216,6 +218,7 @@ def _solve_linear(
             unit[-1] = -1.0 / model.copies
             answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
             compliance = float(answer[-1])
+    # increments of the ring, and contact forces and gaps of the bore after the step
     force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
     increment = condensed.base + condensed.response @ unknown[: n + 1]
     bore = linear.bore
@@ -260,6 +263,7 @@ def _advance(
     Returns:
         The new state, and whether the contact set of the bore remained the same.
     """
+    # touching points under tension open, and open points that overlap close
     bore, masters = linear.bore, model.strip.masters
     local = np.einsum("spp->sp", bore.compliance)
     wrong = np.where(bore.active, -step.pressure * local, -step.after)
@@ -271,6 +275,7 @@ def _advance(
     nodes, lines = bore.normal.shape[1], bore.found.shape[1]
     apart = (touching & bore.present)[:, :nodes].reshape(len(touching), -1, lines)
     shared = ~bore.found | apart.any(axis=1)
+    # damped motion of masters and race; contact forces are not damped
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
     master_dofs = model.dofs(np.arange(masters.size))
@@ -315,6 +320,7 @@ def _finished(
     model: SolidSectorModel, state: SolidState, outcome: Outcome, history: list[float]
 ) -> SolidState:
     """The last state with its outcome, ball forces, energy and moments."""
+    # energy of the segments, and of the teeth under their loads
     frames = model.frames(state)
     energy = sum(
         float(energies(segment, frame).sum())
@@ -327,6 +333,7 @@ def _finished(
             state.circular_spline_force
         )
         energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
+    # moments of the bore forces and of the tooth forces about the axis
     points = np.einsum(
         "sij,spj->spi", frames[0].turn, model.bore_positions(frames[0], state)
     )

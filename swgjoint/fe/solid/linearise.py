@@ -181,6 +181,7 @@ def bore_contact(
         kept: Mask of the lines whose contact remains shared, see :func:`linearise`
             (N, L).
     """
+    # gaps of the bore nodes, their gradients, and vertices over the face width
     teeth, first = model.strip.teeth, model.strip.flank_dofs
     n, p = state.touching.shape
     b = len(model.strip.bore)
@@ -206,6 +207,7 @@ def bore_contact(
     rows = carried + np.einsum("spw,swm->spm", turning, frame.gradient)
     rows = np.einsum("sij,spaj->spai", frame.turn, rows.reshape(n, b, m, 3))
     rows = np.concatenate([rows.reshape(n, b, 3 * m), by_race], axis=2)
+    # compliance W of nodes, vertices and slopes
     compliance = teeth.compliance[first:, first:].reshape(b, 3, b, 3)
     seen = np.einsum("iajb,sjb->siaj", compliance, normal)
     nodal = np.einsum("sia,siaj->sij", normal, seen)
@@ -214,6 +216,7 @@ def bore_contact(
     w[:, :b, :b], w[:, b:, :b] = nodal, vertex @ nodal
     w[:, :b, b:] = w[:, b:, :b].transpose(0, 2, 1)
     w[:, b:, b:] = w[:, b:, :b] @ vertex.transpose(0, 2, 1)
+    # points that can touch, and points that do; slopes follow their vertices
     lines = found.shape[1]
     at, rolls = np.arange(b, b + lines), np.arange(b + lines, p)
     present = np.ones((n, p), dtype=bool)
@@ -223,8 +226,10 @@ def bore_contact(
         present[:, :b] &= model.race.covers(model.strip.bore[:, 2])
     active = state.touching & present
     active[:, rolls] = active[:, at] & (state.pressure[:, at] > 0.0)
+    # spring of a slope whose vertex carries the force lambda: compliance g''/lambda
     loaded = np.where(active[:, rolls], state.pressure[:, at], 1.0)
     w[:, rolls, rolls] += bend / loaded
+    # gaps without the previous forces, and the inverse over the active points
     moved = model.loads(state) @ teeth.compliance[:, first:]
     free = gap - np.einsum("spi,spi->sp", normal, moved.reshape(n, b, 3))
     on = active[:, :, None] & active[:, None, :]

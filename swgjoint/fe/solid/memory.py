@@ -34,11 +34,13 @@ def required_memory(
         sectors: Number of sectors of the flexspline in the model.
         orders: Polynomial degrees of the displacements of faces and sections.
     """
+    # the toothed segment is the largest one
     nodes = strip.teeth.segment.mesh.p.shape[1]
     loaded = 3 * (strip.teeth.flank.size + strip.teeth.bore.size)
     # condensation of the teeth: right-hand sides, their solution, stored results
     condensing = BYTES * (3 * 3 * nodes * loaded + FILL * (3 * nodes) ** (4 / 3))
     kept = BYTES * (3 * nodes * loaded + loaded**2)
+    # equilibrium: the matrices of all sectors; stresses: nodes of all sectors
     size = 3 * strip_masters(strip, orders).size
     solving = BYTES * sectors * size * (size + CONTACTS) * COPIES
     stresses = BYTES * sectors * nodes * (3 + 2 * 6 + 9)

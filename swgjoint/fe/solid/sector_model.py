@@ -173,6 +173,7 @@ class SolidSectorModel:
             alpha: Wave-generator angle [rad].
             rotation: Rotation of the flexspline [rad].
         """
+        # dimensions of the cup, and the angle phi of every master
         x = self.reference
         strip, w0 = self.strip, self.lobe_height
         bore = float(np.hypot(strip.bore[:, 0], strip.bore[:, 1]).min())
@@ -181,12 +182,14 @@ class SolidSectorModel:
         boss = float(np.hypot(held[:, 0], held[:, 1]).mean())
         radius = np.hypot(x[..., 0], x[..., 1])
         phi = np.arctan2(-x[..., 0], x[..., 1]) - (alpha - rotation)
+        # factors s and ds/dz; in the diaphragm the motion vanishes towards the boss
         has_cup = len(strip.segments) > 1
         s, ds, disc = np.ones_like(phi), 0.0, np.ones_like(phi)
         if has_cup:
             ds = -1.0 / closed
             s = np.clip(1.0 - x[..., 2] / closed, 0.0, None)
             disc = np.clip((radius - boss) / (bore - boss), 0.0, 1.0)
+        # inextensional displacements; points outside the bore also turn with it
         off = radius - bore
         turn = 1.5 * w0 * s * np.sin(2.0 * phi) / bore
         radial = w0 * s * np.cos(2.0 * phi)
@@ -197,6 +200,7 @@ class SolidSectorModel:
         moved = x + (radial * disc)[..., None] * out + (around * disc)[..., None] * side
         moved[..., 2] += axial
         moved = np.einsum("ij,saj->sai", about_z(np.array(rotation)), moved)
+        # start without contact forces
         size, n_bore = strip.masters.face_size, len(strip.bore)
         points = n_bore + 2 * (n_bore // strip.planes)
         last = strip.masters.size - size

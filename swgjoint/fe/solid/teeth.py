@@ -147,6 +147,7 @@ class SolidTeeth:
                 :meth:`swgjoint.fe.plane.tooth_contact.ToothContact.search`.
             circular_spline_rotation: Rotation of the circular spline [rad].
         """
+        # deflected flank nodes, seen in every plane from the rotated frame of the tooth
         strip = self.strip
         n, planes, size = len(frame.turn), strip.planes, 2 * strip.flank_size
         teeth, flank = strip.teeth, strip.flank_dofs
@@ -162,6 +163,7 @@ class SolidTeeth:
             plane_flank = plane_flank + self.shift[:, None, None]
         centre = flat.mean(axis=2)
         seen = angle - circular_spline_rotation
+        # displacements of the circular spline: elastic ones, shifts and tilt
         displacements = np.zeros((self.circular_spline_teeth, planes, 0))
         if self.elastic_circular_spline is not None:
             displacements = self.elastic_circular_spline.displacement(
@@ -174,6 +176,7 @@ class SolidTeeth:
             self._circular_spline_offset(circular_spline_rotation),
             displacements.shape[2] // 2,
         )
+        # the 2D search in every plane
         parts, numbers = [], []
         for p in range(planes):
             search = ToothContact(
@@ -229,6 +232,8 @@ class SolidTeeth:
         nodes: Array,
         angle: Array,
     ) -> ToothRows:
+        """Candidates of the planes with the derivatives of their gaps."""
+        # normals and points in the global frame, and the lever arms of the normals
         strip = self.strip
         sector, side, n = contacts.sector, contacts.side, len(plane)
         size, teeth = strip.flank_size, strip.teeth
@@ -245,11 +250,13 @@ class SolidTeeth:
         if self.tilt is not None:
             x, y = np.multiply.outer(self.tilt, strip.mesh.teeth.z[plane])
             circular_spline_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
+        # derivatives by the flank nodes in the frames of the segments
         seen = np.einsum("kji,kj->ki", turn, normal)
         at = np.einsum("kji,kj->ki", turn, point)
         on_nodes = np.zeros((n, strip.planes, 2, size, 3))
         on_nodes[np.arange(n), plane, side] = spline[:, :, None] * seen[:, None, :]
         weight = on_nodes.reshape(n, strip.flank_dofs)
+        # derivatives by the masters: deformation and rotation of the frame
         carried = weight @ teeth.loaded_from_masters[: strip.flank_dofs]
         m = frame.position.shape[1]
         middle = at - frame.centre[sector] - teeth.position.mean(axis=0)

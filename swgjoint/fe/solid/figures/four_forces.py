@@ -72,6 +72,7 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
         cup: A cup with teeth.
         deflection: Largest outward displacement of the teeth without torque [m].
     """
+    # outward directions at all nodes, and positions of the loaded ones
     teeth = cup.segments[0]
     points = np.asarray(teeth.mesh.mesh.p).T
     out = points * np.array([1.0, 1.0, 0.0])
@@ -81,6 +82,7 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
     bore = np.arange(len(at)) < cup.bore
     angle = pi * np.arange(cup.sectors) / cup.sectors
 
+    # unit loads: the forces of both areas, and the torque
     width = np.ptp(cup.strip.teeth.z)
     area = bore & (np.abs(at[:, 2]) <= (HALF_LENGTH + 1e-9) * width)
     cases = []
@@ -106,6 +108,7 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
             for case in cases[:2]
         ]
     )
+    # equal forces without torque; with torque, forces that keep the areas in place
     both = radial[0] + radial[1]
     without = deflection / float(both.max()) * np.array([1.0, 1.0, 0.0])
     by_torque = np.append(-np.linalg.solve(moved[:, :2], moved[:, 2]), 1.0)

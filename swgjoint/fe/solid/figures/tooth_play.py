@@ -54,6 +54,7 @@ def play(
         for _ in range(TURNS):
             turned = replace(frame, turn=about_z(np.array(angle)) @ frame.turn)
             rows = model.teeth.find(turned, load, still, reach, None, thorough=True)
+            # a rotation closes the gaps with a negative arm; the first one limits it
             gap, arm = rows.contacts.gap, sign * rows.arm
             if (gap[np.abs(arm) < flat] < 0.0).any():
                 return nan

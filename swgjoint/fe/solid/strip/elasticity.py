@@ -58,6 +58,7 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
         stress = 2.0 * mu * strain + lame * eye(trace(strain), 3)
         return ddot(stress, sym_grad(v))
 
+    # stiffness of the incompatible modes of every element, and its inverse
     matrix = elasticity.assemble(basis).tocsr()
     at_nodes = basis.nodal_dofs.T.ravel()
     modes = np.asarray(basis.interior_dofs)  # (9, n_elements)
@@ -68,6 +69,7 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
     )
     inverse = np.linalg.inv(np.moveaxis(mode_stiffness, 2, 0))
     mode_inverse = sparse.block_diag(inverse, format="csr")
+    # modes as functions of the nodal displacements, and the condensed matrices
     order = modes.T.ravel()
     coupling = matrix[order][:, at_nodes]
     from_nodes = -(mode_inverse @ coupling)

@@ -102,6 +102,8 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         strip: Mesh of the strip.
         orders: Degrees of the polynomials; None for the default degrees.
     """
+    # masters on a face, segment after segment; neighbouring segments share the masters
+    # of their common edge
     orders = orders or Orders()
     segments = strip.segments
     degrees = [_degrees(strip, k, orders) for k in range(len(segments))]
@@ -125,6 +127,7 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         ends.append(masters[at_end])
     face_size = count
 
+    # masters on the sections, between those that the sections share with both faces
     sections = list[Patch | None]()
     inside = count
     for k, segment in enumerate(segments):
@@ -146,6 +149,7 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         )
     size = count + face_size
 
+    # weights of the masters at the nodes of every segment, and positions of the masters
     position, segment_masters = np.full((size, 3), np.nan), []
     for k, segment in enumerate(segments):
         rows: dict[int, Array] = {}

@@ -183,6 +183,7 @@ def teeth_mesh(
         n: Mesh refinement, a factor on the number of elements per direction [-].
         apron: First part of the cup; None without a cup.
     """
+    # copies of the 2D mesh at every z, and hexahedra between them
     z = np.linspace(-0.5 * width, 0.5 * width, refine_count(FACE_WIDTH, n) + 1)
     size = plane.mesh.p.shape[1]
     nodes = np.arange(len(z))[:, None] * size + np.arange(size)
@@ -248,6 +249,7 @@ def cup_segments(
     Raises:
         DesignError: If the fillet is too small for the wall or the cup too short.
     """
+    # dimensions of the meridian, and their limits
     cup = design.cup
     assert cup is not None
     name, wall = design.drive.name, cup_wall(design)
@@ -286,6 +288,7 @@ def cup_segments(
             r[0] = at_teeth
         parts.append((f"cylinder {k + 1}", r, np.repeat(z[:, None], rows, axis=1)))
         start = stop
+    # a fillet inward to a diaphragm or outward to a flange
     turn = np.linspace(0.0, 0.5 * pi, refine_count(FILLET, n) + 1)[:, None]
     if inward:
         centre = inner + wall - fillet

@@ -124,6 +124,7 @@ def _condensed(
     def dofs(nodes: Index) -> Index:
         return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
+    # nodes on the boundary follow the masters, all others are free
     matrix, size = body.stiffness.tocsc(), body.stiffness.shape[0]
     boundary = dofs(masters.boundary)
     fixed = boundary if held is None else np.union1d(boundary, dofs(held))
@@ -137,6 +138,7 @@ def _condensed(
         permc_spec="MMD_AT_PLUS_A",
         options={"SymmetricMode": True},
     )
+    # response of the free nodes to the masters and to forces on the loaded surfaces
     pull = matrix[free][:, boundary] @ follow
     units = np.zeros((len(free), len(force_dofs)))
     units[np.searchsorted(free, force_dofs)] = spread.toarray()

@@ -37,6 +37,7 @@ def smooth_strip(design: Design) -> StripMesh:
     wall = LARGEST_WALL * rim
     if design.cup is not None:
         wall = min(cup_wall(design), wall)
+    # rows of nodes above and in the lower rim, on a grid of radius and angle
     above = np.linspace(inner + rim, inner + wall, refine_count(LAYERS, n) + 1)
     below = np.linspace(inner + wall, inner, refine_count(LOWER_RIM, n) + 1)
     radius = np.concatenate([above, below[1:]])

@@ -231,6 +231,7 @@ def lobe_characteristic(
             features that the 3D model lacks.
         ComputationError: If a solve fails or the model does not fit in memory.
     """
+    # force and play without tooth contact
     model = solid_sector_model(design, half=True)
     cup, height = cup_of(model, design), lobe_height(design)
     stiffness = cup.pull(1.0, place).stiffness
@@ -256,6 +257,7 @@ def lobe_characteristic(
     )
     if isinf(free_teeth.take_up):
         return free_teeth
+    # force on the teeth beyond the take-up
     pressed, planes = [(free_teeth.take_up, 0.0)], cup.share(place)
     for k, part in enumerate(BEYOND):
         w = free_teeth.take_up + part * height

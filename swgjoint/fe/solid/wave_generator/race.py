@@ -173,6 +173,7 @@ class SolidRace:
             race: Coordinates (N, 2, 4) [m].
             alpha: Wave-generator angle [rad].
         """
+        # bending and stretching in the plane
         plane_ring, n = self.on_balls.race, self.sectors
         plane = race[..., :2]
         whole = np.concatenate([plane, -plane]) if self.half else plane
@@ -181,6 +182,7 @@ class SolidRace:
         gradient, hessian = np.zeros((n, 2 * NODE)), np.zeros((n, 2 * NODE, 2 * NODE))
         gradient[:, PLANE[:4]] = nodal.reshape(-1, 4)[:n]
         hessian[:, PLANE[:, None], PLANE] = blocks[:n]
+        # contact with the balls on the elements of the model
         balls = self.on_balls.press_balls(q, alpha, self.phase, self._feet(race, alpha))
         on = np.flatnonzero(balls.overlap > 0.0)
         on = on[balls.seen.dofs[on, 0] // 4 < n]
@@ -195,12 +197,14 @@ class SolidRace:
             (sector[:, None, None], PLANE[:, None], PLANE),
             np.swapaxes(rows, 1, 2) @ (form @ rows),
         )
+        # roll and axial motion out of the plane
         out = np.concatenate([ROLL, AXIAL])
         moved = self.elements(race)[:, out]
         pulled = moved @ self.roll.stiffness
         gradient[:, out] += pulled
         hessian[:, out[:, None], out] += self.roll.stiffness
         bent = 0.5 * float(np.einsum("si,si->", moved, pulled))
+        # weak springs and fixed coordinates against rigid motions
         largest = float(np.abs(np.einsum("sii->si", hessian)).max())
         every = np.arange(2 * NODE)
         hessian[:, every, every] += ANCHOR * largest

@@ -72,6 +72,7 @@ class RaceOutside:
             Gap (N, b) [m], and its derivatives by the points (N, b, 3), by the mean
             line (N, b, 4, 2) and by u (N, b, 4) [-].
         """
+        # feet of the points on the mean line, by Newton's method
         flat, z = points[..., :2], points[..., 2]
         xi = np.broadcast_to(start, z.shape).copy()
         for _ in range(8):
@@ -82,6 +83,8 @@ class RaceOutside:
             xi += np.clip(step, -1.0, 1.0)
             if np.abs(step).max() < 1e-12:
                 break
+        # distance from the mean line, roll at the foot and its derivative along the
+        # outside
         value, first, second = hermite(xi)
         r, v, w = (h @ line for h in (value, first, second))
         length = np.hypot(v[..., 0], v[..., 1])

@@ -1,9 +1,9 @@
 r"""Roll of the wave generator's outer race about the circumferential direction.
 
-The edge at z = b/2 moves outward by u and the other edge inward. Roll
-:math:`\vartheta = 2u/b` and axial motion w have the strain energy of a curved beam
-(Timoshenko, Strength of Materials II, circular rings out of their plane; textbook, not
-checked):
+The edge at z = b/2 moves outward by u and the other edge inward. For the roll
+:math:`\vartheta = 2u/b` and the axial motion w the strain energy is that of a curved
+beam (Timoshenko, Strength of Materials II, circular rings bent out of their plane; not
+checked against the book):
 
 .. math:: U = \int \tfrac12 EI_z\Bigl(\frac\vartheta r - w''\Bigr)^2
     + \tfrac12 GJ\Bigl(\vartheta' + \frac{w'}r\Bigr)^2 ds, \quad
