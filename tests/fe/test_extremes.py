@@ -84,7 +84,7 @@ def test_a_load_out_of_reach_ends_with_advice():
     """A thousand times the rated torque: what failed, and what to try."""
     design = few_teeth()
     with pytest.raises(
-        ComputationError, match=naming("reference-2d", "20000 N·m", "1000 x", "20 N·m")
+        ComputationError, match=naming("reference-2d", "20000 N·m", "1000", "20 N·m")
     ) as found:
         simulate_meshing(design, torque=20_000.0, steps=1, half=True)
     advice = {outcome.value for outcome in Outcome if not outcome.ok}
