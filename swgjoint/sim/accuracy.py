@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import mujoco
 import numpy as np
@@ -238,21 +239,28 @@ def errors(run: Run, reference: Run) -> dict[str, float]:
 def common_samples(run: Run, other: Run) -> tuple[slice, slice]:
     """Slices that select the samples of two runs at common times.
 
+    The common samples are one least common multiple of the two sampling intervals
+    apart: 1 ms for intervals of 0.2 ms and 0.125 ms.
+
     Args:
         run: The first run.
-        other: The second run; one interval is a multiple of the other.
+        other: The second run.
 
     Returns:
         Slices of ``run`` and of ``other``.
 
     Raises:
-        ValueError: If the two runs have no samples at the same times.
+        ValueError: If the two runs have no samples at the same times after the first.
     """
-    interval = run.time[1], other.time[1]
-    by = [max(1, round(max(interval) / one)) for one in interval]
+    # scenes with a sampled loop keep every step, so neither interval need divide the
+    # other
+    most = max(run.time.size, other.time.size)
+    ratio = Fraction(run.time[1] / other.time[1]).limit_denominator(most)
+    by = ratio.denominator, max(1, ratio.numerator)
     count = min(len(run.time[:: by[0]]), len(other.time[:: by[1]]))
     own, theirs = (slice(0, (count - 1) * n + 1, n) for n in by)
-    if not np.allclose(run.time[own], other.time[theirs], atol=1e-9):
+    same = np.allclose(run.time[own], other.time[theirs], rtol=0.0, atol=1e-9)
+    if count < 2 or not same:
         raise ValueError("the two runs have no samples at the same times")
     return own, theirs
 

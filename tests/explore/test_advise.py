@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from messages import names, naming
 
@@ -23,8 +24,10 @@ from swgjoint.sim.accuracy import (
     Setting,
     SettingOutcome,
     attempt,
+    common_samples,
     errors,
 )
+from swgjoint.sim.motion.trajectory import time_grid
 
 
 @pytest.fixture(scope="module")
@@ -194,6 +197,59 @@ def test_a_run_that_fails_ends_what_was_settled_before(bench, monkeypatch):
         ComputationError, match=naming("bench", "full", "reference", "cut")
     ):
         settle(bench.scene, parse_bound("1arcmin"), bench.drives)
+
+
+def test_a_scene_with_a_sampled_loop_gets_its_advice(bench):
+    """It keeps every step: every 0.2 ms in a run, every 0.125 ms in the reference."""
+    scene = bench.scene.with_changes(
+        {
+            "controller": {
+                "kind": "computed_torque",
+                "natural_frequency_Hz": 8.0,
+                "damping_ratio": 1.0,
+            }
+        }
+    )
+    found = advise(
+        scene,
+        parse_bound("0.3arcmin"),
+        drives=bench.drives,
+        levels=("full",),
+        steps=(2e-4,),
+    )
+    assert found["step_s"] == 2e-4
+    assert 0.0 < found["expected_error"] <= 0.3
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "common"),
+    [
+        (2e-4, 1.25e-4, 1e-3),
+        (1e-3, 1e-3 / 64, 1e-3),
+        (5e-4, 5e-3, 5e-3),
+        (3e-4, 1e-3, 3e-3),
+        (1e-3, 1e-3, 1e-3),
+    ],
+)
+def test_common_samples_of_two_runs(own, other, common):
+    """They are one least common multiple of the two intervals apart."""
+    # runs end at the whole step that is nearest to 11 s
+    times = [time_grid(11.0, step) for step in (own, other)]
+    runs = [SimpleNamespace(time=time) for time in times]
+    slices = common_samples(*runs)
+    kept = [time[part] for time, part in zip(times, slices, strict=True)]
+    expected = common * np.arange(len(kept[0]))
+    assert np.allclose(kept[0], expected, rtol=0.0, atol=1e-9)
+    assert np.allclose(kept[1], expected, rtol=0.0, atol=1e-9)
+    assert len(kept[0]) > 10.99 / common
+
+
+def test_runs_without_common_samples_are_refused():
+    """The start alone is no comparison; neither are times that drift apart."""
+    for own, other in ((np.arange(5) * 0.1, np.arange(5) * 0.09), ([0, 1], [0, 3])):
+        runs = [SimpleNamespace(time=np.asarray(time)) for time in (own, other)]
+        with pytest.raises(ValueError, match="samples at the same times"):
+            common_samples(*runs)
 
 
 def test_a_bound_beyond_the_reference(bench, monkeypatch):
