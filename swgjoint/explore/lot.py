@@ -1,9 +1,9 @@
-"""A lot of drives of one design: their accuracy, and how many of them meet a spec.
+"""Accuracy and yield of a lot of drives of one design.
 
 The errors of each drive are drawn with a seed of its own. The tolerances of the design
-are either the sizes of the errors (``limit``), which gives the worst lot that may be
-delivered, or their upper limits (``uniform``); then each size is drawn between zero and
-its limit.
+have one of two meanings. With ``limit``, they are the sizes of the errors, which gives
+the worst lot that may be delivered. With ``uniform``, they are upper limits, and each
+size is drawn between zero and its limit.
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ LOWER = ("torsional_stiffness_Nm_rad",)
 """Figures with a lower limit."""
 FIGURES = UPPER + LOWER
 SIZES = ("limit", "uniform")
+"""Meanings of the tolerances: sizes of the errors, or upper limits of these sizes."""
 
 CHUNK = 10
-"""Drives per task, which takes some seconds. A task carries the error-free positions,
-tens of megabytes; each drive is solved alone and stored as soon as it is solved."""
+"""Number of drives per task. A task takes a few seconds and contains tens of megabytes
+of error-free positions. Each drive is stored as soon as it is solved."""
 _SIZE_STREAM = 100
 """Stream of the random sizes of a drive; the streams of its errors have lower
 numbers."""
@@ -59,13 +60,13 @@ class Drawn:
 
     seed: int
     transmission_accuracy_arcmin: float | None
-    """Peak-to-peak kinematic error over one output turn [arcmin]: the middle between
-    the value certain from low orders and samples and the largest value with the
-    remaining orders. With the wave generator fixed, turns differ; this is the first
-    one."""
+    """Peak-to-peak kinematic error over one output turn [arcmin]: midpoint of a lower
+    estimate from the low orders and the samples, and an upper estimate that adds the
+    largest contribution of the remaining orders. With the wave generator fixed, the
+    error differs from turn to turn; the value refers to the first turn."""
     ripple_rms_percent: float | None
-    """Rms torque ripple at rated torque with the output on its ideal motion [% of rated
-    torque]."""
+    """Rms torque ripple at rated torque, with the output constrained to its ideal
+    motion [% of rated torque]."""
     torsional_stiffness_Nm_rad: float | None
     """Mean tangent stiffness at rated torque [N·m/rad]."""
 
@@ -75,7 +76,7 @@ class Drawn:
         return self.transmission_accuracy_arcmin is None
 
     def meets(self, spec: Mapping[str, float]) -> bool:
-        """Whether every limit is met; a drive that cannot be solved meets none."""
+        """Whether the drive meets every limit; a drive without solution meets none."""
         if self.failed:
             return False
         return all(
@@ -89,6 +90,7 @@ class _Judged:
     """Stored :func:`superposition_error` of the first drive."""
 
     error: float | None
+    """Relative deviation from full solves [-]; None if none of them succeeded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +107,7 @@ def draw(design: Design, seed: int, sizes: str = "limit") -> Design:
     Args:
         design: Design whose ``tolerances`` are the sizes of the errors or their limits.
         seed: Seed of all errors of the drive.
-        sizes: One of :data:`SIZES`.
+        sizes: Meaning of the tolerances, one of :data:`SIZES`.
     """
     changes: dict[str, Any] = {"tolerances.seed": seed}
     if sizes == "uniform":
@@ -142,15 +144,17 @@ def run_lot(
         sizes: Meaning of the tolerances of the design, see :data:`SIZES`.
         spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
         jobs: Number of processes.
-        progress: Called with the stage, the number of finished tasks and their total.
+        progress: Called with the stage, the number of finished drives and their total.
 
     Returns:
-        ``rows`` (:class:`Drawn` and, with a spec, ``passed``), ``figures``
-        (:func:`distribution` of each), ``yield`` (None without a spec; ``part``, its
-        95 % interval ``low`` and ``high``, and that of each limit alone in
-        ``by_limit``), ``validity`` (level, torque, effects left out,
-        ``superposition_error``: difference of the first drive from full solves over its
-        peak to peak), ``failed``, ``wall_s``, ``sizes``, ``spec``, ``design``.
+        ``rows`` (fields of :class:`Drawn` and, with a spec, ``passed``), ``figures``
+        (:func:`distribution` of each figure), ``yield`` (None without a spec; fraction
+        ``part`` of drives that pass, its 95 % interval ``low`` to ``high``, and in
+        ``by_limit`` the same for each limit alone), ``validity`` (level, torque,
+        effects left out, and ``superposition_error``, see
+        :func:`~swgjoint.fe.tolerances.lot.superposition_error`, of the first drive),
+        ``failed`` (number of drives without solution), ``wall_s``, ``sizes``, ``spec``,
+        ``design``.
 
     Raises:
         DesignError: If the design cannot be built, or has no errors to draw.
@@ -272,7 +276,7 @@ def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
 
 @lru_cache
 def _own_version() -> str:
-    """Hash of the code in this file that determines the figures of a drive."""
+    """Hash of the code that turns the output errors of a drive into its figures."""
     return code_hash("explore/lot.py", "maps/sheet/sampled_accuracy.py")
 
 
@@ -282,7 +286,7 @@ def _solved(task: _Task) -> list[Drawn]:
 
 
 def _one(rests: Sequence[Rest], drive: Design, path: Path | None) -> Drawn:
-    """Solve one drive alone: solving it in a batch would change its round-off."""
+    """Solve one drive alone, because a batch would change its round-off; store it."""
     found = _figures(sample_lot([drive], rests), 0, drive)
     if path is not None:
         keep(path, json_file(found))
@@ -304,7 +308,7 @@ def _figures(lot: Lot, n: int, drive: Design) -> Drawn:
     most = max(sure, low + 2.0 * REST * rest)
     if lot.whole[n]:
         sure = most = float(np.ptp(unloaded))
-    # torque that holds the output on its ideal motion against the error
+    # torque change that keeps the output on its ideal motion in spite of the error
     torque = (loaded - loaded.mean()) / compliance
     rated = ratings_of(drive).rated_torque
     return Drawn(

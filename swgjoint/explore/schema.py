@@ -22,7 +22,9 @@ from swgjoint.faults import unit_of
 from swgjoint.sim.figures import keys
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+"""Version of JSON Schema."""
 KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
+"""Kinds of input files."""
 _SIGNS = {
     "exclusiveMinimum": ">",
     "minimum": ">=",
@@ -35,8 +37,9 @@ def file_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of one kind of file.
 
     Args:
-        kind: One of :data:`KINDS`; ``spec`` is the file of limits for ``compare``,
-            ``lot`` that for ``lot``, ``optimise`` a file of a search.
+        kind: One of :data:`KINDS`. ``optimise`` is the file of a search; ``spec`` and
+            ``lot`` are the files with the limits of ``swgjoint compare`` and
+            ``swgjoint lot``.
     """
     if kind in ("spec", "lot"):
         return _limits(kind)
@@ -120,8 +123,8 @@ def _limits(kind: str) -> dict[str, Any]:
     meaning = meanings(of)
     figures = {}
     for key in (*upper, *lower):
-        bound = "Most" if key in upper else "Least"
-        text = f"{bound} that is accepted. {meaning.get(key, '')}".strip()
+        bound = "Largest" if key in upper else "Smallest"
+        text = f"{bound} accepted value. {meaning.get(key, '')}".strip()
         unit = {"unit": unit_of(key)} if unit_of(key) else {}
         entry = {"type": "number", "exclusiveMinimum": 0, "description": text}
         figures[key] = {**entry, **unit}
@@ -146,10 +149,10 @@ def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Flatten a schema into one entry per key, tables before their keys.
 
     Returns:
-        ``key`` (dotted; NAME is a placeholder for a name that the file chooses, [] for
-        an item of a list), ``of_kind`` (kind of the table it belongs to, or None),
-        ``type``, ``unit``, ``range``, ``default`` (None if there is none),
-        ``required``, ``meaning``.
+        ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of
+        a list), ``of_kind`` (value of ``kind`` in the table of the key; None if the
+        table has no kinds), ``type``, ``unit``, ``range``, ``default`` (None if there
+        is none), ``required``, ``meaning``.
     """
     return list(_keys(schema, schema, "", None))
 
@@ -181,7 +184,7 @@ def _keys(
 def _below(
     form: Mapping[str, Any], root: Mapping[str, Any], key: str
 ) -> Iterator[dict[str, Any]]:
-    """Keys of a table, of tables with chosen names, and of a list of tables."""
+    """Keys of a table, of tables with free names, and of the tables in a list."""
     if "properties" in form:
         kind = form["properties"].get("kind", {}).get("const")
         yield from _keys(form, root, f"{key}.", kind)

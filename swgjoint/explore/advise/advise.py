@@ -1,8 +1,8 @@
 """``swgjoint advise``: the cheapest level, integrator and step within an error.
 
-All errors are measured on the scene itself. The reference is level ``full``, whose step
-is halved until two extrapolations to step zero agree. Settings are then tried in the
-order of their cost until one is within the bound.
+All errors are measured on the scene itself. The reference is level ``full``
+extrapolated to step zero; its step is halved until two successive extrapolations agree.
+Settings are then tried in the order of increasing cost until one meets the bound.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from swgjoint.sim.assembly import assemble
 from swgjoint.sim.scene.scene import Scene
 
 STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
-"""Steps that are tried [s]."""
+"""Time steps to try [s]."""
 
 
 def advise(
@@ -37,7 +37,7 @@ def advise(
     steps: Sequence[float] = STEPS,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Find the cheapest setting of a scene within an error.
+    """Find the cheapest setting of a scene that meets an error bound.
 
     Args:
         scene: The scene; its own levels, integrator and step do not matter.
@@ -48,16 +48,17 @@ def advise(
         progress: Called while maps are built and after every run.
 
     Returns:
-        ``level``, ``integrator``, ``step_s``, ``sub_steps``, ``expected_error`` in
-        ``unit``, ``expected_error_arcmin`` (of the link angle), ``cost`` (CPU time per
-        simulated time, divided by that of the rigid arm at 1 ms), ``reference``,
-        ``rows`` (settings that were tried, the cheapest first), ``wall_s``.
+        ``scene``, ``bound`` and ``quantity`` of the bound; ``level``, ``integrator``,
+        ``step_s`` and ``sub_steps`` of the cheapest setting; its ``expected_error`` in
+        ``unit``, ``expected_error_arcmin`` (of the link angle) and ``cost`` (CPU time
+        per simulated time, divided by that of the rigid arm at 1 ms); ``reference``;
+        ``rows`` (settings in the order in which they were tried); ``wall_s``.
 
     Raises:
-        InputError: If the scene cannot be run, or has no tool although the bound is one
-            of the tool position.
-        ComputationError: If the reference does not converge, or no setting is within
-            the bound; the message names the best one.
+        InputError: If the scene cannot be run, or if the bound refers to the tool
+            position and the arm has no tool.
+        ComputationError: If the reference does not converge, or if no setting meets the
+            bound; the message then names the most accurate setting.
     """
     begin = time.perf_counter()
     known = _loaded(scene, drives, progress)
@@ -65,7 +66,7 @@ def advise(
         raise InputError(
             f"--error {bound.text}: arm {scene.arm!r} has no tool; accepted: an angle"
         )
-    # schemes that diverge are rows, the engine need not print them too
+    # a diverging run becomes a row, so the engine need not print a warning
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         reference = settle(scene, bound, known, progress)
@@ -115,7 +116,11 @@ def advise(
 def _loaded(
     scene: Scene, drives: Mapping[str, DriveMap] | None, progress: Progress
 ) -> dict[str, DriveMap]:
-    """Maps of all joints, built once; an unusable scene is rejected here."""
+    """Maps of all joints, each built once.
+
+    Raises:
+        InputError: If the scene cannot be run.
+    """
     known = dict(drives or {})
     rigid = assemble(scene.with_level("rigid"), drives=known, progress=progress)
     for name in rigid.joints:

@@ -20,6 +20,7 @@ UNITS = {
     "mm": ("tool_position", mm),
     "um": ("tool_position", um),
 }
+"""Quantity and SI value of each accepted unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,13 +28,15 @@ class ErrorBound:
     """An accepted rms error of the link angle or of the tool position."""
 
     text: str
+    """Bound as entered by the user, with its unit."""
     quantity: str
+    """``link_angle`` or ``tool_position``."""
     value: float
-    """Error, in the unit that ``QUANTITIES`` lists for its quantity."""
+    """Largest accepted error, in :attr:`unit`."""
 
     @property
     def unit(self) -> str:
-        """Unit of ``value``."""
+        """Unit of ``value``: arcmin or mm."""
         return QUANTITIES[self.quantity]
 
 
@@ -41,7 +44,7 @@ def parse_bound(text: str) -> ErrorBound:
     """Parse a number with its unit, such as ``0.1arcmin``, ``2e-5rad`` or ``0.05mm``.
 
     Raises:
-        InputError: If the text is not such a number, or it is not above zero.
+        InputError: If the text is not such a number, or if the number is not positive.
     """
     accepted = f"accepted: a number > 0 with one of {', '.join(UNITS)}, as in 0.1arcmin"
     found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*([a-z]+)\s*", text, re.I)

@@ -16,10 +16,10 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 
 REFERENCE_STEPS = tuple(1e-3 / 2**k for k in range(1, 7))
-"""Steps of the reference, used in this order until it converges [s]."""
+"""Time steps of the reference, used in this order until it converges [s]."""
 SETTLED, TRUSTED = 0.02, 0.2
-"""Disagreement of two extrapolations, over the bound: below the first value the
-reference has converged, above the second one the scene has no reference."""
+"""Difference of two successive extrapolations, divided by the bound [-]. Up to the
+first value the reference has converged; above the second value it is rejected."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,11 +27,12 @@ class FullReference:
     """Level ``full`` without time-discretisation error."""
 
     run: Run
+    """Extrapolated signals at the samples of the longer of the two last steps."""
     step: float
-    """Smallest step that was used for the extrapolation [s]."""
+    """Shortest time step used for the extrapolation [s]."""
     error: float
-    """Difference from the extrapolation from twice that step, in the unit of the
-    bound."""
+    """Difference from the previous extrapolation, whose steps are twice as long, in the
+    unit of the bound."""
 
 
 def settle(
@@ -42,9 +43,10 @@ def settle(
 ) -> FullReference:
     """Compute the reference: halve the step until two extrapolations agree.
 
-    The scheme is of first order in the link angle, because the positions of the engine
-    lead by half a step; the extrapolation is 2 x(h) - x(2h). A shorter step also
-    resolves more harmonics, about which the two extrapolations then disagree.
+    The link angle converges with first order, because the positions of the engine lead
+    by half a step; the extrapolation is therefore 2 x(h) - x(2h). A shorter step may
+    also resolve harmonics that a longer one leaves out; successive extrapolations then
+    differ by these harmonics.
 
     Args:
         scene: The scene.
@@ -53,13 +55,14 @@ def settle(
         progress: Called after every run.
 
     Raises:
-        ComputationError: If the disagreement stays above :data:`TRUSTED` times the
+        ComputationError: If fewer than three successive steps run, or if the
+            difference of the last two extrapolations exceeds :data:`TRUSTED` times the
             bound.
     """
     last: Run | None = None
     best: Run | None = None
     apart, step = np.inf, 0.0
-    reason: str | None = "fewer than three steps in a row run"
+    reason: str | None = "fewer than three successive steps were run"
     stage = f"{scene.name}: reference"
     for k, h in enumerate(REFERENCE_STEPS):
         progress(stage, k, len(REFERENCE_STEPS))
@@ -67,7 +70,7 @@ def settle(
             scene, Setting(level="full", integrator="discrete", step=h), drives
         )
         if got.run is None:
-            # what disagreed before is no word on the steps that follow
+            # agreement before a failed step says nothing about the steps after it
             last, best, apart, step = None, None, np.inf, 0.0
             reason = got.reason
             continue
@@ -84,15 +87,15 @@ def settle(
         raise ComputationError(f"{scene.where}: level full has no reference: {reason}")
     if apart > TRUSTED * bound.value:
         raise ComputationError(
-            f"{scene.where}: the reference does not settle within {bound.text}: at"
-            f" steps down to {1e3 * step:g} ms it still moves by {apart:.3g}"
+            f"{scene.where}: the reference does not converge within {bound.text}: at a"
+            f" step of {1e3 * step:g} ms it still changes by {apart:.3g}"
             f" {bound.unit}; use a larger --error"
         )
     return FullReference(run=best, step=step, error=float(apart))
 
 
 def _extrapolated(fine: Run, coarse: Run) -> Run:
-    """Twice the finer run minus the coarser one, at the samples of the coarser one."""
+    """Twice the finer run minus the coarser run, at the samples of the coarser run."""
     own, theirs = common_samples(fine, coarse)
     names = ("position", "torsion", "output_torque", "tool_position")
     return replace(

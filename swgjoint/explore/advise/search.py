@@ -29,21 +29,23 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 
 FLAT = 0.9
-"""Ratio of the error to that at the next longer step above which the error of the level
-itself dominates; shorter steps of that level are not tried."""
+"""Threshold for the error divided by the error at the next longer step [-]. Above it
+the model error of the level dominates, and shorter steps of that level are not tried.
+"""
 ALIKE = 1.05
-"""Factor within which costs count as equal, because timing resolves no smaller
-difference."""
+"""Factor within which two costs count as equal, because timing cannot resolve smaller
+differences [-]."""
 FEWEST = {"discrete": 0.4, "RK4": 1.5}
-"""Lower bound of the cost of a setting at 1 ms before it is measured; it gives the
-order."""
+"""Lower bound of the cost at a step of 1 ms, by integrator [-]; it determines the order
+in which costs are measured."""
 
 
 def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """The cheapest of the rows within the bound; None if there is none.
+    """The cheapest row within the bound; None if no row is within it.
 
-    Among rows of equal cost (:data:`ALIKE`) the lowest level is chosen, then the
-    smallest error, so that two runs on a busy machine give the same advice.
+    Among rows of equal cost (see :data:`ALIKE`) the one with the lowest level wins,
+    then the one with the smallest error. The advice therefore does not depend on the
+    scatter of the timing.
     """
     within = [row for row in rows if row["within"]]
     least = min((row["cost"] for row in within), default=np.inf)
@@ -56,11 +58,12 @@ def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
 
 @dataclass(frozen=True, kw_only=True)
 class SettingSearch:
-    """Settings of one scene, the cheapest first."""
+    """Search over the settings of one scene, from cheap to costly."""
 
     scene: Scene
     bound: ErrorBound
     drives: Mapping[str, DriveMap]
+    """Maps by drive reference."""
     reference: FullReference
 
     def run(
@@ -68,7 +71,8 @@ class SettingSearch:
     ) -> list[dict[str, Any]]:
         """Run settings in the order of their cost until one is within the bound.
 
-        Settings of about the same cost as this one are run, too.
+        Settings whose cost equals that of this setting within :data:`ALIKE` are also
+        run.
 
         Args:
             levels: Levels to try.
@@ -76,7 +80,7 @@ class SettingSearch:
             progress: Called after every run.
 
         Returns:
-            One row per setting that was run.
+            One row per setting that was run or refused.
         """
         rigid = rigid_arm(self.scene, self.drives)
         settings = [
@@ -121,7 +125,7 @@ class SettingSearch:
             error = row["error"]
             if error is None:
                 continue
-            # half the step, nine tenths of the error: the rest is the level's
+            # a shorter step that hardly reduces the error leaves that of the level
             if setting.level != "full" and error > FLAT * last.get(key, np.inf):
                 flat |= {(setting.level, one) for one in SCENE_INTEGRATORS}
             last[key] = error

@@ -19,24 +19,28 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 AHEAD = 3
-"""Tasks submitted per worker thread: one runs, two wait."""
+"""Number of tasks submitted per worker thread: one runs, two wait."""
 CONNECT_S = 15.0
+"""Time limit for connecting to a scheduler [s]."""
 ONE_THREAD = tuple(
     f"export {name}_NUM_THREADS=1" for name in ("OMP", "OPENBLAS", "MKL")
 )
+"""Shell commands that limit linear algebra to one thread."""
 
 
 @dataclass(frozen=True)
 class DaskPool:
     """Workers of a dask scheduler.
 
-    If a worker dies, its tasks go to another worker. The scheduler gives up tasks that
-    have seen more than ``allowed-failures`` deaths (3, a setting of the scheduler).
-    Each of these is tried again alone; if its worker dies again, the task is lost.
-    Workers with a nanny, which is dask's default, use one thread for linear algebra.
+    If a worker dies, its tasks go to another worker. The scheduler gives up a task
+    after more than ``allowed-failures`` deaths of its workers (a setting of the
+    scheduler, 3 by default). Each of these tasks is then tried again alone; if the
+    worker dies again, the task is lost. Workers with a nanny, which is dask's default,
+    use one thread for linear algebra.
     """
 
     client: Any
+    """Client of the scheduler (``distributed.Client``)."""
 
     @property
     def workers(self) -> int:
@@ -74,7 +78,7 @@ class DaskPool:
                 suspects.append(task)
             else:
                 yield task, found
-        # one by one, so that a task that kills its worker affects no other task
+        # one at a time, so that a task that kills its worker affects no other task
         yield from self._run_at(lambda: 1, function, iter(suspects))
 
     def _run_at(
@@ -97,7 +101,7 @@ class DaskPool:
         hand_out()
         for future in ready:
             if future.status in ("lost", "pending"):
-                # the worker that held the result died: the scheduler computes it again
+                # the worker with the result died, so the scheduler repeats the task
                 ready.add(future)
                 continue
             task = out.pop(future.key)
@@ -109,7 +113,7 @@ class DaskPool:
                 if future.status != "error":  # the scheduler has forgotten it
                     raise ConnectionError(f"task {future.status}") from error
                 raise ComputationError(
-                    f"a worker cannot compute: {type(error).__name__}: {error}"
+                    f"a worker failed: {type(error).__name__}: {error}"
                 ) from None
             yield task, found
             hand_out()
@@ -133,7 +137,7 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
     try:
         there = _address(address)
         client = Client(there, timeout=CONNECT_S, set_as_default=False)
-    # missing file, unknown protocol, refused connection; too deeply nested JSON
+    # missing file, unknown protocol, refused connection or too deeply nested JSON
     except (OSError, ValueError, RecursionError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"scheduler {address!r}: {text}") from None
@@ -142,9 +146,9 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
 
 
 def _address(reference: str) -> str:
-    """Check an address, or read it from a scheduler file.
+    """Address of a scheduler, checked, or read from a scheduler file.
 
-    With an invalid address the client of dask would hang for half a minute.
+    With an invalid address, dask's client would hang for half a minute.
 
     Raises:
         OSError: If the scheduler file cannot be read.
@@ -171,7 +175,7 @@ def _address(reference: str) -> str:
 
 
 def slurm_cluster(settings: SlurmCluster) -> Any:
-    """Create the cluster of the settings; no job is submitted yet.
+    """Create the SLURM cluster of the settings; no job is submitted yet.
 
     Raises:
         MissingExtraError: If dask-jobqueue is not installed.
@@ -204,14 +208,14 @@ def _missing() -> MissingExtraError:
 def chosen_executor(
     file: AskedFile, *, jobs: int | None = None, scheduler: str | None = None
 ) -> Iterator[Executor]:
-    """Choose the executor: scheduler, local jobs, or the cluster of the file.
+    """Choose the executor: a dask scheduler, local processes or a SLURM cluster.
 
-    If none of these is specified, one job runs on every core of this machine.
+    If none of these is specified, one process runs on every core of this machine.
 
     Args:
         file: File whose ``cluster`` is used if neither keyword is specified.
-        jobs: Processes on this machine.
-        scheduler: Address or file of a dask scheduler; takes precedence.
+        jobs: Number of processes on this machine.
+        scheduler: Address or file of a dask scheduler; takes precedence over ``jobs``.
 
     Raises:
         InputError: If no scheduler answers at the address.

@@ -39,19 +39,21 @@ MESHING_FIGURES = (
 )
 """Figures of the meshing task.
 
-Stresses are the largest stress in the flexspline or circular spline, averaged over the
-positions. Errors are peak-to-peak output errors over the positions: under the torque
-and, in a second simulation, unloaded. The number of pairs is the mean over the
-positions. The stiffness is the reciprocal of the mean compliance under the torque,
+A stress is the largest one in the flexspline or circular spline, averaged over the
+positions. The transmission error is the peak-to-peak output error over the positions
+under the torque, the kinematic error that of a second, unloaded simulation. The torque
+of the wave generator is also a peak-to-peak value. The number of pairs is the mean over
+the positions. The stiffness is the reciprocal of the mean compliance under the torque,
 including cup and mounting.
 """
 SPEC_FIGURES = tuple(
     key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
 )
-"""Keys of the specification sheet that the map of a design provides."""
+"""Keys of the specification sheet that a sweep can compute."""
 SIZE_FIGURES = ("outer_diameter_mm", "length_mm", "volume_cm3")
 """Outer diameter of the circular spline including its rim, length of the cup (face
-width for a design without cup), and volume of the cylinder with both dimensions."""
+width for a design without cup), and volume of the cylinder of this diameter and length.
+"""
 RUN_FIGURES = (
     "ripple_rms_percent",
     "ripple_pp_percent",
@@ -64,10 +66,12 @@ RUN_FIGURES = (
     "peak_torque_of_rating",
     "cubed_mean_torque_of_rating",
 )
-"""Figures of :class:`swgjoint.explore.compare.compare.Compared` except run times."""
+"""Figures of a run, see :class:`swgjoint.explore.compare.compare.Compared`."""
 
 OK = "ok"
+"""Outcome of a design with figures."""
 LOST = "lost"
+"""Outcome of a design that failed because of the machine."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +79,7 @@ class Asked:
     """One design or scene, and the tasks to compute for it."""
 
     key: str
+    """Key under which the record is stored."""
     design: Design | None
     scene: Scene | None
     meshing: MeshingTask | None
@@ -88,10 +93,10 @@ class Record:
     """Outcome and figures of one design."""
 
     outcome: str
-    """``ok``, ``refused`` (the values give no valid design), ``infeasible`` (cannot be
-    built), ``failed`` (not solved), ``error`` (a bug) or ``lost`` (its process died, or
-    memory, disk space or a package was missing). A lost record is not stored, because
-    another machine may succeed."""
+    """``ok``, ``refused`` (the values give no valid design), ``infeasible`` (the design
+    cannot be built), ``failed`` (no solution), ``error`` (a bug) or ``lost`` (the
+    process died, or memory, disk space or a package was missing). A lost record is not
+    stored, because another machine may succeed."""
     reason: str = ""
     """Why there are no figures, or why some are missing."""
     figures: dict[str, float | None] = field(default_factory=dict)
@@ -117,7 +122,7 @@ def compute_all(points: Sequence[Point]) -> tuple[str, list[Record]]:
 
 
 def _load(first: Asked) -> None:
-    """Import the modules that the tasks need, so that ``work_s`` excludes imports."""
+    """Import the modules that the tasks need, to exclude imports from ``work_s``."""
     from swgjoint.gear.design import feasibility  # noqa: F401
     from swgjoint.maps.sheet.spec_sheet import needs_map
 
@@ -140,7 +145,7 @@ def compute(asked: Asked) -> Record:
             outcome = "infeasible"
         else:
             found, reason = _figures(asked)
-            # not a number becomes None, like a value that the model does not provide
+            # NaN becomes None, like a value that the model does not provide
             figures = {k: v if _finite(v) else None for k, v in found.items()}
             outcome = OK
     except InputError as error:
@@ -192,7 +197,7 @@ def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
 
 
 def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
-    """Means and ranges over the positions of the wave generator."""
+    """Figures of the meshing task: means and ranges over the positions."""
     from swgjoint.gear.catalogue import ratings_of
     from swgjoint.gear.mounting import series_compliance
 
@@ -249,7 +254,8 @@ def _map(
     from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
-    if not turn and has_errors(design):  # measured with the input locked
+    # figures with locked input describe the drive without tooth errors
+    if not turn and has_errors(design):
         design = without_errors(design)
     return build_map(design, model=task.model, angles=task.angles), design
 
@@ -292,7 +298,7 @@ def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
 def _run(
     scene: Scene, design: Design | None, task: RunTask
 ) -> tuple[dict[str, float | None], dict[str, str]]:
-    """Figures of the worst joint of a run, and reasons why some are not valid."""
+    """Figures of the worst joint of a run, and reasons why figures are not valid."""
     from swgjoint.explore.compare.compare import row_of
     from swgjoint.maps.sheet.validity_marks import joint_doubt
     from swgjoint.sim.figures.keys import RIPPLE

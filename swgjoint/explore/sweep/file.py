@@ -1,4 +1,4 @@
-"""Sweep files: the designs of a sweep, and the tasks computed for each."""
+"""Sweep files: the designs of a sweep, and the tasks computed for each design."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class SweepFile(AskedFile):
 
     @classmethod
     def load(cls, reference: str | Path) -> SweepFile:
-        """Read a sweep file, given as a path or as the name of a bundled one.
+        """Read a sweep file, given as a path or as the name of a bundled file.
 
-        Paths in the file, of bases or of values, are relative to its folder.
+        Relative paths in the file start from its folder.
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file is not found or has faults; one line per fault.
         """
         path = find(reference, "sweeps", ".toml", what="sweep")
         data = read_toml(path, what="sweep")
@@ -43,17 +43,17 @@ class SweepFile(AskedFile):
 
 
 class _Planned(Protocol):
-    """A file with a plan."""
+    """A file with base design, base scene and a plan."""
 
     design: str | None
     scene: str | None
 
     @property
     def plan(self) -> AnyPlan:
-        """Plan with the parameters."""
+        """Plan of the file, with its parameters."""
 
     def model_copy(self, *, update: dict[str, Any]) -> Self:
-        """Copy with other fields."""
+        """Copy with some fields replaced."""
 
 
 Planned = TypeVar("Planned", bound=_Planned)

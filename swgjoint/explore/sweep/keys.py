@@ -17,7 +17,7 @@ from swgjoint.sim.scene.scene import Scene
 ANY = "*"
 """Placeholder for a name that the file chooses, such as the name of a joint."""
 BASE = "design"
-"""The key of the base design itself."""
+"""Key of the base design itself."""
 _PATHS = (BASE, "arm", "trajectory.file", "defaults.drive", f"joints.{ANY}.drive")
 
 
@@ -55,7 +55,8 @@ def known_keys(kind: str) -> dict[str, bool]:
     found: dict[str, bool] = {}
     for key, field in keys_of(model):
         whole = int in (field.annotation, *get_args(field.annotation))
-        # two kinds of profile or wave generator may have the same key
+        # kinds of profiles or wave generators may share a key, which takes integers
+        # only if it does so in all of them
         found[key] = found.get(key, True) and whole
     return found
 
@@ -93,7 +94,7 @@ def is_path(key: str) -> bool:
 
 
 def kind_of(key: str, kinds: tuple[str, ...]) -> str | None:
-    """Whether a key belongs to the ``design`` or the ``scene``; None for neither.
+    """Kind that a key belongs to, ``design`` or ``scene``; None for neither.
 
     Args:
         key: Dotted key, or ``design`` for the base design itself.
@@ -105,7 +106,7 @@ def kind_of(key: str, kinds: tuple[str, ...]) -> str | None:
 
 
 def unknown(key: Any, kinds: tuple[str, ...]) -> str:
-    """Message for an unknown key, with the most similar known keys.
+    """Message for an unknown key; it suggests the most similar known keys.
 
     Args:
         key: Unknown key.

@@ -13,8 +13,8 @@ from swgjoint.faults import Fault, Section, unit_of
 MOST = 1_000_000
 """Largest number of designs in one sweep.
 
-The main process holds about 1 kB per design, and about 5 kB per design while it writes
-the tables: 5 GB for this number.
+The main process needs about 1 kB per design, and about 5 kB per design while it writes
+the tables, that is 5 GB for this number of designs.
 """
 
 Count = Annotated[int, Field(ge=2, le=MOST)]
@@ -22,7 +22,7 @@ Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
 
 
 class Parameter(Section):
-    """Keys that share one value, and the values that they take."""
+    """Keys that share one value, and the values that they take in turn."""
 
     keys: Annotated[tuple[Text, ...], Listed]
     values: Annotated[tuple[Any, ...], Listed] | None = None
@@ -72,7 +72,7 @@ class Parameter(Section):
 
 
 def _tabled(value: Any) -> bool:
-    """Whether tables and JSON can hold a value, unlike the times of TOML."""
+    """Whether tables and JSON can contain a value; dates and times of TOML cannot."""
     if isinstance(value, dict):
         return all(map(_tabled, value.values()))
     if isinstance(value, list | tuple):
@@ -92,7 +92,7 @@ class Grid(Section):
 
 
 class LatinHypercube(Section):
-    """Latin hypercube: one random value in each equally probable part of a range."""
+    """Latin hypercube: one random value in each of n equal parts of every range."""
 
     kind: Literal["latin_hypercube"] = "latin_hypercube"
     designs: Count
@@ -101,7 +101,7 @@ class LatinHypercube(Section):
 
 
 class List(Section):
-    """The first values of all parameters together, then the second ones, and so on."""
+    """Design k has the k-th value of every parameter."""
 
     kind: Literal["list"] = "list"
     parameters: Parameters
@@ -111,7 +111,7 @@ Plan = Annotated[Grid | LatinHypercube | List, Field(discriminator="kind")]
 
 
 class SearchPlan(Section):
-    """Values that a genetic search chooses, generation by generation (NSGA-II).
+    """Values that a genetic search chooses generation by generation (NSGA-II).
 
     Source:
         Deb, Pratap, Agarwal and Meyarivan (2002), "A fast and elitist multiobjective
@@ -120,11 +120,11 @@ class SearchPlan(Section):
 
     kind: Literal["nsga2"] = "nsga2"
     designs: Count = 300
-    """Number of designs that are tried, including those that cannot be built."""
+    """Number of designs to try, including those that cannot be built."""
     population: Annotated[int, Field(ge=2, le=10_000)] = 24
     seed: Seed = 0
     minutes: Annotated[float, Field(gt=0, le=1e6)] | None = None
-    """Time after which no further generation starts [min]. Without this limit the same
+    """Time after which no further generation starts [min]. Without this limit, the same
     file gives the same designs on any machine."""
     parameters: Parameters
 
@@ -185,7 +185,7 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
 
 
 def takes_whole_numbers(parameter: Parameter, kinds: tuple[str, ...]) -> bool:
-    """Whether any key of a parameter takes integers, so that its range is rounded.
+    """Whether any key of a parameter takes integers; values of its range are rounded.
 
     Args:
         parameter: Parameter of a plan.

@@ -28,14 +28,14 @@ from swgjoint.maps.cache import key_of
 from swgjoint.sim.scene.scene import Scene
 
 Values = dict[str, Any]
-"""Value of every parameter by its column."""
+"""Values of the parameters by column."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Point:
     """One row of a sweep.
 
-    The design is built in the process that computes it and is not stored here: a
+    The design is not stored here but built in the process that computes it, because a
     million designs would take 30 GB and keep the main process busy.
     """
 
@@ -43,8 +43,9 @@ class Point:
     key: str | None
     """Key of its record; None if the values give no valid design or scene."""
     fault: str = ""
-    """Why the values are not valid."""
+    """Reason why the values are not valid; empty if they are."""
     bases: Bases = field(repr=False, compare=False)
+    """Base design and scene to which the values are applied."""
 
     @property
     def asked(self) -> Asked | None:
@@ -82,7 +83,7 @@ class Bases:
         return self._designs[reference]
 
     def apply(self, values: Values) -> tuple[Design | None, Scene | None]:
-        """Apply the values of a point to the bases; returns checked design and scene.
+        """Apply the values of a point to the bases; return checked design and scene.
 
         Raises:
             InputError: If the values give no valid design or scene.
@@ -106,9 +107,9 @@ class Bases:
     def arm(
         self, reference: str, tool_site: str, *, balance_inertia: bool = False
     ) -> list[str]:
-        """Hashes of an arm: of its file, and of the compiled model with all includes.
+        """Hashes of the file of an arm, and of its compiled model with all includes.
 
-        The arm is read at the first call; later sweeps read it again.
+        The arm is read only once per sweep.
 
         Args:
             reference: Bundled name or path of the arm.
@@ -167,7 +168,8 @@ def _column(parameter: Parameter, kinds: tuple[str, ...]) -> Sequence[Any]:
 
 
 def _sampled(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
-    """Value at a fraction, 0 to 1, of the list or range; all are equally likely."""
+    """Value at a fraction, 0 to 1, of the list or range; every value has the same
+    share."""
     listed, low, high = parameter.values, parameter.low, parameter.high
     if listed is not None:
         return listed[min(int(part * len(listed)), len(listed) - 1)]
@@ -179,10 +181,10 @@ def _sampled(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
 
 
 def _between(parameter: Parameter, part: float) -> float:
-    """Number at a fraction of the range, 0 to 1."""
+    """Number at a fraction, 0 to 1, of the range."""
     low, high = parameter.low, parameter.high
     assert low is not None and high is not None
-    # both ends equal the bounds of the file to the last digit
+    # this form returns the bounds of the file exactly
     return float(low * (1.0 - part) + high * part)
 
 
@@ -237,7 +239,8 @@ def _parts(
 
 
 def _drives(scene: Scene) -> dict[str, str | None]:
-    """Content of the drives of a scene; catalogue drives are part of the code."""
+    """Hashes of the drives of a scene; None for catalogue drives, which are part of the
+    code."""
     from swgjoint.drives.references import find_drive
 
     names = {section.drive for section in (scene.defaults, *scene.joints.values())}
@@ -252,6 +255,7 @@ def _drives(scene: Scene) -> dict[str, str | None]:
 
 
 def _content(path: Path) -> str:
+    """Hash of a file."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:

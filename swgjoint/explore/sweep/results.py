@@ -56,7 +56,7 @@ class Folder:
             return read_regular(self.path / name)
         except FileNotFoundError:
             return None
-        except OSError as error:  # a file where a folder should be, no permission
+        except OSError as error:  # such as a missing permission, or a file as folder
             why = error.strerror or error
             raise InputError(f"cannot read {self.path_of(name)}: {why}") from None
 
@@ -87,7 +87,7 @@ class Folder:
 
 
 class Remote:
-    """A folder of another file system, such as ``s3://bucket/sweep``."""
+    """A folder of any file system of fsspec, such as ``s3://bucket/sweep``."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -162,7 +162,7 @@ def read_record(place: ResultStore, key: str) -> Record | None:
 def write_record(
     place: ResultStore, key: str, record: Record, values: Mapping[str, Any]
 ) -> None:
-    """Store a record, together with its parameter values for human readers.
+    """Store a record, together with its parameter values for the human reader.
 
     Args:
         place: Store of the records.
@@ -180,12 +180,12 @@ def _name(key: str) -> str:
 def write_to(
     place: ResultStore, outputs: Mapping[str, Callable[[], bytes | None]]
 ) -> list[str]:
-    """Write the outputs of a result; if one fails, the others are still written.
+    """Write the output files of a result; if one fails, the others are still written.
 
     Args:
         place: Folder of the outputs.
-        outputs: Function that makes the content, by name of the file; an output whose
-            content is None is skipped.
+        outputs: Functions that return the content, by file name. A file whose content
+            is None is skipped.
 
     Returns:
         Paths of the written files.
@@ -214,7 +214,8 @@ def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
 
 
 def _column(values: list[Any]) -> list[Any]:
-    """Values of one type: numbers if all are numbers, else strings."""
+    """Values of one type: integers next to floats become floats, all other mixtures
+    strings."""
     kinds = {type(value) for value in values} - {type(None)}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -224,7 +225,8 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def flat(value: Any) -> Any:
-    """Value for one cell of a table: tables and lists as JSON, no infinities."""
+    """Value of a table cell: tables and lists as JSON text, infinity and NaN as None.
+    """
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Mapping | list | tuple):

@@ -14,6 +14,7 @@ class Schedule:
     """A simulated sweep."""
 
     workers: int
+    """Number of computing processes."""
     wall: float
     """Time from the start to the last result [s]."""
     work: float
@@ -21,7 +22,7 @@ class Schedule:
 
     @property
     def efficiency(self) -> float:
-        """Work over wall time and workers [-]."""
+        """Work divided by wall time and workers [-]."""
         return self.work / (self.wall * self.workers)
 
 
@@ -32,7 +33,7 @@ def schedule(
 
     One process hands out the tasks one after the other. The number of workers that it
     can keep busy is therefore limited to about the time of a task divided by the time
-    to hand one out. If handing out takes no time, n tasks in any order end within
+    to hand it out. If handing out takes no time, tasks in any order finish within
     ``work/m + (1 - 1/m) longest`` on m workers (Graham 1966, "Bounds for certain
     multiprocessing anomalies", Bell System Technical Journal 45).
 
@@ -40,7 +41,7 @@ def schedule(
         task_times: Computing time of each task, in the order of handing out, shape
             (n,) [s].
         workers: Number of computing processes.
-        start: Time until the workers are ready, for processes and imports [s].
+        start: Time until the workers are ready: process start and imports [s].
         handing: Time that the main process spends on one task and its result [s].
     """
     times = np.asarray(task_times, dtype=float).ravel().tolist()

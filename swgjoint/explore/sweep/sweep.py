@@ -1,4 +1,4 @@
-"""Sweeps over many designs: each result is kept, and a sweep can be resumed."""
+"""Sweeps over many designs: every result is stored, so a sweep can be resumed."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ class SweepResult:
     file: SweepFile
     points: tuple[Point, ...]
     records: tuple[Record, ...]
-    """In the order of the points."""
+    """Outcome and figures of every point, in the order of the points."""
     reused: int
     """Number of points whose record was stored by an earlier run."""
     computed: int
     """Number of different designs computed in this run."""
     workers: int
+    """Number of processes that computed at the same time."""
     work_s: float
     """Total computing time of the designs computed in this run [s]."""
     wall_s: float
@@ -92,18 +93,19 @@ def run_sweep(
     retry_failed: bool = False,
     progress: Progress = silent,
 ) -> SweepResult:
-    """Compute all designs that are not stored yet; a failed design is a record.
+    """Compute all designs that are not stored yet.
 
-    Every record is stored as soon as it is computed, under a key derived from its
-    inputs. An interrupted sweep therefore resumes where it stopped, and an extended
-    sweep computes only the additional designs. Designs that failed because of the
-    machine (``lost``) are not stored; the next run computes them again.
+    Every record, including that of a failed design, is stored as soon as it is
+    computed, under a key derived from its inputs. An interrupted sweep therefore
+    resumes where it stopped, and an extended sweep computes only the additional
+    designs. Designs that failed because of the machine (``lost``) are not stored; the
+    next run computes them again.
 
     Args:
         file: Sweep file.
         executor: Executor that computes the designs.
         place: Store of the records; None stores none.
-        retry_failed: Whether failures of earlier runs are computed again.
+        retry_failed: Whether designs that failed in earlier runs are computed again.
         progress: Called with the stage, the number of computed designs and their total.
 
     Raises:
@@ -161,8 +163,8 @@ def _computed(
             if alone:
                 yield (alone.pop(),)
                 continue
-            # fill the duration of a task once the time of a design is known; the last
-            # designs are spread over all workers
+            # as many designs as fill the duration of a task, once the time of a design
+            # is known; the last designs are spread over all workers
             fitting = round(TASK_S * count / spent) if spent else 1
             fair = len(queue) // (4 * max(executor.workers, 1))
             yield tuple(queue.pop() for _ in range(max(1, min(fitting, fair))))

@@ -19,7 +19,7 @@ from swgjoint.faults import Fault, Section
 Listed = Field(strict=False, min_length=1)  # TOML has lists, the models tuples
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
-"""A bundled name or a path."""
+"""Name of a bundled file, or a path."""
 
 
 class FigureTask(Section):
@@ -43,17 +43,18 @@ class FigureTask(Section):
 
 
 class MeshingTask(FigureTask):
-    """Meshing simulation: stresses, errors, contact."""
+    """Simulation of meshing: stresses, errors and contact."""
 
     known = MESHING_FIGURES
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
     """Output torque [N·m]; None for the rated torque of the design."""
     positions: Annotated[int, Field(ge=1, le=10_000)] = 6
+    """Number of positions of the wave generator."""
     turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
     """Input rotation [deg]; None for one pitch of the fixed member, after which the
-    pattern of a perfect gear repeats."""
+    mesh cycle of a drive without errors repeats."""
     model: Literal["2d", "3d"] | None = None
-    """Model; None for 3d if the design has a cup, else 2d."""
+    """Fidelity; None for 3d if the design has a cup, else 2d."""
 
     @model_validator(mode="after")
     def _loaded(self) -> MeshingTask:
@@ -74,7 +75,8 @@ class SpecTask(FigureTask):
 
 
 class RunTask(FigureTask):
-    """Run of the scene with the drive in every driven joint; the worst joint counts."""
+    """Run of the scene with the design in every driven joint; the figures are those of
+    the worst joint."""
 
     known = RUN_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
@@ -92,7 +94,9 @@ class SlurmCluster(Section):
 
     kind: Literal["slurm"] = "slurm"
     jobs: Annotated[int, Field(ge=1, le=10_000)]
+    """Number of jobs."""
     cores: Annotated[int, Field(ge=1, le=1_000)]
+    """Number of cores of one job."""
     memory_GB: Annotated[float, Field(gt=0, le=100_000)]
     """Memory of one job [GB]."""
     walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]
@@ -110,7 +114,7 @@ class AskedFile(Section):
     description: Annotated[str, Field(max_length=1000)] = ""
     source: Annotated[str, Field(max_length=1000)] = ""
     design: Reference | None = None
-    """Base of the designs; without it, the scene keeps its drives."""
+    """Base of the designs; without a base, the scene keeps its drives."""
     scene: Reference | None = None
     meshing: MeshingTask | None = None
     spec: SpecTask | None = None

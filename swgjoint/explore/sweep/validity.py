@@ -17,10 +17,11 @@ NOT_MODELLED = {
 }
 """Effects left out, by model of the drive; all models are quasi-static."""
 RUN = "effects left out at the level of a joint, orders too fast for the time step"
+"""Effects left out by the joints of a run."""
 
 
 def validity_of(file: AskedFile) -> dict[str, dict[str, Any]]:
-    """One validity label per task of a sweep.
+    """Validity labels by task of a sweep: ``level``, ``torque``, ``not_modelled``.
 
     ``swgjoint meshing``, ``spec`` and ``run`` report more about a single design. A
     sweep does not estimate the mesh error.

@@ -7,11 +7,12 @@ of an episode is
     = \sqrt{\langle e^2 \rangle + s^2 w \langle u^2 \rangle},
 
 where e is the error of the true link angle, u the motor torque divided by its limit,
-and the brackets denote the mean over the episode. J is the rms error plus a torque
-term, which is :math:`s\sqrt{w}` for permanent full torque. For small errors the mean
-reward is :math:`1 - (J/s)^2`; unlike the reward, J does not level off for large errors.
-After a broken limit, and if a signal is not a number, e is the limit of the link angle
-and u is 1. No cost is therefore larger than :attr:`Trials.worst`.
+and the brackets denote the mean over the episode. J combines the rms error with a
+torque term, which is :math:`s\sqrt{w}` for permanent full torque. For small errors the
+mean reward is :math:`1 - (J/s)^2`. For large errors the reward levels off, but J does
+not. After a limit has been exceeded, and wherever a signal is not finite, e is set to
+the limit of the link angle and u to 1. No cost is therefore larger than
+:attr:`Trials.worst`.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Trace:
     reference: Array
     """Reference of the link angle [rad]."""
     error: Array
-    """Link angle minus reference [rad]; not a number after a broken limit."""
+    """Link angle minus reference [rad]; NaN after a limit has been exceeded."""
     torque: Array
     """Motor torque [N·m]."""
 
@@ -116,7 +117,8 @@ class Trials:
         """Effort weight w of the cost [-]."""
         self._limit = float(limits.angle[0])
         self.worst = float(np.hypot(self._limit, self._full_torque))
-        """Cost of an episode that breaks a limit at once [rad]."""
+        """Largest possible cost: that of an episode that exceeds a limit at once
+        [rad]."""
         self._plans: dict[str, tuple[MotorPlan, MotorPlan]] = {}
 
     @property
@@ -128,7 +130,7 @@ class Trials:
 
         Args:
             tunable: Controller.
-            values: Values of its parameters by key, shape (candidates,) each.
+            values: Parameter values of the candidates by key, shape (candidates,) each.
         """
         return self._run(tunable, values, None)
 
@@ -139,7 +141,7 @@ class Trials:
 
         Args:
             tunable: Controller.
-            values: Values of its parameters by key, shape (candidates,) each.
+            values: Parameter values of the candidates by key, shape (candidates,) each.
         """
         rows: list[tuple[Array, Array]] = []
         costs = self._run(tunable, values, rows)
@@ -168,7 +170,7 @@ class Trials:
         each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
         limit = self.joints.torque_limit
         controller = build(self._plan(tunable, task, each), each, limit)
-        # the controller must not know the age of the readings: it is tuned
+        # the age of the readings is a tuned parameter, so hide the true one
         controller.start(replace(task, reading_age=ReadingAge()))
         squares = np.zeros((2, env.num_envs))
         alive = np.ones(env.num_envs, dtype=bool)
@@ -194,7 +196,7 @@ class Trials:
     def _plan(
         self, tunable: Tunable, task: Task, each: Mapping[str, Array]
     ) -> MotorPlan:
-        """Plan of all motions; the parts common to all candidates are planned once."""
+        """Plan of all motions; parts that candidates share are computed only once."""
         count = len(self.seeds)
         few = replace(
             task,

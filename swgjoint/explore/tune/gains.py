@@ -1,16 +1,15 @@
-r"""Controllers with tuned gains, and the textbook rule that they are compared with.
+r"""Controllers with tuned gains, and the textbook rule for comparison.
 
-If the drive is stiff enough, motor and link behave like one inertia
+With a sufficiently stiff drive, motor and link behave like one inertia
 :math:`J = J_m + J_l/i^2` at the motor. PD control with
 
 .. math:: k_p = J\omega^2, \quad k_d = 2\zeta J\omega
 
 then has the natural frequency :math:`\omega` and the damping ratio :math:`\zeta`. The
 drive limits the bandwidth: with the motor locked, the link oscillates on the stiffness
-K of the drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`, at which the motor
-does not move the link. The rule of this file is :math:`\omega = \omega_a/3`,
-:math:`\zeta = 0.7`, with nominal inertias and the mean stiffness of the map up to rated
-torque.
+K of the drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`. The textbook rule
+of this file is :math:`\omega = \omega_a/3` and :math:`\zeta = 0.7`, with nominal
+inertias and the mean stiffness of the map up to rated torque.
 """
 
 from __future__ import annotations
@@ -42,19 +41,22 @@ class GainParameter:
     """One tuned number, on a logarithmic scale between two bounds."""
 
     key: str
+    """Name that ends with the unit; without a unit the parameter is dimensionless."""
     low: float
+    """Lower bound, in the unit of the key."""
     high: float
+    """Upper bound, in the unit of the key."""
     neutral: float
-    """Untuned value: gains by the rule, shares of 1, no integral, readings without
-    delay."""
+    """Value before tuning, in the unit of the key: gains by the rule, shares of 1, no
+    integral, no delay of the readings."""
 
     def value(self, place: Array) -> Array:
-        """Values at positions 0 to 1 between the bounds."""
+        """Values at relative positions between the bounds, 0 to 1."""
         return np.asarray(self.low * (self.high / self.low) ** place)
 
     @property
     def start(self) -> float:
-        """Position of the neutral value between the bounds, or of the nearest bound."""
+        """Relative position of the neutral value, 0 to 1; clipped to the bounds."""
         inside = min(max(self.neutral, self.low), self.high)
         return float(np.log(inside / self.low) / np.log(self.high / self.low))
 
@@ -65,8 +67,11 @@ class Tunable:
 
     name: str
     text: str
+    """Description for messages."""
     plan: Planner
+    """Function that plans the motor motion and torque of a task."""
     keys: tuple[str, ...]
+    """Keys of the tuned parameters."""
 
 
 CONTROLLERS = {
@@ -125,7 +130,7 @@ def controller_named(name: str) -> Tunable:
 
 
 def anti_resonance(joints: KnownJoints) -> float:
-    """Anti-resonance of the first joint: link on its drive, motor locked [Hz]."""
+    """Anti-resonance of the first joint: link on its drive, with locked motor [Hz]."""
     stiffness = joints.drives[0].mean_stiffness
     return float(np.sqrt(stiffness / joints.link_inertia[0]) / (2.0 * np.pi))
 
@@ -139,7 +144,7 @@ def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter,
     """
     high = anti_resonance(joints)
     known = (
-        # 0.1 to 2 times the anti-resonance: too soft below, oscillates above
+        # control is too soft below 0.1 times the anti-resonance, oscillates above twice
         GainParameter(
             key="frequency_Hz",
             low=0.1 * high,
@@ -151,7 +156,7 @@ def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter,
         GainParameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
         GainParameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
         GainParameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
-        # share of the nominal kinematic error; specimens differ in its phase
+        # share of the nominal kinematic error, whose phase differs between specimens
         GainParameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
         # a reading taken at t - age is compared with the plan at that time
         GainParameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
@@ -225,9 +230,10 @@ def weight_plan(
 
     Args:
         parts: Parts of the plan of the task, see :func:`parts_of`.
-        task: Motions; the second axis is the episodes.
-        values: Shares by key, shape (n_motions, 1) each; a missing share is 1.
-        repeats: Number of times that the motions of the task are repeated.
+        task: Motions of the episodes, which are the second axis of its arrays.
+        values: Shares and age of the readings [s] by key, shape (n_motions, 1) each. A
+            missing share is 1, a missing age zero.
+        repeats: Number of candidates, for each of which the motions are repeated.
     """
     (even, uneven), joints, i = parts, task.joints, task.joints.ratio
     one = np.ones(1)
@@ -266,7 +272,7 @@ def build(
     Args:
         plan: Weighted plan of all motions.
         values: Values of the tuned parameters, shape (n_motions, 1) each.
-        torque_limit: Torque limit of the motors [N·m]; also limits the integral.
+        torque_limit: Torque limit of the motors [N·m], used as limit of the integral.
     """
     return MotorPID(
         lambda task: plan,

@@ -32,13 +32,14 @@ class TuneSettings:
     """Total number of candidates of both searches, as an alternative to ``minutes``;
     the result is then the same on every machine."""
     seed: int = 0
+    """Seed of the optimiser, from which the seeds of the episodes follow."""
     arguments: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the environment. Drives and loads vary within their tolerances
     unless ``randomise`` is false."""
     population: int = 16
     """Number of candidates in a generation."""
     training: int = 8
-    """Number of seeds used by the searches."""
+    """Number of seeds on which the searches evaluate every candidate."""
     held_out: int = 16
     """Number of seeds reserved for the comparison."""
 
@@ -77,18 +78,18 @@ class GainCandidate:
     name: str
     controller: str
     values: dict[str, float]
-    """Values of its parameters."""
+    """Parameter values by key, in the unit of the key."""
     gains: dict[str, float]
-    """Gains at the motor, in SI units."""
+    """Gains at the motor by key, in SI units."""
     training: Array
     """Cost of each training seed [rad]."""
     held_out: Array
     """Cost of each held-out seed [rad]."""
     trace: Trace
-    """Trace of the held-out episodes."""
+    """Signals of the held-out episodes."""
 
     def to_json(self) -> dict[str, Any]:
-        """Figures of the candidate."""
+        """Parameters, gains and costs as JSON."""
         got: dict[str, Any] = {
             "name": self.name,
             "controller": self.controller,
@@ -112,12 +113,12 @@ class Tuned:
     settings: TuneSettings
     environment: str
     candidates: tuple[GainCandidate, ...]
-    """First PD by the textbook rule, last the tuned controller."""
+    """Compared controllers, from PD control by the rule to the tuned controller."""
     searches: dict[str, GainSearch]
     parameters: tuple[GainParameter, ...]
     """Parameters of the named controller."""
     anti_resonance: float
-    """Anti-resonance of the nominal plant [Hz]."""
+    """Anti-resonance of the nominal joint [Hz]."""
     error_scale: float
     """Error scale s of the cost [rad]."""
     effort_weight: float
@@ -129,7 +130,7 @@ class Tuned:
 
     @property
     def baseline(self) -> GainCandidate:
-        """PD by the textbook rule."""
+        """PD control with gains by the textbook rule."""
         return self.candidates[0]
 
     @property
@@ -138,11 +139,11 @@ class Tuned:
         return self.candidates[-1]
 
     def improvement(self, candidate: GainCandidate) -> float:
-        """Fraction of the baseline's held-out cost that a candidate saves [-]."""
+        """Relative reduction of the mean held-out cost against the baseline [-]."""
         return float(1.0 - candidate.held_out.mean() / self.baseline.held_out.mean())
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON object, without files."""
+        """The JSON object of ``swgjoint tune``, without files."""
         rows = [
             one.to_json() | {"improvement_percent": 100.0 * self.improvement(one)}
             for one in self.candidates

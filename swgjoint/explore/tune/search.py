@@ -1,8 +1,8 @@
 """Searches in the unit cube that can be resumed after an interruption.
 
 All optimisers are seeded and request whole generations. A journal stores the requested
-candidates and their costs. A resumed search runs again from its beginning and takes the
-stored costs from the journal, so that it continues exactly as without interruption.
+candidates and their costs. A resumed search starts again from the beginning but takes
+the stored costs from the journal, so its result is the same as without interruption.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ Evaluate = Callable[[Array], Array]
 """Maps candidates, shape (n, d), to costs, shape (n,)."""
 
 JOURNAL = "tune.npz"
+"""Name of the journal file."""
 NEAR = 0.1
 """Standard deviation about the start in the first generation of differential
-evolution, relative to the width of the cube."""
+evolution, relative to the width of the cube [-]."""
 STEP = 0.2
-"""Initial standard deviation of CMA-ES, relative to the width of the cube."""
+"""Initial standard deviation of CMA-ES, relative to the width of the cube [-]."""
 
 
 class Spent(Exception):
@@ -36,7 +37,7 @@ class Spent(Exception):
 
 
 class _Failed(Exception):
-    """Passes an error of the cost function through an optimiser unchanged."""
+    """Carries an error of the cost function unchanged through an optimiser."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(error)
@@ -92,7 +93,7 @@ def run_search(
         start: Member of the first generation, shape (d,).
         size: Number of candidates in a generation.
         seed: Seed of the optimiser.
-        clock: Function that returns a time [s].
+        clock: Function that returns the present time [s].
         after: Called after every new generation.
 
     Raises:
@@ -114,7 +115,7 @@ def run_search(
             after()
         elif not np.array_equal(search.places[done], places):
             raise InputError(
-                f"{JOURNAL} is of another search (generation {done + 1} differs);"
+                f"{JOURNAL} belongs to another search (generation {done + 1} differs);"
                 " accepted: the versions of swgjoint, scipy, cma, optuna that wrote it"
             )
         done += 1
@@ -123,7 +124,7 @@ def run_search(
     def guarded(places: Array) -> Array:
         try:
             return evaluate(places)
-        # scipy would replace these errors, including InputError, by its own
+        # scipy would replace these errors, including InputError, with its own
         except (TypeError, ValueError) as error:
             raise _Failed(error) from None
 
@@ -142,7 +143,7 @@ def _differential_evolution(
 
     rng = np.random.default_rng(seed)
     shape = (size, start.size)
-    # Latin hypercube; half of it is replaced by the start and its neighbourhood
+    # Latin hypercube; half of it is replaced with the start and its neighbourhood
     strata = np.tile(np.arange(size)[:, None], start.size)
     first = (rng.permuted(strata, axis=0) + rng.uniform(size=shape)) / size
     near = start + NEAR * rng.standard_normal((size // 2, start.size))
@@ -215,7 +216,8 @@ OPTIMISERS: dict[str, Callable[[Evaluate, Array, int, int], None]] = {
     "cma": _cma,
     "optuna": _optuna,
 }
-"""Differential evolution (scipy), CMA-ES (cma), tree-structured Parzen (optuna)."""
+"""Optimisers by key: differential evolution (scipy), CMA-ES (cma) and tree-structured
+Parzen estimator (optuna)."""
 
 
 def write_journal(
@@ -250,6 +252,9 @@ def read_journal(
         header: Settings of the resumed run.
         names: Names of the searches.
 
+    Returns:
+        Searches by name.
+
     Raises:
         InputError: If there is no journal, it cannot be read, or its settings differ.
     """
@@ -258,7 +263,7 @@ def read_journal(
         arrays = arrays_content(read_regular(path))
         kept = json.loads(str(arrays["header"]))
         if not isinstance(kept, dict):
-            raise ValueError("the header is no object")
+            raise ValueError("the header is not an object")
         found = {name: _search(arrays, name) for name in names}
     except FileNotFoundError:
         raise InputError(
@@ -266,7 +271,7 @@ def read_journal(
         ) from None
     except Exception as error:  # a file may be anything
         raise InputError(
-            f"{path} is no journal of a tuning run: {one_line(error)}; accepted:"
+            f"{path} is not a journal of a tuning run: {one_line(error)}; accepted:"
             " another --out"
         ) from None
     for key, value in header.items():

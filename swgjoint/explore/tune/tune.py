@@ -1,8 +1,9 @@
 """``swgjoint tune``: tunes the gains of a controller and compares with a textbook rule.
 
-Four controllers are compared on held-out seeds, which separates the benefit of feed-
-forward from the benefit of tuning: PD by the rule, the same PD with both gains tuned,
-the named controller with gains by the rule, and the named controller with tuned gains.
+Four controllers are compared on held-out seeds: PD control with gains by the rule, PD
+control with tuned gains, the named controller with gains by the rule, and the named
+controller with tuned gains. The comparison separates the benefit of feed-forward from
+the benefit of tuning. If the named controller is PD itself, only two remain.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 PD_SHARE = 0.2
-"""Fraction of the budget for tuning the two gains of plain PD."""
+"""Fraction of the budget for tuning the two gains of PD control [-]."""
 RESERVE = 15.0
 """Part of the wall time reserved for the held-out seeds and the report [s]."""
 _PD, _NAMED = "pd", "named"
@@ -62,16 +63,20 @@ def tune(
     resume: bool = False,
     progress: Progress = silent,
 ) -> Tuned:
-    """Tune a controller, and a plain PD controller for comparison.
+    """Tune a controller, and a PD controller for comparison.
 
     Args:
         settings: Controller and budget. With ``evaluations``, the same settings give
             the same result to the last bit; with ``minutes``, the number of candidates
             depends on the machine.
-        folder: Folder of the journal, which is written after every generation; an
-            existing journal of the same settings is resumed. None writes no journal.
+        folder: Folder of the journal, which is written after every generation. If the
+            folder contains a journal of the same settings, the run resumes from it.
+            None writes no journal.
         resume: Whether a journal must exist.
         progress: Called with the stage, the candidates (or seconds) done and the total.
+
+    Returns:
+        The compared controllers with their costs, and the searches.
 
     Raises:
         InputError: If a name, an argument or the journal is invalid.
@@ -169,13 +174,17 @@ class _Budget:
 
     settings: TuneSettings
     searches: Mapping[str, GainSearch]
+    """All searches of the run."""
     search: GainSearch
+    """Search that this budget limits."""
     share: float
+    """Fraction of the whole budget [-]; 1 for the last search, which gets the rest."""
     elapsed: Any
+    """Function that returns the wall time of the run so far [s]."""
 
     @property
     def _candidates(self) -> int:
-        """Candidates of this search; the second search gets what the first left."""
+        """Largest number of candidates; the last search gets what the first left."""
         s = self.settings
         assert s.evaluations is not None
         if self.share < 1.0:
@@ -188,7 +197,7 @@ class _Budget:
         return 60.0 * (self.settings.minutes or MINUTES) - RESERVE
 
     def more(self) -> bool:
-        """Whether another generation is allowed; the first always is."""
+        """Whether another generation is allowed; the first one always is."""
         if not self.search.places:
             return True
         if self.settings.evaluations is not None:
@@ -200,7 +209,7 @@ class _Budget:
         return bool(spent + one <= self.share * self._seconds)
 
     def shown(self) -> tuple[int, int]:
-        """Candidates or seconds spent, and their total."""
+        """Spent candidates or seconds, and the budget."""
         if self.settings.evaluations is not None:
             return self.search.evaluations, self._candidates
         done = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
