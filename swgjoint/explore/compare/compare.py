@@ -1,8 +1,8 @@
 """Compare drives in one scene: stiffness, ripple, error, stress, run time.
 
 Each argument is a design, a map, a catalogue drive or a level. A drive replaces the
-drive of every driven joint, or of selected joints; a level keeps the drives of the
-scene. The figures of a scene are those of the worst of these joints.
+drive of every driven joint, or of selected joints; a level changes only the level of
+these joints. The figures of a run are those of the worst of these joints.
 """
 
 from __future__ import annotations
@@ -36,12 +36,13 @@ from swgjoint.view.run import run_scene
 STRESS_POSITIONS = 6
 """Positions over one pitch of the fixed member, after which the mesh cycle repeats."""
 SORTABLE = (*UPPER, *LOWER)
+"""Figures that can be limited, and by which rows can be sorted."""
 SLOW = "fatigue_safety_factor"
-"""Figure that is computed only if a spec or the sorting needs it: the 3D model takes
-minutes."""
+"""Figure that is computed only if a spec or the sorting needs it, because its 3D model
+takes minutes."""
 STIFFNESS = "K1_Nm_rad"
 UNYIELDING = ("rigid", "kinematic")
-"""Levels without compliance: they have no stiffness that could be compared."""
+"""Levels without compliance, which have no stiffness to compare."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,9 @@ class Compared:
 
     argument: str
     design: str
+    """Name of the drive; for a level, that of the softest drive of the scene."""
     level: str
+    """Level of the joint with the largest ripple."""
     verdict: str
     """Whether the run is valid, see :mod:`swgjoint.sim.figures.verdict`."""
     reasons: tuple[str, ...]
@@ -58,16 +61,17 @@ class Compared:
     ripple_rms_percent: float
     ripple_pp_percent: float
     ripple_missing: str | None
-    """Why no ripple is reported: its figures are vibration and round-off."""
+    """Reason why no ripple is reported, such as a ripple below the integration noise;
+    None if it is reported."""
     ripple_is_lower_bound: bool
-    """Whether the step leaves out orders that matter, in the joint with the largest
+    """Whether the step leaves out significant orders in the joint with the largest
     ripple."""
     ripple_valid: bool | None
-    """Whether the maps of all joints are within the limit of their validation at the
-    torques of the run; None if no map has a validation."""
+    """Whether the maps of all joints meet the limit of their validation at the torques
+    of the run; None if no map has a validation."""
     map_difference: dict[str, Any] | None
-    """Largest differences of these maps from unseen solves, by quantity, as for a
-    joint."""
+    """Largest differences of these maps from their validation solves, by quantity, in
+    the form of the figures of a joint."""
     transmission_error_arcmin: float
     """Peak-to-peak transmission error [arcmin]."""
     transmission_error_ripple_arcmin: float
@@ -80,20 +84,24 @@ class Compared:
     tool_rp_mm: float | None
     K1_Nm_rad: float | None
     von_mises_MPa: float | None
+    """Largest von Mises stress of the flexspline at rated torque, averaged over one
+    pitch [MPa]; None without a design."""
     fatigue_safety_factor: float | None
+    """Smallest fatigue safety factor at rated torque [-]; None if it was not requested
+    or the argument is no design with a cup."""
     peak_torque_of_rating: float
-    """Peak torque over the repeated peak torque [-]."""
+    """Peak torque divided by the repeated peak torque [-]."""
     cubed_mean_torque_of_rating: float
-    """Cubic mean torque over the rated torque [-]."""
+    """Cubic mean torque divided by the rated torque [-]."""
     real_time_factor: float
-    """Simulated time over the computing time of the steps."""
+    """Simulated time divided by the wall time of the steps [-]."""
     joint: str
     """Joint with the largest ripple."""
     strongest_order_left_out: tuple[str, ...]
     """Joints that turn too fast for the step to resolve the strongest order of their
     drive."""
     wall_s: float
-    """Total computing time, maps included [s]."""
+    """Wall time of the comparison, including maps and stresses [s]."""
     run: Run = field(repr=False, compare=False)
     missed: tuple[str, ...] = ()
     """Limits of the spec that are not met."""
@@ -117,7 +125,7 @@ def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str,
         accepted: Figures that may be limited.
 
     Raises:
-        InputError: If the file or a key cannot be used.
+        InputError: If the file cannot be read, has no limits, or a limit is invalid.
     """
     table = read_toml(Path(path), what="spec").get("spec")
     if not isinstance(table, Mapping) or not table:
@@ -135,8 +143,11 @@ def checked_limits(
         accepted: Figures that may be limited.
         where: Text that messages put before the name of a figure.
 
+    Returns:
+        The limits as floats.
+
     Raises:
-        InputError: With one line for every unknown figure and unusable value.
+        InputError: With one line for every unknown figure and invalid value.
     """
     faults = []
     for key, value in limits.items():
@@ -173,16 +184,19 @@ def compare(
     Args:
         arguments: Designs, maps, catalogue drives or levels.
         scene: The scene.
-        model: Fidelity of all designs, including those of the scene; None: the default
-            of each design. Maps and catalogue drives have none.
+        model: Fidelity of all designs, including those of the scene; None for the
+            default of each design. It does not apply to maps and catalogue drives.
         spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
         fatigue: Whether to assess the fatigue of designs with a cup.
         joints: Joints that get the drive or the level, and whose figures count; every
             driven joint if empty.
         progress: Called with the stage, the number of finished runs and their total.
 
+    Returns:
+        One entry per argument.
+
     Raises:
-        InputError: If an argument is none of these.
+        InputError: If an argument is neither a drive nor a level.
     """
     sources = {name: None if name in LEVELS else find_drive(name) for name in arguments}
     kept: dict[str, DriveMap] = {}  # drives that the scene keeps
@@ -225,7 +239,7 @@ def _is_design(reference: str) -> bool:
 
 
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
-    """Limits that a row does not meet; unknown and invalid figures miss theirs.
+    """Limits that a row does not meet; unknown and invalid figures meet none.
 
     A level without compliance meets every lower limit of the stiffness.
 
@@ -257,7 +271,7 @@ def row_of(
     level: str | None,
     of: Sequence[str] = (),
 ) -> Compared:
-    """Figures of one run; those of the design itself are added later.
+    """Figures of one run, still without stress, fatigue and wall time.
 
     Args:
         name: The argument.
@@ -271,7 +285,7 @@ def row_of(
     joints, tool = metrics["joints"], metrics["tool"]
     if of:
         joints = {name: figures for name, figures in joints.items() if name in of}
-    if drive is None:  # the softest drive of the scene
+    if drive is None:  # report the softest drive of the scene
         drives = [t.drive for t in run.assembly.transmissions if t.joint in joints]
         drive = min(drives, key=lambda d: d.mean_stiffness)
     worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
@@ -353,12 +367,12 @@ def _safety(
 def _stress(
     source: Design | DriveMap, drive: DriveMap, model: str | None
 ) -> float | None:
-    """Mean over one pitch of the largest von Mises stress at rated torque [MPa]."""
+    """Largest von Mises stress at rated torque, averaged over one pitch [MPa]."""
     if isinstance(source, DriveMap):
         return None
     from swgjoint.fe.meshing import simulate_meshing
 
-    if model == "ring":  # has no notches
+    if model == "ring":  # a thin ring has no notches, so it gives no stress
         model = "2d"
     model = model or default_model(source)
     try:

@@ -13,18 +13,19 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.step_choice import resolving_step
 
 _END = "_joint"
-"""Ending of a joint's name that a pattern may leave out."""
+"""Ending of joint names that a pattern may omit."""
 
 
 def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
-    """Load a scene from a file or a bundled name, or make one around an arm.
+    """Load a scene from a file or a bundled name, or create one for an arm.
 
     Args:
         reference: Scene file, MJCF or URDF file of an arm, or bundled name.
-        overrides: ``key=value`` texts that change the scene.
+        overrides: ``key=value`` strings that change the scene.
 
     Raises:
-        InputError: If it is neither, or a change does not fit.
+        InputError: If the reference is neither a scene nor an arm, or if a change is
+            invalid.
     """
     overrides = list(overrides)
     if is_arm(reference):
@@ -35,10 +36,10 @@ def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
 def resolve_step(
     scene: Scene, arguments: Iterable[str], joints: Sequence[str] = ()
 ) -> Scene:
-    """Choose a step that resolves the ripple of every compared drive.
+    """The scene with a time step that resolves the ripple of every compared drive.
 
     Args:
-        scene: The scene; a step that is short enough is kept.
+        scene: The scene; its own step is kept if it is short enough.
         arguments: Drives and levels that are compared.
         joints: Joints that get them; every driven joint if empty.
     """
@@ -59,8 +60,8 @@ def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
 
     Args:
         scene: The scene.
-        patterns: Names or shell patterns, also several separated by commas; the ending
-            ``_joint`` may be left out. No patterns match no joint.
+        patterns: Names or shell patterns, or several of them separated by commas; the
+            ending ``_joint`` may be omitted. Without a pattern, no joint matches.
 
     Raises:
         InputError: If a pattern matches no joint.
@@ -73,7 +74,7 @@ def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
     faults = []
     for pattern in (p for p in wanted if not found[p]):
         near = near_names(pattern, joints)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        hint = f"; did you mean {' or '.join(near)}?" if near else ";"
         faults.append(
             f"--joints {pattern}: no such joint in arm {scene.arm!r}{hint} accepted:"
             f" {', '.join(joints)}, or a pattern such as 'wrist_*'"

@@ -1,4 +1,4 @@
-"""Files of ``models/optimisations``: the objectives, and the designs to search."""
+"""Files of ``models/optimisations``: objectives, limits and parameters of a search."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from swgjoint.models_path import find
 from swgjoint.toml_file import read_toml
 
 REFINEMENT = "mesh.refinement"
+"""Design key that a confirmation may change."""
 
 
 class Objective(Section):
@@ -33,12 +34,12 @@ class Objective(Section):
 
     @property
     def sign(self) -> float:
-        """Factor that turns the figure into one to minimise."""
+        """Factor that turns the figure into a quantity to minimise: 1 or -1."""
         return 1.0 if self.goal == "minimise" else -1.0
 
 
 class Limit(Section):
-    """Bounds that the figure of a design must keep."""
+    """Bounds of a figure that every design of the front must meet."""
 
     figure: Text
     least: float | None = None
@@ -55,7 +56,10 @@ class Limit(Section):
         return self
 
     def violation(self, value: float) -> float:
-        """Distance from the nearest bound, over that bound; zero within bounds."""
+        """Excess beyond the violated bound, divided by its magnitude [-].
+
+        It is zero within the bounds, and not divided if the violated bound is zero.
+        """
         beyond = 0.0
         if self.most is not None:
             beyond = max(beyond, (value - self.most) / (abs(self.most) or 1.0))
@@ -68,12 +72,12 @@ class Confirmation(Section):
     """More accurate computation of designs of the Pareto front."""
 
     designs: Annotated[int, Field(ge=1, le=1_000)] = 5
-    """Number of designs of the front to confirm: the best of every objective first,
-    then those farthest apart."""
+    """Number of designs of the front to confirm: first the best one in each objective,
+    then those farthest from the designs already selected."""
     positions: Annotated[int, Field(ge=1, le=10_000)] | None = None
     """Number of positions of the wave generator in the simulation of meshing."""
     refinement: Annotated[float, Field(gt=0, le=100)] | None = None
-    """Refinement of the mesh."""
+    """Refinement of the mesh [-]."""
     model: Literal["2d", "3d"] | None = None
     """Fidelity of the meshing and of the map."""
 
@@ -92,7 +96,8 @@ class OptimisationFile(AskedFile):
     def _fits(self) -> OptimisationFile:
         faults = [*task_faults(self), *plan_faults(self.plan, self.kinds)]
         if self.design is None:
-            faults.append(("design", "missing; accepted: where the search starts"))
+            fault = "missing; accepted: a design from which the search starts"
+            faults.append(("design", fault))
         told = ", ".join(self.figures)
         for table, items in (("objectives", self.objectives), ("limits", self.limits)):
             names = [item.figure for item in items]
@@ -101,7 +106,7 @@ class OptimisationFile(AskedFile):
                 if name not in self.figures:
                     faults.append((where, f"{name!r}; accepted: {told}"))
                 elif name in names[:k]:
-                    faults.append((where, f"{name!r} more than once"))
+                    faults.append((where, f"{name!r} is listed more than once"))
         confirm = self.confirm
         if confirm is not None and self.meshing is None:
             if confirm.positions is not None:
@@ -110,25 +115,26 @@ class OptimisationFile(AskedFile):
                 faults.append(("confirm.model", "used only by meshing and maps"))
         varied = {key for p in self.plan.parameters for key in p.keys}
         if confirm is not None and confirm.refinement and REFINEMENT in varied:
-            told = f"{REFINEMENT} is a parameter; accepted: one of the two"
+            told = f"{REFINEMENT} is also a parameter; accepted: one of the two"
             faults.append(("confirm.refinement", told))
         if BASE in varied:
-            faults.append(("plan.parameters", f"key {BASE!r}; accepted: in a sweep"))
+            fault = f"key {BASE!r}: only sweeps can vary the base design"
+            faults.append(("plan.parameters", fault))
         if faults:
             raise Fault(*faults)
         return self
 
     @classmethod
     def load(cls, reference: str | Path) -> OptimisationFile:
-        """Read a file, given as a path or as the name of a bundled one.
+        """Read a file, given as a path or as the name of a bundled file.
 
-        Paths in the file are relative to it.
+        Relative paths in the file start from its folder.
 
         Args:
             reference: Path or name.
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file is not found or has faults; one line per fault.
         """
         path = find(reference, "optimisations", ".toml", what="optimisation")
         data = read_toml(path, what="optimisation")
@@ -137,7 +143,10 @@ class OptimisationFile(AskedFile):
         return file.model_copy(update={"beside": beside})
 
     def violations(self, figures: Mapping[str, float | None]) -> dict[str, float]:
-        """Violation of each limit; an unknown figure counts as the largest one."""
+        """Violations by limited figure [-], see :meth:`Limit.violation`.
+
+        The violation of an unknown figure is one.
+        """
         found = {}
         for limit in self.limits:
             value = figures.get(limit.figure)
@@ -148,7 +157,8 @@ class OptimisationFile(AskedFile):
         """The sweep that computes some designs.
 
         Args:
-            columns: Values of the parameters of this file by column, or of other keys.
+            columns: Values of all designs by column; a column that is not a parameter
+                of this file is a key of the design.
             confirm: Whether they are computed with the accuracy of the confirmation.
         """
         keys = {p.column: p.keys for p in self.plan.parameters}

@@ -19,7 +19,8 @@ class Candidate:
     """A design and its results."""
 
     values: Values
-    """Values of the parameters by column, or the name of a compared design."""
+    """Values of the parameters by column; for the start and the designs to compare
+    with, the reference of the design under key ``design``."""
     design: Design | None
     """None if the values give no valid design."""
     record: Record
@@ -39,14 +40,15 @@ def objectives_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> Ar
 
 def _signed(candidate: Candidate, objective: Objective) -> float:
     value = candidate.record.figures[objective.figure]
-    assert value is not None  # of designs with figures
+    assert value is not None  # the caller selects designs with figures
     return objective.sign * value
 
 
 def front_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> list[int]:
     """Indices of the Pareto-optimal designs, sorted by the first objective.
 
-    Only designs with figures within the limits count; of equal values the first one.
+    Only designs with all objectives known and within the limits count. Of designs with
+    equal objectives, only the first one counts.
 
     Args:
         file: File with objectives and limits.
@@ -70,17 +72,22 @@ def front_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> list[in
 
 
 def _beaten(values: Array, k: int) -> bool:
-    """Whether another row is nowhere worse and somewhere better."""
+    """Whether another row dominates row k: nowhere worse and somewhere better."""
     no_worse = np.all(values <= values[k], axis=1)
     return bool(np.any(no_worse & np.any(values < values[k], axis=1)))
 
 
 def pick_spread(values: Array, count: int) -> list[int]:
-    """Select the best row of every column, then those farthest from the selected.
+    """Select the best row of every column, then those farthest from selected rows.
+
+    Distances are measured with every objective divided by its range.
 
     Args:
-        values: Objectives (n, m).
+        values: Objectives to minimise, shape (n, m).
         count: Number of rows to select.
+
+    Returns:
+        Indices of the rows, in the order of their selection.
     """
     width = np.ptp(values, axis=0)
     scaled = values / np.where(width > 0.0, width, 1.0)
@@ -93,9 +100,11 @@ def pick_spread(values: Array, count: int) -> list[int]:
 
 
 def not_worse(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
-    """Whether a design is at least as good as another in every known objective.
+    """Whether a design is at least as good as another one in every objective.
 
-    Confirmed figures are compared if both have them, else those of the search.
+    Confirmed figures are compared if both designs have them, else the figures of the
+    search. The answer is no if an objective of either design is unknown, or if the
+    confirmation of either design failed.
 
     Args:
         file: File with the objectives.
@@ -105,7 +114,7 @@ def not_worse(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
     records = [one.record, other.record]
     confirmed = [one.confirmed, other.confirmed]
     if any(record is not None and not record.ok for record in confirmed):
-        return False  # it did not stand the care
+        return False  # the more accurate computation has no figures
     if all(record is not None and record.ok for record in confirmed):
         records = [record for record in confirmed if record is not None]
     for objective in file.objectives:

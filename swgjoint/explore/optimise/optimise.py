@@ -1,7 +1,8 @@
-"""Search for designs that are good in several figures at once.
+"""Multi-objective search for Pareto-optimal designs.
 
-Every generation of the search is a sweep: it runs where sweeps run, stores every design
-as soon as it is computed, and finds it again when the same file is run again.
+Every generation of the search is a sweep. It uses the executors of sweeps and stores
+every design as soon as it is computed; a second run of the same file reuses the stored
+designs.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from swgjoint.pool import Executor
 from swgjoint.progress import Progress, silent
 
 NAME = 80
-"""Longest part of the start's name in the names of front designs [characters]."""
+"""Largest number of characters of the start's name in the names of front designs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,10 +47,14 @@ class Optimum:
     front: tuple[Candidate, ...]
     """Pareto-optimal designs, sorted by the first objective."""
     start: Candidate
+    """Design from which the search started."""
     beside: tuple[Candidate, ...]
+    """Designs to compare with the front."""
     generations: int
     sweeps: tuple[SweepResult, ...]
+    """All sweeps of the search: compared designs, generations and confirmations."""
     wall_s: float
+    """Wall time [s]."""
 
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint optimise``, without files."""
@@ -86,7 +91,10 @@ class Optimum:
         }
 
     def designs(self, source: str) -> list[Design]:
-        """Designs of the front, named after the start design."""
+        """Designs of the front, named after the start design.
+
+        ``source`` is the optimisation file that the designs name as their source.
+        """
         assert self.start.design is not None
         base = self.start.design.drive.name[:NAME]
         found = []
@@ -130,22 +138,25 @@ def optimise(
     place: ResultStore | None = None,
     progress: Progress = silent,
 ) -> Optimum:
-    """Search, then compute some designs of the front again with more accuracy.
+    """Search, then compute some designs of the front again with higher accuracy.
 
-    Without ``minutes`` in its plan the same file gives the same designs, wherever they
-    are computed and however often the search is stopped and resumed: stored designs are
+    Without ``minutes`` in its plan, the same file gives the same designs, wherever they
+    are computed and however often the search is stopped and resumed. Stored designs are
     not computed twice.
 
     Args:
         file: Objectives, limits and parameters.
-        executor: Where designs are computed.
-        place: Where records are stored; None stores none.
+        executor: Executor that computes the designs.
+        place: Store of the records; None stores none.
         progress: Called with the stage, the number of finished designs and their total.
+
+    Returns:
+        The front, all designs that were tried, and the compared designs.
 
     Raises:
         InputError: If a design cannot be read.
-        ComputationError: If the start design or every design of the search has no
-            figures, or the executor cannot go on.
+        ComputationError: If the start design has no figures, no design of the search
+            is within the limits, a design is lost, or the executor cannot continue.
         MissingExtraError: If the optimiser is not installed.
     """
     begin = time.perf_counter()
@@ -172,11 +183,11 @@ def optimise(
 
     named = {BASE: [file.design, *file.beside]}
     for name in file.beside:
-        Design.load(name)  # before anything is computed
+        Design.load(name)  # report a bad reference before anything is computed
     start, *beside = computed(named, partial(_as, progress, "start and others"))
     if not start.record.ok:
         raise ComputationError(
-            f"the design to start from, {file.design}, {start.record.outcome}:"
+            f"start design {file.design}: {start.record.outcome}:"
             f" {start.record.reason}"
         )
     assert start.design is not None
@@ -190,10 +201,11 @@ def optimise(
         columns = {name: [v[name] for v in generation] for name in generation[0]}
         found = computed(columns, report)
         lost = [c.record.reason for c in found if c.record.outcome == LOST]
-        if lost:  # not kept: the search would go elsewhere another time
+        if lost:  # their figures would change the course of the search in another run
             raise ComputationError(
-                f"{len(lost)} designs of a generation were lost, the first:"
-                f" {lost[0]}; what is finished is kept, the same command goes on"
+                f"{len(lost)} designs of a generation were lost, the first one:"
+                f" {lost[0]}; finished designs are stored, and the same command resumes"
+                " the search"
             )
         return found
 
@@ -207,8 +219,8 @@ def optimise(
     front = [tried[k] for k in front_of(file, tried)]
     if not front:
         raise ComputationError(
-            f"none of {len(tried)} designs has figures within the limits; the first:"
-            f" {tried[0].record.reason or 'beyond a limit'}"
+            f"none of {len(tried)} designs has figures within the limits; the first"
+            f" one: {tried[0].record.reason or 'beyond a limit'}"
         )
     if file.confirm is not None:
         chosen = pick_spread(objectives_of(file, front), file.confirm.designs)

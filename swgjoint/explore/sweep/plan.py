@@ -92,7 +92,7 @@ class Grid(Section):
 
 
 class LatinHypercube(Section):
-    """Latin hypercube: one random value in each of n equal parts of every range."""
+    """Latin hypercube: n designs, one value in each of n equal parts of every range."""
 
     kind: Literal["latin_hypercube"] = "latin_hypercube"
     designs: Count

@@ -168,8 +168,7 @@ def _column(parameter: Parameter, kinds: tuple[str, ...]) -> Sequence[Any]:
 
 
 def _sampled(parameter: Parameter, part: float, kinds: tuple[str, ...]) -> Any:
-    """Value at a fraction, 0 to 1, of the list or range; every value has the same
-    share."""
+    """Value at a fraction, 0 to 1, of the list or range; all values share equally."""
     listed, low, high = parameter.values, parameter.low, parameter.high
     if listed is not None:
         return listed[min(int(part * len(listed)), len(listed) - 1)]
@@ -239,8 +238,7 @@ def _parts(
 
 
 def _drives(scene: Scene) -> dict[str, str | None]:
-    """Hashes of the drives of a scene; None for catalogue drives, which are part of the
-    code."""
+    """Hashes of the drives of a scene; None for a catalogue drive, part of the code."""
     from swgjoint.drives.references import find_drive
 
     names = {section.drive for section in (scene.defaults, *scene.joints.values())}

@@ -214,8 +214,7 @@ def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
 
 
 def _column(values: list[Any]) -> list[Any]:
-    """Values of one type: integers next to floats become floats, all other mixtures
-    strings."""
+    """Values of one type: integers and floats become floats, other mixtures text."""
     kinds = {type(value) for value in values} - {type(None)}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -225,8 +224,7 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def flat(value: Any) -> Any:
-    """Value of a table cell: tables and lists as JSON text, infinity and NaN as None.
-    """
+    """Value of a table cell: tables and lists as JSON text, infinity or NaN as None."""
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Mapping | list | tuple):

@@ -75,8 +75,7 @@ class SpecTask(FigureTask):
 
 
 class RunTask(FigureTask):
-    """Run of the scene with the design in every driven joint; the figures are those of
-    the worst joint."""
+    """Run of the scene with the design in all driven joints; figures of the worst one."""
 
     known = RUN_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
