@@ -1,10 +1,10 @@
 """``swgjoint bench fe``: error and run time of finite element models of the drive.
 
 Every setting is compared with three references: the finest 3D model, the finest mesh of
-its own kind, and the finest mesh of the next level up (ring, 2D, 3D; linear,
-nonlinear). Long references come from a stored file. The file also contains one short
-setting; solving it again shows whether the file matches the present code. Long settings
-that are not stored are left out.
+its own kind, and the finest mesh of the next more accurate kind (ring, 2D, 3D; linear,
+nonlinear). Results of long settings come from a stored file; long settings that are not
+stored are left out. The file also contains one short setting, which every run solves
+again to check whether the file matches the present code.
 """
 
 from __future__ import annotations
@@ -58,10 +58,12 @@ SETTINGS = (
     FeSetting(model="3d", refinement=1.0),
     FeSetting(model="3d", refinement=1.4),
 )
-"""Settings with the finest of every kind last; the last one of all is the reference."""
+"""Settings, from coarse to fine within each kind; the last one is the reference."""
 
 LEFT_OUT = "left out: long run, not in a stored file; --recompute solves it"
+"""Outcome of a long setting that is not stored."""
 LOST = "process died: out of memory or killed"
+"""Outcome of a setting whose process died."""
 
 
 def run_fe_cost(
@@ -80,21 +82,22 @@ def run_fe_cost(
         settings: Settings, from coarse to fine within each kind.
         folder: Folder for table, JSON and picture; None writes nothing.
         progress: Called after every setting.
-        jobs: Number of processes, one per core; every setting has a fresh process.
-        recompute: Whether stored settings are solved again and a new stored file is
+        jobs: Number of settings solved at the same time, each in a fresh process.
+        recompute: Whether long settings are solved too, and a new stored file is
             written into ``folder``.
 
     Returns:
         ``rows``, see :func:`swgjoint.bench.fe.rows.rows_of`; ``cheapest``: cheapest
-        setting by quantity and bound, and ``cheapest_in_the_plane``: the same compared
-        with the finest 2D mesh; ``design``; ``stored``: provenance and drift of the
-        stored settings; ``left_out``: keys of the settings left out;
+        setting by quantity and bound; ``cheapest_in_the_plane``: the same among the
+        nonlinear 2D settings, compared with their finest mesh; ``design``; ``stored``:
+        provenance and drift of the stored settings; ``left_out``: keys of the settings
+        left out;
         ``kinematic_error_positions``: number of positions per pitch at which the
-        kinematic error is evaluated, which resolve its first harmonic; ``provenance``,
+        kinematic error is evaluated, enough for its first harmonic; ``provenance``,
         ``files``, ``wall_s``.
 
     Raises:
-        DesignError: If the design has no cup or a feature that 3D does not model.
+        DesignError: If the design has no cup, or a feature that the 3D model lacks.
         ComputationError: If the reference fails.
     """
     begin = time.perf_counter()
@@ -155,11 +158,15 @@ def _solve_all(
     stage: str,
     progress: Progress,
 ) -> dict[str, Found | str]:
-    """Solve every setting in a process of its own, the longest ones first."""
+    """Solve every setting in a process of its own, the longest first.
+
+    Returns:
+        Results by key of the setting, or the reason for missing results.
+    """
     order = sorted(settings, key=_work, reverse=True)
     found: dict[str, Found | str] = {}
     progress(stage, 0, len(order))
-    # one thread per process, so that a process that dies does not end the others
+    # each thread waits for one process, so a process that dies does not end the others
     threads = ThreadPoolExecutor(max_workers=jobs)
     with _one_thread():
         try:
@@ -176,7 +183,7 @@ def _solve_all(
 
 
 def _solved_apart(task: SettingTask) -> Found | str:
-    """Solve a setting in its own process; the reason if that process fails."""
+    """Solve a setting in its own process; return the reason if there is no solution."""
     context = get_context("spawn")
     with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
         try:

@@ -1,4 +1,4 @@
-"""Settings of ``swgjoint bench fe`` without solid mesh: thin rings, closed forms."""
+"""Solution of the settings ``ring`` of ``swgjoint bench fe``: rings or closed forms."""
 
 from __future__ import annotations
 
@@ -83,7 +83,10 @@ def solve_by_thin_rings(design: Design, setting: FeSetting, begin: float) -> Fou
 
 
 def bearing_by_rule(design: Design) -> dict[str, float]:
-    """Ball bearing with the proportions of the family, without clearance."""
+    """Ball bearing without clearance, with the proportions of the design family.
+
+    Thin rings need a bearing; this one serves for designs without one.
+    """
     pitch = design.drive.module_mm * design.drive.teeth_flexspline
     return {
         "balls": family.BALLS,
@@ -100,8 +103,8 @@ def _rim_stress(design: Design, model: ThinRing, state: ThinRingState) -> float:
     .. math:: \sigma = E\,(\varepsilon + y\,\Delta\kappa)
 
     The stress is evaluated at the bore and at the root circle, at distance y from the
-    neutral line. It is taken in the middle of every element, where the curvature of a
-    cubic element is accurate.
+    neutral line, and in the middle of every element, where the curvature of a cubic
+    element is accurate.
     """
     rim, outside = model.rim, design.flexspline.rim_mm * mm
     centre: Array = np.arange(rim.elements, dtype=np.float64) + 0.5
@@ -119,7 +122,7 @@ def _rim_stress(design: Design, model: ThinRing, state: ThinRingState) -> float:
 
 
 def _closed_form(design: Design, begin: float) -> Found:
-    """Thin shell on an unloaded wave generator, with rigid teeth at the ideal ratio."""
+    """Thin shell on an unloaded wave generator; the kinematic error is zero."""
     phi = pi * np.arange(RIM) / RIM
     return Found(
         stiffness=1.0 / series_compliance(design, cup=True),

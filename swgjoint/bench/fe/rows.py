@@ -16,10 +16,11 @@ QUANTITIES = {
     "tensile_MPa": "%",
     "rim_shape_mm": "%",
 }
-"""Quantities with the unit of their error. The error of the rim shape is the largest
+"""Quantities with the unit of their error. The error of the kinematic error is the peak
+to peak of the difference of two curves. The error of the rim shape is the largest
 difference along the rim divided by the largest deflection."""
 NEXT_LEVEL = {"ring": "2d", "2d linear": "2d", "2d": "3d", "3d linear": "3d"}
-"""Next more accurate kind by kind."""
+"""For each kind of setting, the next more accurate kind."""
 SAME = 1e-6
 """Relative difference below which two errors count as equal [-]."""
 BOUNDS = (1.0, 5.0, 15.0)
@@ -43,15 +44,17 @@ def rows_of(
 
     Returns:
         ``bench``, ``model``, ``setting``, ``kind``, ``quantity``, ``value``; ``unit``
-        of the errors; ``error`` from ``reference``, ``error_of_kind`` from
-        ``reference_of_kind``, both also as ``..._percent``, for the kinematic error
-        relative to its peak-to-peak value; ``error_next_level`` from
-        ``reference_next_level``; ``pareto`` and ``pareto_of_kind``: whether no other
-        setting is both cheaper and closer to the reference; ``wall_s``, ``cpu_s``,
-        ``peak_MB``, ``cores``, ``nodes`` of a sector, ``stored``, ``outcome``. Errors
-        without a reference, such as those of the only mesh of a kind, are null.
-        ``kinematic_error_pp_arcsec`` contains the first harmonic over a pitch, which is
-        what four positions resolve.
+        of the errors; ``error`` relative to ``reference``, ``error_of_kind`` relative
+        to ``reference_of_kind`` and ``error_next_level`` relative to
+        ``reference_next_level``; ``error_percent`` and ``error_of_kind_percent``:
+        magnitudes of the first two errors in percent, that of the kinematic error
+        relative to the peak to peak of the reference; ``pareto`` and
+        ``pareto_of_kind``: whether no other setting, or no other one of its kind, is
+        both cheaper and closer to the reference; ``wall_s``, ``cpu_s``, ``peak_MB``,
+        ``cores``, ``nodes`` of a sector, ``stored``, ``outcome``. Errors without a
+        reference, such as those of the only mesh of a kind, are None.
+        ``kinematic_error_pp_arcsec`` contains only the first harmonic over a pitch,
+        because four positions resolve no more.
     """
     meshes = [
         s
@@ -139,7 +142,7 @@ def _failed(same: dict[str, Any], best: FeSetting, outcome: str) -> dict[str, An
 
 
 def _value(found: Found, quantity: str) -> float | None:
-    """Value of a quantity, in the unit of its name."""
+    """Value of a quantity, in the unit of its name; None if the setting lacks it."""
     if quantity == "torsional_stiffness_Nm_rad":
         return found.stiffness
     if quantity == "tensile_MPa":
@@ -152,7 +155,10 @@ def _value(found: Found, quantity: str) -> float | None:
 
 
 def _error(one: Found, than: Found, quantity: str) -> float | None:
-    """Signed relative error of a scalar; largest difference of two patterns."""
+    """Error of a quantity, in the unit of :data:`QUANTITIES`; None if unknown.
+
+    Errors of stiffness and stress are signed, the other errors are magnitudes.
+    """
     if quantity == "kinematic_error_pp_arcsec":
         if one.kinematic_error is None or than.kinematic_error is None:
             return None
@@ -169,7 +175,7 @@ def _error(one: Found, than: Found, quantity: str) -> float | None:
 def _percent(
     row: dict[str, Any], found: Mapping[str, Found | str], tail: str
 ) -> float | None:
-    """Magnitude of an error relative to the value of its reference [%]."""
+    """Magnitude of an error, relative to the value of its reference [%]."""
     error, than = row[f"error{tail}"], found.get(row[f"reference{tail}"])
     if error is None or not isinstance(than, Found):
         return None
@@ -180,9 +186,9 @@ def _percent(
 
 
 def seconds(row: Mapping[str, Any]) -> float:
-    """Cost of a setting: CPU time, which other processes do not lengthen [s].
+    """Cost of a setting [s]: CPU time, on which other processes have little effect.
 
-    Wall time replaces a missing CPU time.
+    If the CPU time is missing, the wall time is used.
     """
     return float(row["wall_s"] if row["cpu_s"] is None else row["cpu_s"])
 
@@ -196,7 +202,7 @@ def _on_front(row: dict[str, Any], beside: list[dict[str, Any]], key: str) -> bo
         if other is row or other[key] is None or seconds(other) > cost:
             continue
         than = abs(other[key])
-        # models of half and of all teeth differ only in the last digits
+        # models of half the teeth and of all teeth differ only in the last digits
         if than < (1.0 - SAME) * error or (
             than <= (1.0 + SAME) * error and seconds(other) < cost
         ):
@@ -214,13 +220,13 @@ def cheapest(
 
     Args:
         rows: Rows of all settings.
-        kind: Only settings of this kind, compared with the finest of them; None for
-            all settings, compared with the reference.
+        kind: Kind of the settings to choose from, which are compared with the finest
+            mesh of this kind; None for all settings, compared with the reference.
 
     Returns:
-        ``quantity``, ``bound_percent``, ``model``, ``setting``, ``error_percent``,
-        ``wall_s``, ``cpu_s``; the setting is null if only the reference meets the
-        bound.
+        One entry per quantity and bound: ``quantity``, ``bound_percent``, ``model``,
+        ``setting``, ``error_percent``, ``wall_s``, ``cpu_s``. All but the first two are
+        None if only the reference meets the bound.
     """
     tail, found = "" if kind is None else "_of_kind", []
     error = f"error{tail}_percent"

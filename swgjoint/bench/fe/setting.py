@@ -1,6 +1,6 @@
 """Settings of ``swgjoint bench fe``, and the results stored for each.
 
-Every setting solves the same positions over one pitch: without torque for the kinematic
+Every setting solves the same positions over one pitch: unloaded for the kinematic
 error, and at rated torque for stiffness, stress and rim shape.
 """
 
@@ -39,11 +39,11 @@ class FeSetting:
     zero for closed forms."""
     nonlinear: bool = True
     full: bool = False
-    """Whether all teeth are modelled even if half of them suffice."""
+    """Whether all teeth are modelled even if symmetry allows half of them."""
 
     @property
     def name(self) -> str:
-        """Name in the table."""
+        """Name of the setting in tables, without the model."""
         if self.model == "ring":
             if not self.refinement:
                 return "closed form"
@@ -56,7 +56,7 @@ class FeSetting:
 
     @property
     def key(self) -> str:
-        """Model and name."""
+        """Unique name: model and name."""
         return f"{self.model}, {self.name}"
 
     @property
@@ -79,16 +79,18 @@ class Found:
     """Radial deflection of the bore at mid-face, at angles from the major axis of the
     wave generator, under rated torque at the first position, shape (RIM,) [m]."""
     wall_s: float
+    """Wall time [s]."""
     cpu_s: float | None = None
     """CPU time of all threads [s]."""
     peak_MB: float | None = None
     """Largest resident memory of the process [MB]."""
     nodes: int | None = None
-    """Number of nodes in one sector of the flexspline."""
+    """Number of nodes in one sector of the flexspline, or of a thin ring per tooth
+    pitch; None for closed forms."""
 
 
 def require_equilibrium(state: AnyState) -> AnyState:
-    """Return the state if it is an equilibrium.
+    """Return the state unchanged if it is an equilibrium.
 
     Raises:
         ComputationError: If it is not an equilibrium.
@@ -129,12 +131,12 @@ def mean_of(
 def rim_shape(points: Array, radius: float, alpha: float) -> Array:
     """Radial deflection at equally spaced angles from the major axis.
 
-    Both half turns are mapped onto one.
+    Points of both half turns are mapped onto one half turn.
 
     Args:
         points: Points of the deflected rim in any order, shape (n, 2) [m].
-        radius: Undeformed radius [m].
-        alpha: Wave-generator angle [rad].
+        radius: Undeformed radius of the rim [m].
+        alpha: Wave-generator angle, from the y axis to the major axis [rad].
 
     Returns:
         Deflection, shape (RIM,) [m].

@@ -48,7 +48,10 @@ class SettingTask:
 
 
 def solve_in_process(task: SettingTask) -> Found | str:
-    """Solve a setting in a fresh process; the reason if there is no solution."""
+    """Solve a setting; return the reason if there is no solution.
+
+    CPU time and memory are those of the process, which must be fresh.
+    """
     cpu = time.process_time()
     try:
         found = solve_setting(task.design, task.setting)
@@ -78,7 +81,7 @@ def solve_setting(design: Design, setting: FeSetting) -> Found:
     if setting.model == "ring":
         return solve_by_thin_rings(design, setting, begin)
     changed = design.with_changes({"mesh.refinement": setting.refinement})
-    # with a rigid wave generator, as in 3D
+    # the wave generator is rigid, as in 3D
     half = can_halve(changed, bearing=False) and not setting.full
     if setting.model == "3d":
         ring = solid_sector_model(changed, half=half, nonlinear=setting.nonlinear)
@@ -122,7 +125,7 @@ def _measured(
         follow: Continuation of its model.
         stress: Function that returns the largest stresses of the flexspline at a state.
         rim: Function that returns the rim shape at a state.
-        series: Compliance in series that the model lacks [rad/(N·m)].
+        series: Compliance in series that the model does not contain [rad/(N·m)].
         nodes: Number of nodes in a sector.
         begin: Start of the setting, from :func:`time.perf_counter` [s].
     """

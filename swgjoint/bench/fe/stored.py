@@ -1,4 +1,4 @@
-"""Stored file of the long references of ``swgjoint bench fe``."""
+"""Stored results of the long settings of ``swgjoint bench fe``."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from swgjoint.provenance import provenance
 from swgjoint.store import json_content, read_kept
 
 LONG = ("3d, refinement 1, linear", "3d, refinement 1.4")
-"""Settings that take up to one hour. They are read from the file if it contains them,
-else left out; only ``recompute`` solves them."""
+"""Keys of the settings that take up to one hour. They are read from the file, or left
+out if the file does not contain them; only ``recompute`` solves them."""
 WITNESS = "3d, refinement 0.5"
-"""Setting that is stored and also solved in every run, to detect changed results."""
+"""Key of a setting that is stored and also solved in every run, to detect changes."""
 DRIFT = 1e-3
 """Relative change of the witness above which the file does not match the code [-]."""
 FILE = "bench-fe-reference.json"
@@ -26,7 +26,7 @@ FILE = "bench-fe-reference.json"
 
 @dataclass(frozen=True, kw_only=True)
 class _Stored:
-    """Content of the file that is read."""
+    """Part of the file that is read."""
 
     design_hash: str
     positions: int
@@ -96,8 +96,10 @@ def describe_stored(
         found: Results of the settings by key.
 
     Returns:
-        Among others ``drift``, the largest relative change of stiffness and stress of
-        the witness, and ``pace``, its present CPU time divided by the stored one.
+        ``settings`` (keys of the stored long settings), ``command``, ``provenance``,
+        ``witness``, ``drift`` (largest relative change of stiffness and stress of the
+        witness), ``pace`` (its present CPU time divided by the stored one) and
+        ``of_this_code`` (whether the drift is below :data:`DRIFT`).
     """
     was, now = kept["settings"].get(WITNESS), found.get(WITNESS)
     drift = pace = None

@@ -1,9 +1,9 @@
 """``swgjoint bench joint``: error and cost of joint levels, integrators and time steps.
 
-There are three scenes (:mod:`swgjoint.bench.joint.scenes`). The error of a setting is
-its difference from level ``full`` solved without time-step error. Its ``own_error`` is
-the difference from its own level solved without time-step error, that is the part of
-the error that the time step causes.
+There are three scenes (:mod:`swgjoint.bench.joint.scenes`). The ``error`` of a setting
+is its difference from level ``full`` solved with negligible time-step error. Its
+``own_error`` is the difference from its own level solved in the same way, that is the
+part of the error that the time step causes.
 """
 
 from __future__ import annotations
@@ -42,16 +42,19 @@ from swgjoint.sim.accuracy import (
 from swgjoint.sim.run import Run
 
 STEPS = (1e-5, 5e-5, 1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)
-"""Time steps [s]."""
+"""Time steps of level ``full`` [s]; other levels use some of them."""
 REFERENCE_STEP = 2e-5
-"""Time step of the RK4 reference [s]; a run at twice this step shows its error."""
+"""Time step of the RK4 reference [s]; a run at twice this step estimates its error."""
 EXPLICIT = ("Euler", "implicitfast", "RK4")
+"""Integrators that run without sub-steps."""
 SPLIT_STEPS = (5e-4, 1e-3, 2e-3, 5e-3)
+"""Time steps of the splits [s]."""
 DAMPING = "damping_ratio"
+"""Quantity of the rows with the numerical damping of a setting."""
 
 
 def settings() -> list[Setting]:
-    """All settings of a scene, with most time steps at level ``full``."""
+    """All settings of a scene; level ``full`` has the largest number of time steps."""
     found = []
     for level in LEVELS:
         steps: tuple[float, ...] = STEPS[1:]
@@ -83,18 +86,22 @@ def run_joint_cost(
 
     Args:
         only: Names of the scenes to run; empty for all.
-        jobs: Number of processes; each runs one scene at a time.
+        jobs: Number of processes, each of which runs one scene at a time.
         folder: Folder for tables and pictures; None writes nothing.
         progress: Called after every scene.
 
     Returns:
         ``rows``, one per setting and quantity: ``bench``, ``scene``, ``model`` (the
         level), ``setting``, ``integrator``, ``step_s``, ``quantity``, ``error``,
-        ``own_error``, ``unit``, ``outcome``, ``reason``, ``sub_steps``, ``steps_ratio``
-        (steps per second relative to the rigid arm), ``cost`` (CPU time per simulated
-        time relative to the rigid arm at 1 ms), ``pareto``, ``wall_s``, ``reference``.
-        ``steps_ratio`` and ``cost`` are None for the splits. Also ``references`` with
-        their own errors, ``files``, ``provenance``, ``wall_s``.
+        ``own_error``, ``unit``, ``outcome``, ``reason``, ``sub_steps``, ``unresolved``
+        (number of harmonics left out), ``steps_ratio`` (steps of the scene per second
+        relative to the rigid arm), ``cost`` (CPU time per simulated time relative to
+        the rigid arm at 1 ms), ``pareto``, ``wall_s``, ``reference``. ``steps_ratio``
+        and ``cost`` are None for the splits. The rows of quantity ``damping_ratio``
+        also have ``frequency_Hz``, ``physical_damping_ratio``, ``most`` and
+        ``most_at_Hz`` (largest numerical damping ratio and its frequency). Also
+        ``references`` with estimates of their own errors, ``files``, ``provenance``,
+        ``wall_s``.
 
     Raises:
         InputError: If a scene is unknown.
@@ -133,7 +140,7 @@ def check_scenes(only: Sequence[str]) -> None:
 
 def run_bench_scene(name: str) -> dict[str, Any]:
     """Run all settings of one scene."""
-    # a diverging scheme becomes a row, so the engine need not print a warning
+    # a diverging run becomes a row, so the engine need not print a warning
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         return measure(bench_scene(name), settings())
@@ -142,7 +149,7 @@ def run_bench_scene(name: str) -> dict[str, Any]:
 
 
 def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
-    """Run settings of a scene, and its references.
+    """Run settings of a scene, and the references that they need.
 
     Args:
         bench: Scene with its drives.
@@ -172,7 +179,7 @@ def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
             "reference": names["full"],
         }
         if setting.integrator in SPLITS:
-            # its force comes from Python, so its cost is not comparable
+            # the force of a split comes from Python, so its cost is not comparable
             with split(bench.scene, setting, bench.drives) as whole:
                 got = attempt_assembled(whole)
                 base |= _costs(got, None)
@@ -186,10 +193,10 @@ def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
 
 
 def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
-    """Solve a level without time-step error.
+    """Solve a level with negligible time-step error.
 
-    The method is RK4 with inputs taken in the middle of each step, or DOP853 for scene
-    ``bench`` at level ``full``.
+    The method is RK4 with inputs taken in the middle of each step; for scene ``bench``
+    at level ``full`` it is DOP853.
 
     Args:
         bench: Scene with its drives.
@@ -227,7 +234,7 @@ def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
 def _rows(
     base: dict[str, Any], got: SettingOutcome, full: Run, level: Run
 ) -> list[dict[str, Any]]:
-    """One row per quantity of a setting.
+    """One row per quantity of a setting, and one for its numerical damping.
 
     Args:
         base: Columns that the rows share.
@@ -270,7 +277,7 @@ def _rows(
 
 
 def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
-    """Sub-steps, unresolved harmonics and times; relative cost if ``rigid`` is set."""
+    """Sub-steps, unresolved harmonics, wall time; relative cost if ``rigid`` is set."""
     keys = ("sub_steps", "unresolved", "wall_s", "steps_ratio", "cost")
     found: dict[str, Any] = dict.fromkeys(keys)
     if got.run is None or got.assembly is None:

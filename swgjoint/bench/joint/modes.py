@@ -1,10 +1,10 @@
 r"""Modes of an arm in discrete time, and the damping that the integrator adds.
 
-The motors apply only the constant torque that holds the start of the scene, because
-their control loops would also damp the modes. One step of the engine about that start
-is linearised in positions, velocities, actuator states and the memory of the plugin.
-The eigenvalues :math:`\lambda` of the resulting matrix are :math:`e^{sh}`, where h is
-the time step, and
+The motors apply only the constant torque that holds the initial pose of the scene,
+because their control loops would also damp the modes. One step of the engine about that
+pose is linearised in positions, velocities, actuator states and the memory of the
+plugin. The eigenvalues :math:`\lambda` of the resulting matrix are :math:`e^{sh}`,
+where h is the time step. Frequency and damping ratio of a mode are
 
 .. math:: f = |s|/2\pi, \qquad \zeta = -\operatorname{Re} s/|s|.
 """
@@ -29,7 +29,7 @@ from swgjoint.typing import Array
 Complex = NDArray[np.complex128]
 
 EXACT_STEP = 1e-5
-"""Time step of RK4, which gives the modes of the model without numerical damping [s].
+"""Time step at which RK4 gives the modes of the model without numerical damping [s].
 """
 LOWEST, HIGHEST = 5.0, 60.0
 """Frequency range of the modes [Hz]."""
@@ -39,10 +39,11 @@ ALIKE = 0.7
 """Scalar product of two mode shapes of unit length above which they match [-]."""
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _CHANGE = {"q": 1e-6, "v": 1e-4, "act": 1e-6, "plugin": 1e-1}
+"""Increments of the central differences, in SI units."""
 
 
 def release_motors(whole: Assembly) -> Assembly:
-    """Replace the motor loops of an assembly by their constant torque at the start.
+    """Replace the motor loops of an assembly with their constant torque at the start.
 
     Loops with an integral or a torque-speed line are kept.
     """
@@ -64,7 +65,8 @@ class Modes:
     s: Complex
     """Complex eigenvalues [1/s], shape (n,)."""
     shape: Complex
-    """Mode shapes: positions at the output, of unit length, shape (nq, n)."""
+    """Mode shapes of unit length, with rotor angles referred to the output, shape
+    (nq, n)."""
 
     def where(self, chosen: NDArray[Any]) -> Modes:
         """Select modes by mask or index."""
@@ -117,7 +119,8 @@ def step_matrix(whole: Assembly) -> Array:
 def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
     """Entries of the engine's state to vary, and the increment of each.
 
-    Time is excluded, and so are the states of hysteresis and bristles: they stick.
+    Time is excluded. The states of hysteresis and bristles are also excluded, because
+    they stick in a small vibration.
     """
     model = whole.model
     flexible = whole.motor_position[whole.motor_position >= 0]
@@ -142,7 +145,11 @@ def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
 
 
 def own_modes(whole: Assembly) -> Modes:
-    """Modes up to :data:`HIGHEST` without numerical damping, lowest first."""
+    """Lightly damped modes without numerical damping, the lowest first.
+
+    They are between :data:`LOWEST` and :data:`HIGHEST`, with a damping ratio below
+    :data:`LIGHT`.
+    """
     exact = replace(whole, model=copy.copy(whole.model))
     exact.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     exact.model.opt.timestep = EXACT_STEP
@@ -156,13 +163,15 @@ def own_modes(whole: Assembly) -> Modes:
 
 
 def numerical_damping(whole: Assembly) -> list[tuple[float, float, float]]:
-    """Numerical damping of the modes, lowest first.
+    """Numerical damping of the modes, the lowest first.
 
-    Modes at the time step of the scene are matched by the closest shape. If no mode
-    matches, the time step suppresses the oscillation: the damping ratio is then one.
+    Each mode is compared with the mode of the closest shape at the time step of the
+    scene. If no mode matches, the time step suppresses the oscillation, and the damping
+    ratio at this step is one.
 
     Returns:
-        Frequency [Hz], physical damping ratio and added damping ratio of each mode.
+        Frequency [Hz], physical damping ratio [-] and added damping ratio [-] of each
+        mode.
     """
     free = release_motors(whole)
     stepped = modes(free)

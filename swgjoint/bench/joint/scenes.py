@@ -6,9 +6,9 @@ The equations of motion of scene ``bench`` are
     J\ddot\theta = \tau - \left(T(\Delta) + C\dot\Delta\right)(1/i + e_0'(\theta)),
     \qquad J_l\ddot\psi = T(\Delta) + C\dot\Delta - T_l
 
-with :math:`\Delta = \theta/i + e_0(\theta) - \psi` and the torque :math:`\tau` of the
-motor loop written out. The solution uses neither the map nor the engine nor inputs that
-are constant over a step.
+with :math:`\Delta = \theta/i + e_0(\theta) - \psi` and the motor torque :math:`\tau` of
+the control loop. The solution uses neither the map nor the engine, and its inputs vary
+continuously instead of being constant over a step.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ STIFFNESS = 3e4
 """Stiffness of the drive of scene ``bench`` at zero torque [N·m/rad]; rotor and link
 oscillate at 39 Hz."""
 DURATION = 1.6
+"""Duration of all scenes [s]."""
 TIMING = {"hold_s": 0.1, "ramp_s": 0.3, "settle_s": 0.1}
 TRAVEL = 8.0
 """Travel of every joint [deg]; the links move at about 7 deg/s."""
@@ -49,10 +50,11 @@ class BenchScene:
     name: str
     scene: Scene
     drives: dict[str, DriveMap] = field(default_factory=dict)
+    """Maps by drive reference."""
 
     @property
     def is_bench(self) -> bool:
-        """Whether :func:`exact` solves it."""
+        """Whether :func:`exact` can solve the scene."""
         return self.name == "bench"
 
 
@@ -61,7 +63,7 @@ def bench_scene(name: str) -> BenchScene:
 
     Scene ``bench`` has a hardening drive, the arms have catalogue drives. All drives
     have a kinematic error of 1 arcmin at orders two and four per input turn. They have
-    neither hysteresis nor friction, so that RK4 converges with fourth order.
+    neither hysteresis nor friction, which would reduce the order of RK4.
     """
     if name == "bench":
         return BenchScene(
@@ -91,7 +93,7 @@ def bench_scene(name: str) -> BenchScene:
 
 
 SCENES = ("ur5e", "iiwa14", "bench")
-"""Scenes, the longest run first."""
+"""Scenes, the one with the longest run time first."""
 
 
 def _bench() -> Scene:
@@ -124,7 +126,11 @@ def exact(run: Run, whole: Assembly) -> Run:
 
     Args:
         run: Run at level ``full``, which defines start and sample times.
-        whole: Assembled scene at a small step: motion, gains, load and inertias.
+        whole: Assembled scene at a small step, with motion, gains, load and inertias.
+
+    Returns:
+        Copy of the run with angles, torsion, output torque and tool position of the
+        solution.
 
     Raises:
         ComputationError: If the integration fails.

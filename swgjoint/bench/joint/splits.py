@@ -1,8 +1,8 @@
 r"""Two implicit-explicit splits, for comparison with the scheme of the joint.
 
-A native tendon of stiffness :math:`K_0` connects rotor and link. The ``discrete``
-integrator treats it implicitly; the rest of the drive is an explicit force. This is the
-``plain split``. The ``corrected split`` also removes the integrator's own term
+In the ``plain split``, a native tendon of stiffness :math:`K_0` connects rotor and
+link, which the ``discrete`` integrator treats implicitly. The rest of the drive is an
+explicit force. The ``corrected split`` also removes the integrator's own term
 :math:`-h K_0\,\dot l` along the tendon of length l and adds
 :math:`-\mu h K_0\,\dot\Delta` along the gradient of the torsion, with
 :math:`\mu = 0.2`.
@@ -27,7 +27,7 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 
 SPLITS = {"plain split": None, "corrected split": 0.2}
-"""Splits with their coefficient mu; None for no correction."""
+"""Coefficient mu of each split [-]; None for no correction."""
 
 
 @contextmanager
@@ -39,7 +39,10 @@ def split(
     Args:
         scene: Scene whose drives have neither hysteresis nor friction.
         setting: Setting whose integrator names the split.
-        drives: Maps by name, as for :func:`assemble_setting`.
+        drives: Maps by drive reference.
+
+    Yields:
+        The compiled scene.
     """
     full, linear = (
         assemble_setting(
@@ -49,7 +52,7 @@ def split(
         )
         for level in ("full", "linear")
     )
-    # forces come from the map of level full, tendons from the linear model
+    # the forces come from the map of level full, the tendons from level linear
     whole = replace(
         linear,
         transmissions=tuple(
@@ -63,7 +66,7 @@ def split(
     for j, t in enumerate(linear.transmissions):
         tendon = whole.model.tendon(t.attached.tendon).id
         law = full.transmissions[j].attached.drive
-        # a split is stable from half of the largest stiffness on
+        # a split needs a tendon of at least half the largest stiffness to be stable
         stiffness = max(t.attached.stiffness, 0.5 * law.max_stiffness)
         whole.model.tendon_stiffness[tendon] = stiffness
         joints.append((j, law, stiffness))
@@ -71,7 +74,7 @@ def split(
 
     def rest(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         if model.nq != whole.model.nq:
-            return  # the rigid arm that provides the torques of the motion
+            return  # the rigid arm, which only provides the torques of the motion
         discrete = model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE
         h = float(model.opt.timestep) if discrete and mu is not None else 0.0
         for j, law, k in joints:

@@ -11,6 +11,7 @@ from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 
 DESIGN = "reference-2d"
+"""Design of all sweeps but that of the number of teeth."""
 POSITIONS = 3
 """Number of positions after the first one, which counts as set-up."""
 
@@ -18,7 +19,10 @@ POSITIONS = 3
 def _measure(
     design: Design, *, part: float = 1.0, positions: int = POSITIONS
 ) -> dict[str, Any]:
-    """CPU time of one position and of the set-up, for half of a drive over a pitch."""
+    """CPU time of one position and of the set-up, for a model of half the teeth.
+
+    The positions are a third of a pitch apart.
+    """
     marks = [time.process_time()]
     torque = part * ratings_of(design).rated_torque
     row: dict[str, Any] = {"model": "2d", "torque_Nm": torque}
@@ -56,12 +60,12 @@ def mesh(refinement: float) -> dict[str, Any]:
 
 
 def torque(part: float) -> dict[str, Any]:
-    """Vary the torque; ``part`` is the torque divided by rated torque."""
+    """Vary the torque; ``part`` is the torque divided by the rated torque."""
     return _measure(Design.load(DESIGN), part=part)
 
 
 def angles(count: float) -> dict[str, Any]:
-    """Vary the number of positions, with the same spacing as in the other sweeps."""
+    """Vary the number of positions, spaced as in the other sweeps; time of them all."""
     row = _measure(Design.load(DESIGN), positions=int(count))
     each = row.get("seconds")
     return row | {"seconds": None if each is None else each * count}

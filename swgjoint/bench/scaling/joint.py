@@ -1,4 +1,4 @@
-"""Run time of driven joints over their number, batch size and number of harmonics."""
+"""Run time of driven joints over number of joints, batch size and harmonics."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from swgjoint.maps.drive_map import DriveMap
 STEP = 1e-3
 """Time step [s]."""
 DRIVE = "CSG-25-100"
+"""Catalogue drive of all joints."""
 HARMONICS = 4
 """Number of harmonics of the map in chains and batches."""
 ARM = 6
@@ -29,11 +30,15 @@ ROTOR = 1e-4
 REPEATS = 5
 """Number of timed repetitions."""
 SPEED = 1e-3
-"""Speed of the links [rad/s], so slow that the time step resolves all harmonics."""
+"""Speed of the links, slow enough for the time step to resolve all harmonics [rad/s].
+"""
 
 
 def map_with(harmonics: int) -> DriveMap:
-    """Map of a catalogue drive with orders 1 to n, each with a ripple of 2 %/n."""
+    """Map of a catalogue drive with orders 1 to n, without hysteresis.
+
+    Each order has a torque ripple of 2 %/n and a kinematic error.
+    """
     base = DriveMap.from_catalogue(DRIVE, kinematic_error_arcmin=0.0)
     base = replace(base, hysteresis=())
     n = 1 + harmonics
@@ -104,7 +109,7 @@ def chain_model(
 
 
 def best(work: Callable[[], object], count: int) -> float:
-    """CPU time of one unit of work: the shortest of several runs after a warm-up [s].
+    """CPU time of one unit of work: shortest of several calls after a warm-up [s].
 
     Args:
         work: Function to time.
@@ -120,7 +125,7 @@ def best(work: Callable[[], object], count: int) -> float:
 
 
 def _step_seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> float:
-    """CPU time of one step [s]; every repetition runs the same steps."""
+    """CPU time of one step [s]; every repetition continues the motion."""
     mujoco.mj_step(model, start, 50)
 
     def work() -> None:
@@ -137,7 +142,10 @@ def _step_seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> fl
 
 
 def chain(joints: float) -> dict[str, Any]:
-    """Time of one step of a chain at level ``full``, and its ratio to a rigid chain."""
+    """CPU time of one step of a chain at level ``full``.
+
+    ``against_rigid`` is the time of a rigid chain divided by this time.
+    """
     n = int(joints)
     steps = max(20, 4000 // n**2)
     rigid = _step_seconds(*chain_model(n, level="rigid"), steps)
@@ -151,7 +159,10 @@ def chain(joints: float) -> dict[str, Any]:
 
 
 def batch(arms: float) -> dict[str, Any]:
-    """CPU time of one step of a batch, and step rates on one and two threads."""
+    """CPU time of one step of a whole batch, and step rates per arm.
+
+    ``steps_per_s`` refers to CPU time, the rates for one and two threads to wall time.
+    """
     from mujoco.batch import Batch
 
     n = int(arms)
@@ -173,13 +184,13 @@ def batch(arms: float) -> dict[str, Any]:
 
 
 def step_with_harmonics(count: float) -> dict[str, Any]:
-    """Time of one step of a single joint at level ``full``."""
+    """CPU time of one step of a single joint at level ``full``."""
     seconds = _step_seconds(*chain_model(1, harmonics=int(count)), 2000)
     return {"model": "full", "seconds": seconds, "steps_per_s": 1.0 / seconds}
 
 
 def evaluation(count: float) -> dict[str, Any]:
-    """Time of one torque of a map, evaluated at 1000 states at once."""
+    """CPU time of one torque of a map, evaluated at 1000 states at once."""
     drive, rng = map_with(int(count)), np.random.default_rng(1)
     low, high = drive.torsion_knots[[0, -1]]
     torsion = rng.uniform(low, high, 1000)

@@ -1,10 +1,11 @@
 """``swgjoint bench scaling``: growth of the run time with the size of the problem.
 
-Measured are time steps of a chain of driven joints, of batches and of a joint whose map
-has more and more harmonics; evaluations of the map in Python; and positions of the 2D
-finite elements over teeth, nodes, torque and number of positions. Times are CPU times.
-An exponent p is fitted to time ~ size^p. For chain, harmonics and teeth the fit uses
-only the larger sizes, where constant overhead is negligible.
+The benchmark measures time steps of chains of driven joints, of batches of arms and of
+a joint whose map has more and more harmonics. It also measures evaluations of the map
+in Python, and positions of the 2D finite-element model over teeth, nodes, torque and
+number of positions. Times are CPU times. An exponent p is fitted to time ~ size^p. For
+chains, harmonics and teeth, the fit uses only the larger sizes, where constant overhead
+is negligible.
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ class SizeSweep:
 
     name: str
     label: str
-    """Label of the axis."""
+    """Label of the size axis."""
     per: str
-    """Unit of work that ``seconds`` of a row refer to."""
+    """Unit of work to which ``seconds`` of a row refer."""
     sizes: tuple[float, ...]
+    """Values of the varied parameter."""
     measure: Callable[[float], dict[str, Any]]
     """Function of the size that returns ``seconds`` and further columns of the row."""
     from_size: float = 0.0
@@ -123,12 +125,12 @@ def run_scaling(
 
     Returns:
         ``rows``: ``bench``, ``sweep``, ``model``, ``setting``, ``size``, ``seconds``,
-        ``per``, ``wall_s`` of the measurement, ``outcome``; ``error``, ``unit`` and
-        ``reference`` exist as in the other benchmarks but are null, because nothing is
-        compared. ``fits``: ``sweep``, ``per``, ``exponent``, ``coefficient``,
-        ``from_size``, ``spread`` (largest factor between fit and measurement),
-        ``seconds_per_unit`` (slope between the smallest and the largest size). Also
-        ``provenance``, ``files``, ``wall_s``.
+        ``per``, ``wall_s`` of the measurement, ``outcome``, and columns of the sweep;
+        ``error``, ``unit`` and ``reference`` exist as in the other benchmarks but are
+        None, because nothing is compared. ``fits``: ``sweep``, ``per``, ``exponent``,
+        ``coefficient`` [s], ``from_size``, ``spread`` (largest factor between fit and
+        measurement), ``seconds_per_unit`` (slope between the smallest and the largest
+        fitted size). Also ``provenance``, ``files``, ``wall_s``.
     """
     begin = time.perf_counter()
     rows: list[dict[str, Any]] = []
@@ -175,14 +177,14 @@ def run_scaling(
 def fit_exponent(
     sweep: SizeSweep, rows: Sequence[dict[str, Any]]
 ) -> dict[str, Any] | None:
-    """Fit an exponent by least squares of the logarithms.
+    """Fit the exponent of a sweep by least squares in the logarithms.
 
     Args:
         sweep: Sweep to fit.
         rows: Rows of all sweeps.
 
     Returns:
-        Entry of ``fits``; None for fewer than two sizes.
+        Entry of ``fits``; None if fewer than two sizes can be fitted.
     """
     used = [r for r in rows if r["sweep"] == sweep.name and r["seconds"]]
     used = [r for r in used if r["size"] >= sweep.from_size]

@@ -1,9 +1,9 @@
 """Arms with catalogue drives in all joints: in free fall, and under control.
 
 A falling arm without damping, control or joint limits conserves the sum of kinetic,
-torsion and gravity energy. Under control the arm runs its bundled scene. The error is
-the largest difference of a link angle from the explicit integrator RK4 at a small step;
-it includes the part of a step by which the positions of the engine lead.
+torsion and gravity energy. Under control, the arm runs its bundled scene. The error is
+the largest difference of a link angle from RK4 at a small step. It includes the half
+engine step by which the positions of the discrete integrator lead.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
 
 SCENES = ("ur5e-catalogue", "iiwa14-sweep", "kinova-sweep", "panda-sweep")
+"""Bundled scenes of the arms."""
 STEPS = (5e-4, 1e-3, 2e-3)
 """Time steps [s]."""
 FALL = 2.0
@@ -35,6 +36,7 @@ FALL_SPEED = 100.0
 """Rotor speed for which the stability region is checked in a fall [rad/s]; the rotors
 reach 2000 rad/s."""
 SAMPLES = 200
+"""Number of energy samples along a fall."""
 EXACT_STEP = 1e-4
 """Time step of the RK4 reference [s]."""
 
@@ -48,7 +50,7 @@ class ArmTask:
 
 
 def run_arm(task: ArmTask) -> list[StabilityRow]:
-    """Run fall and controlled motion of one arm at all time steps."""
+    """Run the fall and the controlled motion of one arm at all time steps."""
     scene = Scene.load_file(task.scene)
     names = {
         scene.joint_settings(joint).drive or "" for joint in RigidArm(scene.arm).joints
@@ -193,7 +195,7 @@ def _let_go(
         position=np.array([q for q, _ in states]),
         velocity=np.array([v for _, v in states]),
         energy=np.array(energy),
-        scale=max(stored),  # it starts at rest
+        scale=max(stored),  # at rest, the initial value is no useful scale
         diverged=bool(bad),
         sub_steps=parts,
     )

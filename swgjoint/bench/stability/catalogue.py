@@ -14,13 +14,14 @@ from swgjoint.units import rpm
 FREE_STEP, FREE_TIME = 1e-3, 10.0
 """Time step and duration of free running [s]."""
 FREE_SPEEDS = (200.0 * rpm, 2000.0 * rpm)
-"""Rotor speeds [rad/s]: the rated speed of catalogues and a tenth of it."""
+"""Rotor speeds of free running [rad/s]: a tenth of the rated speed of catalogues, and
+that speed."""
 STEPS = (5e-4, 1e-3, 2e-3)
-"""Time steps of the runs with a step of the ratcheting torque [s]."""
+"""Time steps of the runs with a torque step to the ratcheting torque [s]."""
 LINKS = (1e-2, 1.0)
 """Link inertias of a wrist and of a shoulder [kg·m²]."""
 COUNT, SHORTEST = 2000, 0.5
-"""Minimum number of time steps, and minimum duration [s], after a torque step."""
+"""Minimum number of time steps and minimum duration [s] after a torque step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,7 @@ class CatalogueDrive:
 
     name: str
     rotor: float
-    """Inertia of the wave generator alone, the lightest possible rotor [kg·m²]."""
+    """Inertia of the wave generator alone, that is of the lightest rotor [kg·m²]."""
     ratcheting: float
     """Ratcheting torque [N·m]."""
 
@@ -47,7 +48,7 @@ def catalogue_drives() -> list[CatalogueDrive]:
 
 
 def run_drive(task: CatalogueDrive) -> list[StabilityRow]:
-    """Run free running and torque steps of one drive."""
+    """Run one drive freely and with torque steps."""
     drive = with_kinematic_error(
         DriveMap.from_catalogue(task.name, kinematic_error_arcmin=0.0)
     )

@@ -1,11 +1,11 @@
 """Chains of two links resting on a floor or against joint limits for seconds.
 
 Gravity lets a chain with catalogue drives fall onto a floor or against the limits of
-its joints, where it comes to rest. From then on, the sum of kinetic, torsion and
-gravity energy may only decrease, except for the energy stored in a compressed contact.
-A gain is therefore the rise of the mean over a part of the run above the lowest earlier
-mean. Lossless chains have the contact damping of
-:data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO`.
+its joints, where it comes to rest. The sum of kinetic, torsion and gravity energy may
+only decrease, except for energy that a compressed contact returns. The energy is
+therefore averaged over parts of the run, and a gain is the rise of a mean above the
+lowest earlier mean. Lossless chains have a damping of
+:data:`~swgjoint.joint.drive.CONTACT_DAMPING_RATIO` while a contact or limit acts.
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
 KINDS = ("floor", "limit")
+"""Kinds of contact: a floor, or limits of the joints."""
 MASSES = (0.3, 3.0)
 """Mass of each link [kg]."""
 DAMPING_RATIOS = (0.0, 0.001, 0.02)
+"""Damping ratios of the drives [-]."""
 STEPS = (5e-4, 1e-3, 2e-3)
 """Time steps [s]."""
 DURATION = 4.0
@@ -38,12 +40,14 @@ SPEED = 100.0
 rotors reach ten times this speed."""
 PARTS = 10
 """Number of parts of a run over which the energy is averaged, because a bounce returns
-the energy that it stored."""
+the energy that it has stored."""
 SAMPLES = 2000
+"""Number of energy samples along a run."""
 FINE = 4
-"""Step refinement of the runs that show the energy gain of the contacts alone."""
+"""Factor by which the step is divided in the runs that show the energy gain of the
+contacts alone."""
 LIFTS = (-0.02, -0.01, 0.01, 0.02)
-"""Initial angles of the upper link in those runs [rad]; they are varied because bounces
+"""Initial angles of the upper link in those runs [rad]; they vary because bounces
 amplify small differences."""
 
 _XML = """
@@ -72,7 +76,9 @@ class ContactTask:
 
     drive: CatalogueDrive
     kind: str
+    """One of :data:`KINDS`."""
     mass: float
+    """Mass of each link [kg]."""
     steps: tuple[float, ...] = STEPS
     damping_ratios: tuple[float, ...] = DAMPING_RATIOS
 
@@ -83,7 +89,7 @@ class ContactTask:
 
 
 def contact_tasks(*, full: bool) -> list[ContactTask]:
-    """Tasks for all catalogue drives, kinds and masses, or for a subset."""
+    """Tasks for all catalogue drives, kinds of contact and masses, or for a subset."""
     drives, masses = catalogue_drives(), list(MASSES)
     if not full:
         drives, masses = drives[3::8], masses[:1]
@@ -144,7 +150,7 @@ def _row(task: ContactTask, step: float, damping: float) -> StabilityRow:
 def chain(
     task: ContactTask, step: float, damping: float
 ) -> tuple[mujoco.MjSpec, list[JointDrive]]:
-    """Chain of a task, lossless except for a damping ratio.
+    """Chain of a task, without losses apart from the damping ratio.
 
     Args:
         task: Drive, kind of contact and mass.
@@ -188,8 +194,9 @@ def lie_down(
         lift: Initial angle of the upper link [rad].
 
     Returns:
-        Mean change of energy in each part, relative to the energy that the fall
-        releases, shape (PARTS,) [-]; infinite if the run diverged.
+        Mean change of the total energy in each part, divided by the largest kinetic and
+        torsion energy in the first part, shape (PARTS,) [-]; infinite if the run
+        diverged.
     """
     spec.option.timestep = step
     model = spec.compile()

@@ -6,7 +6,7 @@ For a small vibration of rotor against link, one step multiplies (torsion, rate)
 
 .. math:: \zeta = -\ln|\lambda| / \sqrt{\varphi^2 + \ln^2|\lambda|},
 
-which compares with the damping ratio of the drive itself. If it is negative, the
+which can be compared with the damping ratio of the drive itself. If it is negative, the
 integrator adds energy.
 """
 
@@ -21,7 +21,7 @@ from swgjoint.bench.stability.joint import RATIO, REACH, Joint
 from swgjoint.typing import Array
 
 SMALL = 1e-5
-"""Torsion of the vibration relative to the torsion at full torque [-]."""
+"""Amplitude of the torsion relative to the torsion at full torque [-]."""
 
 
 def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
@@ -29,7 +29,7 @@ def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
 
     Args:
         joint: Joint without kinematic error and damping.
-        sub_steps: Number of parts of a time step.
+        sub_steps: Number of equal parts of a time step.
 
     Returns:
         Damping ratio [-]; None if the step gives values that are not finite.
@@ -59,7 +59,8 @@ def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
     small = SMALL * REACH
     try:
         model.opt.timestep = h
-        # nonzero torsion in both: the engine's metric omits a tendon of zero length
+        # both states have torsion, because the engine's metric omits a tendon of zero
+        # length
         first = after(small, 0.0)
         second = after(small, small) - first
     finally:

@@ -34,17 +34,20 @@ LINK = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2)
 STEPS = (1e-5, 1e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 """Time steps [s]."""
 FEWER_ROTOR = (1e-7, 1e-5, 1e-3)
+"""Rotor inertias of the subset [kg·m²]."""
 FEWER_LINK = (1e-4, 1e-2, 1.0, 1e2)
+"""Link inertias of the subset [kg·m²]."""
 FEWER_STEPS = (1e-4, 1e-3, 2e-3, 5e-3)
+"""Time steps of the subset [s]."""
 FAST = 2000.0 * rpm
-"""Speed of the free-running rotor [rad/s]: the rated speed of catalogues."""
+"""Speed of the free-running rotor [rad/s], the rated speed of catalogues."""
 SLOW = 20.0
 """Speed of the rotor under load [rad/s]."""
 RATCHETING = 5.0
-"""Torque step divided by the repeated peak torque [-]; in the catalogue the ratcheting
+"""Torque step divided by the repeated peak torque [-]; in the catalogue, the ratcheting
 torque is 2.7 to 4.9 times the repeated peak torque."""
 COUNT, SHORTEST = 2000, 0.2
-"""Minimum number of time steps, and minimum duration [s], of a run."""
+"""Minimum number of time steps and minimum duration [s] of a run."""
 FINE = 1e-5
 """Time step of the run that shows the energy gain of the contacts alone [s]."""
 
@@ -53,17 +56,22 @@ OTHERS = {
     "native tendon": ("native", "discrete"),
     "RK4": ("full", "RK4"),
 }
-"""Other schemes: level and integrator, run at the full step without region check."""
+"""Level and integrator of the other schemes, which run without region check at the
+undivided time step."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GridJoint:
-    """One joint of the grid with its time steps, in SI units."""
+    """One joint of the grid with its time steps."""
 
     stiffness: float
+    """Stiffness at zero torque [N·m/rad]."""
     rotor: float
+    """Rotor inertia [kg·m²]."""
     link: float
+    """Link inertia [kg·m²]."""
     steps: tuple[float, ...]
+    """Time steps [s]."""
     others: bool = False
     """Whether the other schemes are run as well."""
 
@@ -74,13 +82,13 @@ class GridJoint:
 
     @property
     def frequency(self) -> float:
-        """Frequency of the torsional vibration [rad/s]."""
+        """Frequency of the torsional vibration at zero torque [rad/s]."""
         reflected = RATIO**2 * self.rotor
         return sqrt(self.stiffness * (1.0 / reflected + 1.0 / self.link))
 
 
 def grid(*, full: bool) -> list[GridJoint]:
-    """All joints, or a subset at fewer time steps; the slowest run first."""
+    """All joints, or a subset at fewer time steps; the longest run time first."""
     rotors, links = (ROTOR, LINK) if full else (FEWER_ROTOR, FEWER_LINK)
     joints = [
         GridJoint(
@@ -99,8 +107,8 @@ def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
     """Starts of the joints of the grid, with the rotor speed for the region check.
 
     ``free``: rotation at rated speed without torque. ``loaded``: slow rotation under
-    full torque. ``released``: release at rest from full torque. ``step``: slow
-    rotation, then a torque step at which a real drive would ratchet.
+    full torque. ``released``: release from full torque at rest. ``step``: slow
+    rotation with a torque step at which a real drive would ratchet.
     """
     full = drive.ratings.repeated_peak
     return {
@@ -175,7 +183,7 @@ def _dropped(task: GridJoint, drive: DriveMap, step: float) -> StabilityRow:
     course = drop(joint, duration=duration, sub_steps=parts)
     own = 0.0
     if course.gain > GAIN:
-        # bounces amplify small differences, so the start is varied
+        # bounces amplify small differences, so the initial speed is varied
         finer = max(4 * parts, round(step / FINE))
         own = max(
             drop(joint, duration=duration, sub_steps=finer, speed=speed).gain

@@ -1,7 +1,8 @@
 """Contact impacts: a link with drive and rotor is dropped on a floor.
 
-The rotor turns with the link. The sum of kinetic, torsion and gravity energy may only
-decrease: the floor dissipates energy, and returns what it stores under compression.
+The rotor initially turns with the link, without torsion. The sum of kinetic, torsion
+and gravity energy must not exceed its initial value, because the floor only dissipates
+energy, or stores it under compression and returns it.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ HEIGHT = 0.05
 TIP_SPEED = 1.0
 """Initial speed of the ball towards the floor [m/s]."""
 GRAVITY = 9.81
+"""Gravitational acceleration [m/s²]."""
 
 _BALL = 0.03
+"""Radius of the ball [m]."""
 _XML = """
 <mujoco>
   <option timestep="{step!r}" integrator="discrete" gravity="0 0 -{gravity}"/>
@@ -48,7 +51,7 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
         link: Inertia of the link about the joint [kg·m²].
         step: Time step [s].
     """
-    # almost all of the inertia is the mass at the end
+    # almost all of the inertia comes from the mass at the end of the link
     own = 0.01 * link
     text = _XML.format(
         step=step,
@@ -80,7 +83,7 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
 
 
 def impact_speed() -> float:
-    """Rotor speed before the impact [rad/s]."""
+    """Initial rotor speed [rad/s], at which the stability region is checked."""
     return RATIO * TIP_SPEED / LENGTH
 
 
@@ -92,7 +95,7 @@ def drop(
     Args:
         joint: Joint from :func:`drop_joint`.
         duration: Duration of the run [s].
-        sub_steps: Number of parts of a time step.
+        sub_steps: Number of equal parts of a time step.
         speed: Initial speed of the ball relative to :data:`TIP_SPEED` [-].
     """
     model, law = joint.model, joint.law
@@ -135,6 +138,6 @@ def drop(
 
 
 def _weight(model: mujoco.MjModel, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Gravity energy of the link [J]."""
+    """Potential energy of the link due to gravity [J]."""
     mass = float(model.body("link").mass[0])
     return np.asarray(mass * GRAVITY * LENGTH * np.sin(angle))

@@ -30,19 +30,20 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 RATIO = 100
+"""Magnitude of the ratio of the drive [-]."""
 ORDERS = (2, 4)
-"""Orders of the kinematic error per turn of the input."""
+"""Orders of the kinematic error per input turn."""
 ERROR = 1.0 * arcmin
 """Amplitude of each order [rad]."""
 REACH = 4e-3
-"""Torsion at full torque, the repeated peak torque [rad]; for comparison, CSG-25-100
-has 204 N·m and 5e4 N·m/rad."""
+"""Torsion at full torque, which is the repeated peak torque [rad]. For comparison, a
+CSG-25-100 has 204 N·m and 5e4 N·m/rad, which also gives about 4 mrad."""
 HARDENING = 2.0
 """Relative increase of the stiffness from zero to full torque [-]."""
 SAMPLES = 400
 """Number of energy samples along a run."""
 GAIN = 0.05
-"""Fraction of kinetic and torsion energy above which a rise counts as a gain [-]."""
+"""Relative rise of the energy above which a run counts as an energy gain [-]."""
 
 _XML = """
 <mujoco>
@@ -58,7 +59,10 @@ _XML = """
 
 
 def with_kinematic_error(drive: DriveMap) -> DriveMap:
-    """Mean torsion curve of a drive, with the study's kinematic error and no losses."""
+    """Mean torsion curve of a drive with the kinematic error of this study.
+
+    The map has neither hysteresis nor friction; its damping ratio is kept.
+    """
     count = len(ORDERS)
     potential = np.zeros((1 + count, *drive.potential.shape[1:]))
     ends = np.zeros((1 + count, 2, 2))
@@ -79,7 +83,8 @@ def with_kinematic_error(drive: DriveMap) -> DriveMap:
 def hardening_drive(stiffness: float) -> DriveMap:
     """Map of a hardening spring with kinematic error.
 
-    ``stiffness`` is the value at zero torque [N·m/rad].
+    Args:
+        stiffness: Stiffness at zero torque [N·m/rad].
     """
     knots = np.linspace(-REACH, REACH, 9)
     quartic = stiffness * HARDENING / 12.0 / REACH**2
@@ -150,7 +155,9 @@ class Course:
     """Initial kinetic and torsion energy plus the energy that the load stores in the
     drive [J]."""
     diverged: bool
+    """Whether the engine warned, or a state is not finite or too fast."""
     sub_steps: int
+    """Number of parts of a time step."""
 
     @property
     def balance(self) -> float:
@@ -178,16 +185,16 @@ class Joint:
     law: DriveMap
     """Map that acts between rotor and link."""
     q: NDArray[np.intp]
-    """Indices of rotor and link in the positions."""
+    """Indices of rotor and link in the position vector."""
     v: NDArray[np.intp]
-    """Indices of rotor and link in the velocities."""
+    """Indices of rotor and link in the velocity vector."""
     midpoint: bool
     """Whether the scheme refers to positions half a step earlier."""
 
     def region(
         self, speed: float, *, torque: float = 0.0, contacts: bool = False
     ) -> Region:
-        """Check whether the integration of the joint is stable.
+        """Stability region of the joint at its time step, checked for a run.
 
         Args:
             speed: Largest rotor speed [rad/s].
@@ -290,7 +297,7 @@ def make_joint(
         link: Inertia of the link about the joint [kg·m²].
         step: Time step [s].
         level: Level of the joint, see :func:`swgjoint.joint.attach.attach`.
-        integrator: Name of the integrator in MuJoCo.
+        integrator: Name of the integrator in MJCF.
     """
     text = _XML.format(step=step, integrator=integrator, link=link)
     spec = mujoco.MjSpec.from_string(text)

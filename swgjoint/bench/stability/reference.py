@@ -6,8 +6,8 @@ The equations of motion are
     J\ddot\theta = -T(\Delta)\,(1/i + e_0'(\theta)) + T_l/i, \qquad
     J_l\ddot\psi = T(\Delta) - T_l
 
-with :math:`\Delta = \theta/i + e_0(\theta) - \psi`. The spring is written out, so that
-the reference uses neither the map nor the engine.
+with :math:`\Delta = \theta/i + e_0(\theta) - \psi`. The spring law T is coded here
+again, so that the reference uses neither the map nor the engine.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 WINDOW = 0.1
-"""Longest time over which a run is compared [s]."""
+"""Longest duration of the comparison with a run [s]."""
 PHASE = 100.0
-"""Largest phase of the torsional vibration over which a run is compared [rad]."""
+"""Largest phase of the torsional vibration during the comparison [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,9 +50,9 @@ class TwoMassReference:
         """Largest error of the link angle over the window [arcmin].
 
         Args:
-            joint: Joint to compare.
+            joint: Joint to run.
             start: Initial conditions of the reference.
-            sub_steps: Number of parts of a time step.
+            sub_steps: Number of equal parts of a time step.
 
         Returns:
             Error [arcmin]; None if the window contains fewer than four steps or the run
@@ -80,7 +80,7 @@ def reference(
         stiffness: Stiffness of the drive at zero torque [N·m/rad].
         rotor: Rotor inertia [kg·m²].
         link: Link inertia [kg·m²].
-        start: Initial torque and speed, and load.
+        start: Initial torque, initial speed and load.
 
     Raises:
         ComputationError: If the integration fails.

@@ -11,9 +11,11 @@ from typing import Any
 from swgjoint.bench.stability.joint import GAIN, Course
 
 DEFAULT = "discrete"
+"""Name of the default scheme."""
 FREE = "free 10 s"
 """Group in which a loss of energy is also a fault."""
 OUTCOMES = ("ok", "sub_stepped", "refused", "diverged", "energy_gain")
+"""Possible outcomes of a run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,36 +23,42 @@ class StabilityRow:
     """Result of one run."""
 
     case: str
+    """Joint, drive, chain or arm of the run."""
     group: str
-    """Kind of run: ``free``, ``loaded``, ``released``, ``step``, ``drop``, ..."""
+    """Kind of run, see :mod:`swgjoint.bench.stability.stability`."""
     scheme: str
+    """Time integration: :data:`DEFAULT` or another scheme of the grid."""
     step_s: float
+    """Time step, before its division into sub-steps [s]."""
     outcome: str
     """One of :data:`OUTCOMES`."""
     sub_steps: int | None = None
     """Number of parts of the step; None if the run was refused."""
     largest_gain: float | None = None
-    """Largest mean gain over a tenth of the run: energy minus work, relative to the
-    initial kinetic and torsion energy [-]."""
+    """Largest mean gain of energy minus work over a tenth of the run [-], relative to
+    an energy that depends on the group, see :mod:`swgjoint.bench.stability.stability`.
+    """
     own_gain: float | None = None
-    """Largest gain of a run with a much smaller step [-]; it shows the energy that the
-    contacts of the engine add."""
+    """Largest gain of runs with a much smaller step [-]; it shows the energy that the
+    contacts of the engine add. None if no such run was needed."""
     energy_balance: float | None = None
-    """Mean gain in the last tenth [-]; negative if energy was lost."""
+    """Mean change of energy in the last tenth of the run, relative to the same energy
+    [-]; negative if energy was lost."""
     error: float | None = None
     """Largest error of the link angle relative to the reference [arcmin]."""
     numerical_damping_ratio: float | None = None
     """Damping ratio of the torsional vibration that the integrator causes [-]."""
     physical_damping_ratio: float | None = None
-    """Damping ratio of the drive itself [-]; the runs omit it."""
+    """Damping ratio of the drive itself [-]; only the ``sweep`` runs apply it."""
     phase_step: float | None = None
-    """Step times frequency of the torsional vibration [rad]."""
+    """Time step times frequency of the fastest torsional vibration [rad]."""
     reason: str | None = None
-    """Limit that a refused or sub-stepped run exceeded."""
+    """Bound of the stability region that the undivided step exceeds, or another reason
+    for a failed run; None without one."""
 
     @property
     def unexplained(self) -> bool:
-        """Whether the default scheme failed although its region was not exceeded."""
+        """Whether the default scheme failed inside its stability region."""
         if self.scheme != DEFAULT:
             return False
         braked = self.group == FREE and (self.energy_balance or 0.0) < -GAIN
@@ -65,10 +73,10 @@ class StabilityRow:
 
 
 def outcome_of(course: Course, *, own_gain: float = 0.0) -> str:
-    """Outcome of a run that was not refused.
+    """Outcome of a run that was not refused, one of :data:`OUTCOMES`.
 
     Args:
-        course: Course of the run.
+        course: Sampled states of the run.
         own_gain: Energy gain that the contacts of the engine explain [-].
     """
     if course.diverged:
@@ -79,7 +87,7 @@ def outcome_of(course: Course, *, own_gain: float = 0.0) -> str:
 
 
 def counts(rows: Sequence[StabilityRow]) -> dict[str, dict[str, int]]:
-    """Number of rows by key ``group: scheme``, then by outcome."""
+    """Number of rows by ``group: scheme`` and outcome."""
     found: dict[str, Counter[str]] = {}
     for row in rows:
         found.setdefault(f"{row.group}: {row.scheme}", Counter())[row.outcome] += 1

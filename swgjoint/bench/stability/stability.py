@@ -1,4 +1,6 @@
-"""Stability of the joint in stiff and extreme cases.
+"""``swgjoint stability``: stability of the joint in stiff and extreme cases.
+
+The runs belong to these groups:
 
 - ``free``, ``loaded``, ``released``, ``step``, ``drop``: a grid of stiffness, inertias
   and time steps (:mod:`swgjoint.bench.stability.grid`), with a kinematic error of
@@ -10,11 +12,13 @@
 - ``contact``: chains of two links that rest on a floor or against joint limits
   (:mod:`swgjoint.bench.stability.contact`).
 
-Except for two thirds of the ``contact`` runs, no run has physical damping. Any energy
-gain therefore comes from the integrator or from the contacts; a run with a much smaller
-step shows the gain of the contacts alone. A gain is the mean of energy minus work over
-a tenth of the run, minus the initial value. It is divided by the sum of the initial
-kinetic and torsion energy and the energy that the load stores in the drive.
+No run has physical damping, except for the ``sweep`` runs, two thirds of the
+``contact`` runs, and the contact damping of lossless drives. Any energy gain therefore
+comes from the integrator or from the contacts; a run with a much smaller step shows the
+gain of the contacts alone. A gain is the mean of energy minus work over a tenth of the
+run, minus the initial value. It is divided by the sum of the initial kinetic and
+torsion energy and the energy that the load stores in the drive. Groups ``fall`` and
+``contact`` divide by the largest kinetic and torsion energy of the fall instead.
 """
 
 from __future__ import annotations
@@ -52,6 +56,7 @@ from swgjoint.progress import Progress, silent
 Task = ArmTask | CatalogueDrive | ContactTask | GridJoint
 
 ARM_GROUPS = ("fall", "sweep")
+"""Groups of runs of a whole arm."""
 REFERENCE = (
     "free, loaded: two-mass equations by DOP853 (rtol 1e-10) over 100 rad of torsional"
     " vibration, at most 0.1 s; sweep: the same arm by RK4 at 0.1 ms"
@@ -70,19 +75,21 @@ def run_stability(
     folder: Path | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Run the study.
+    """Run the stability study.
 
     Args:
         full: Whether the whole grid is run instead of a subset at four time steps.
         jobs: Number of processes.
         folder: Folder for table and picture; None writes nothing.
-        progress: Called after every joint, drive or arm.
+        progress: Called after every joint, drive, arm or chain.
 
     Returns:
-        ``rows``, ``default_scheme``, ``scheme``, ``unexplained``, ``counts`` by group
-        and scheme, ``shares`` of the outcomes of the default scheme, ``refused_share``,
-        ``arms_refused``, ``free_running``, ``error_unit``, ``reference``, ``files``,
-        ``wall_s``.
+        ``rows`` (see :class:`swgjoint.bench.stability.rows.StabilityRow`),
+        ``default_scheme`` (its name), ``scheme`` (its description), ``unexplained``
+        (rows in which it fails inside its stability region), ``counts`` of the outcomes
+        by group and scheme, ``shares`` of the outcomes of the default scheme,
+        ``refused_share``, ``arms_refused``, ``free_running`` (energy balance of group
+        ``free 10 s``), ``error_unit``, ``reference``, ``files``, ``wall_s``.
     """
     begin = time.perf_counter()
     if folder is not None:
@@ -120,7 +127,7 @@ def run_stability(
 
 def run_task(task: Task) -> list[StabilityRow]:
     """Run one joint, drive, arm or chain."""
-    # a diverging scheme becomes a row, so the engine need not print a warning
+    # a diverging run becomes a row, so the engine need not print a warning
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         if isinstance(task, GridJoint):

@@ -118,7 +118,7 @@ class OptimisationFile(AskedFile):
             told = f"{REFINEMENT} is also a parameter; accepted: one of the two"
             faults.append(("confirm.refinement", told))
         if BASE in varied:
-            fault = f"key {BASE!r}: only sweeps can vary the base design"
+            fault = f"key {BASE!r}: only a sweep can vary the base design"
             faults.append(("plan.parameters", fault))
         if faults:
             raise Fault(*faults)

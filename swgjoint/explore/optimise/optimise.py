@@ -187,8 +187,7 @@ def optimise(
     start, *beside = computed(named, partial(_as, progress, "start and others"))
     if not start.record.ok:
         raise ComputationError(
-            f"start design {file.design}: {start.record.outcome}:"
-            f" {start.record.reason}"
+            f"start design {file.design}: {start.record.outcome}: {start.record.reason}"
         )
     assert start.design is not None
     tried: list[Candidate] = []

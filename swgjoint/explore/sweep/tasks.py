@@ -75,7 +75,10 @@ class SpecTask(FigureTask):
 
 
 class RunTask(FigureTask):
-    """Run of the scene with the design in all driven joints; figures of the worst one."""
+    """Run of the scene with the design in every driven joint.
+
+    The figures are those of the worst joint.
+    """
 
     known = RUN_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
