@@ -175,9 +175,9 @@ def run_lot(
 
     @cache
     def rests() -> Sequence[Rest]:
-        progress(f"{name}: without errors", 0, 1)
+        progress(f"{name}: drive without errors", 0, 1)
         found = perfect_positions(design)
-        progress(f"{name}: without errors", 1, 1)
+        progress(f"{name}: drive without errors", 1, 1)
         return found
 
     def judged() -> _Judged:

@@ -124,7 +124,7 @@ def _limits(kind: str) -> dict[str, Any]:
     figures = {}
     for key in (*upper, *lower):
         bound = "Largest" if key in upper else "Smallest"
-        text = f"{bound} accepted value. {meaning.get(key, '')}".strip()
+        text = f"{bound} value that is accepted. {meaning.get(key, '')}".strip()
         unit = {"unit": unit_of(key)} if unit_of(key) else {}
         entry = {"type": "number", "exclusiveMinimum": 0, "description": text}
         figures[key] = {**entry, **unit}

@@ -121,7 +121,7 @@ def run_fe_cost(
     best = [s for s in settings if s.key not in left_out][-1]
     last = found[best.key]
     if isinstance(last, str):
-        raise ComputationError(f"the reference, {best.name}: {last}")
+        raise ComputationError(f"reference {best.key!r}: {last}")
     from_file = set(LONG) & set(stored)
     rows = rows_of(settings, found, best=best, stored=from_file)
     result = {

@@ -110,7 +110,7 @@ def run_joint_cost(
     begin = time.perf_counter()
     check_scenes(only)
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)  # before minutes of work
+        folder.mkdir(parents=True, exist_ok=True)  # fail before minutes of work
     names = [name for name in SCENES if not only or name in only]
     found = run_all(
         run_bench_scene, names, jobs=jobs, stage="bench joint", progress=progress

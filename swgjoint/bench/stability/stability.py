@@ -93,7 +93,7 @@ def run_stability(
     """
     begin = time.perf_counter()
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)  # before minutes of work
+        folder.mkdir(parents=True, exist_ok=True)  # fail before minutes of work
     tasks: list[Task] = [ArmTask(scene=scene) for scene in SCENES]
     tasks += [*grid(full=full), *contact_tasks(full=full), *catalogue_drives()]
     found = run_all(run_task, tasks, jobs=jobs, stage="stability", progress=progress)
@@ -174,7 +174,7 @@ def summary(result: dict[str, Any]) -> list[str]:
         f"{free['runs']} free joints over 10 s at 1 ms: energy loss at most"
         f" {100.0 * free['largest_loss']:.2f} %, gain at most"
         f" {100.0 * max(0.0, free['largest_gain']):.2g} %",
-        f"error in arcmin: {result['reference']}",
+        f"reference of the errors in arcmin: {result['reference']}",
     ]
     if not result["unexplained"]:
         return [*lines, "no run of the default scheme gained energy or diverged"]

@@ -83,7 +83,7 @@ def advise(
         what = (
             "no setting runs"
             if best is None
-            else f"the best is {best['level']}, {best['integrator']} at"
+            else f"the most accurate one is {best['level']}, {best['integrator']} at"
             f" {1e3 * best['step_s']:g} ms with {best['error']:.3g} {bound.unit}"
         )
         raise ComputationError(
@@ -104,7 +104,7 @@ def advise(
         "cost": found["cost"],
         "reference": {
             "level": "full",
-            "integrator": "discrete, extrapolated to no step",
+            "integrator": "discrete, extrapolated to step zero",
             "step_s": reference.step,
             "error": reference.error,
         },

@@ -125,7 +125,7 @@ class SettingSearch:
             error = row["error"]
             if error is None:
                 continue
-            # a shorter step that hardly reduces the error leaves that of the level
+            # if a shorter step hardly reduces the error, the rest is that of the level
             if setting.level != "full" and error > FLAT * last.get(key, np.inf):
                 flat |= {(setting.level, one) for one in SCENE_INTEGRATORS}
             last[key] = error

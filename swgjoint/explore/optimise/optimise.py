@@ -184,7 +184,7 @@ def optimise(
     named = {BASE: [file.design, *file.beside]}
     for name in file.beside:
         Design.load(name)  # report a bad reference before anything is computed
-    start, *beside = computed(named, partial(_as, progress, "start and others"))
+    start, *beside = computed(named, partial(_as, progress, "compared designs"))
     if not start.record.ok:
         raise ComputationError(
             f"start design {file.design}: {start.record.outcome}: {start.record.reason}"
@@ -226,10 +226,11 @@ def optimise(
         columns = {
             name: [front[k].values[name] for k in chosen] for name in front[0].values
         }
-        again = computed(columns, partial(_as, progress, "confirm"), confirm=True)
+        again = computed(columns, partial(_as, progress, "confirm front"), confirm=True)
         for k, candidate in zip(chosen, again, strict=True):
             front[k] = replace(front[k], confirmed=candidate.record)
-        rivals = computed(named, partial(_as, progress, "confirm others"), confirm=True)
+        stage = partial(_as, progress, "confirm compared designs")
+        rivals = computed(named, stage, confirm=True)
         start, *beside = (
             replace(old, confirmed=new.record)
             for old, new in zip([start, *beside], rivals, strict=True)

@@ -254,7 +254,7 @@ def _map(
     from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
-    # figures with locked input describe the drive without tooth errors
+    # figures with locked input are those of the drive without tooth errors
     if not turn and has_errors(design):
         design = without_errors(design)
     return build_map(design, model=task.model, angles=task.angles), design

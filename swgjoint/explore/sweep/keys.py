@@ -40,7 +40,7 @@ def keys_of(model: type[BaseModel], above: str = "") -> Iterator[tuple[str, Fiel
             None,
         )
         if shape in (list, tuple):
-            continue  # only changed as a whole
+            continue  # a list can only be changed as a whole
         if shape is dict:
             key = f"{key}.{ANY}"
             yield key, field

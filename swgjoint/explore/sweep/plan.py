@@ -173,7 +173,7 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
     if isinstance(plan, List) and len(set(lengths)) > 1:
         counts = ", ".join(map(str, lengths))
         faults.append(
-            ("plan.parameters", f"{counts} values: expected equally many values")
+            ("plan.parameters", f"{counts} values: expected lists of equal length")
         )
     if isinstance(plan, Grid):
         total = 1

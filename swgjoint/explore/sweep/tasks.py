@@ -16,7 +16,7 @@ from swgjoint.explore.sweep.figures import (
 )
 from swgjoint.faults import Fault, Section
 
-Listed = Field(strict=False, min_length=1)  # TOML has lists, the models tuples
+Listed = Field(strict=False, min_length=1)  # TOML lists become tuples
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name of a bundled file, or a path."""
@@ -49,7 +49,6 @@ class MeshingTask(FigureTask):
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
     """Output torque [N·m]; None for the rated torque of the design."""
     positions: Annotated[int, Field(ge=1, le=10_000)] = 6
-    """Number of positions of the wave generator."""
     turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
     """Input rotation [deg]; None for one pitch of the fixed member, after which the
     mesh cycle of a drive without errors repeats."""
@@ -59,7 +58,7 @@ class MeshingTask(FigureTask):
     @model_validator(mode="after")
     def _loaded(self) -> MeshingTask:
         if self.torque_Nm == 0 and STIFFNESS in self.figures:
-            # with clearance, an unloaded output can move freely
+            # with clearance, an unloaded output moves freely and has no stiffness
             fault = f"0 N·m: {STIFFNESS} needs a nonzero torque"
             raise Fault(("torque_Nm", fault))
         return self
@@ -96,9 +95,7 @@ class SlurmCluster(Section):
 
     kind: Literal["slurm"] = "slurm"
     jobs: Annotated[int, Field(ge=1, le=10_000)]
-    """Number of jobs."""
     cores: Annotated[int, Field(ge=1, le=1_000)]
-    """Number of cores of one job."""
     memory_GB: Annotated[float, Field(gt=0, le=100_000)]
     """Memory of one job [GB]."""
     walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]

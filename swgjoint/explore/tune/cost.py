@@ -100,7 +100,7 @@ class Trials:
         from swgjoint.envs.bench import settings_of
         from swgjoint.envs.joint_tracking import TrackingSettings
 
-        # rejects arguments of gymnasium itself, such as the restart mode
+        # reject arguments of gymnasium itself, such as the restart mode
         settings_of(TrackingSettings, dict(arguments))
         self.seeds, self.candidates = tuple(seeds), candidates
         env = gymnasium.make_vec(

@@ -144,7 +144,8 @@ def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter,
     """
     high = anti_resonance(joints)
     known = (
-        # control is too soft below 0.1 times the anti-resonance, oscillates above twice
+        # 0.1 to 2 times the anti-resonance: softer control follows poorly, stiffer
+        # control oscillates
         GainParameter(
             key="frequency_Hz",
             low=0.1 * high,

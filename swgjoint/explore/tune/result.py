@@ -55,8 +55,8 @@ class TuneSettings:
         least = 2 * self.population
         if self.evaluations is not None and self.evaluations < least:
             raise InputError(
-                f"evaluations {self.evaluations}; accepted: at least {least}, a"
-                f" generation of {self.population} for each of two searches"
+                f"evaluations {self.evaluations}; accepted: at least {least}, that is"
+                f" one generation of {self.population} for each of two searches"
             )
         if not 0 <= self.seed < 10**6:
             raise InputError(f"seed {self.seed}; accepted: 0 to 999999")

@@ -116,7 +116,8 @@ def run_search(
         elif not np.array_equal(search.places[done], places):
             raise InputError(
                 f"{JOURNAL} belongs to another search (generation {done + 1} differs);"
-                " accepted: the versions of swgjoint, scipy, cma, optuna that wrote it"
+                " accepted: the versions of swgjoint, scipy, cma and optuna that wrote"
+                " it"
             )
         done += 1
         return np.asarray(search.costs[done - 1].mean(axis=1))
@@ -175,7 +176,7 @@ def _cma(evaluate: Evaluate, start: Array, size: int, seed: int) -> None:
         {
             "bounds": [0.0, 1.0],
             "popsize": size,
-            # its own generator, not the global one of numpy
+            # NaN and randn: draw from rng, not from numpy's global generator
             "seed": float("nan"),
             "randn": lambda *shape: rng.standard_normal(shape),
             "verbose": -9,
@@ -269,7 +270,7 @@ def read_journal(
         raise InputError(
             f"{path}: nothing to resume; accepted: --out of an interrupted run"
         ) from None
-    except Exception as error:  # a file may be anything
+    except Exception as error:  # a damaged file may raise any error
         raise InputError(
             f"{path} is not a journal of a tuning run: {one_line(error)}; accepted:"
             " another --out"
