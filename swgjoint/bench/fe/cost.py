@@ -91,10 +91,9 @@ def run_fe_cost(
         setting by quantity and bound; ``cheapest_in_the_plane``: the same among the
         nonlinear 2D settings, compared with their finest mesh; ``design``; ``stored``:
         provenance and drift of the stored settings; ``left_out``: keys of the settings
-        left out;
-        ``kinematic_error_positions``: number of positions per pitch at which the
-        kinematic error is evaluated, enough for its first harmonic; ``provenance``,
-        ``files``, ``wall_s``.
+        left out; ``kinematic_error_positions``: number of positions per pitch at which
+        the kinematic error is evaluated, enough for its first harmonic;
+        ``provenance``, ``files``, ``wall_s``.
 
     Raises:
         DesignError: If the design has no cup, or a feature that the 3D model lacks.

@@ -18,7 +18,8 @@ comes from the integrator or from the contacts; a run with a much smaller step s
 gain of the contacts alone. A gain is the mean of energy minus work over a tenth of the
 run, minus the initial value. It is divided by the sum of the initial kinetic and
 torsion energy and the energy that the load stores in the drive. Groups ``fall`` and
-``contact`` divide by the largest kinetic and torsion energy of the fall instead.
+``contact`` divide by the largest kinetic and torsion energy of the fall instead, and
+``contact`` subtracts the lowest earlier mean instead of the initial value.
 """
 
 from __future__ import annotations

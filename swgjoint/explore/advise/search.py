@@ -44,8 +44,8 @@ def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The cheapest row within the bound; None if no row is within it.
 
     Among rows of equal cost (see :data:`ALIKE`) the one with the lowest level wins,
-    then the one with the smallest error. The advice therefore does not depend on the
-    scatter of the timing.
+    then the one with the smallest error. Scatter of the timing therefore rarely changes
+    the advice.
     """
     within = [row for row in rows if row["within"]]
     least = min((row["cost"] for row in within), default=np.inf)

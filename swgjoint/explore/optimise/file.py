@@ -56,9 +56,9 @@ class Limit(Section):
         return self
 
     def violation(self, value: float) -> float:
-        """Excess beyond the violated bound, divided by its magnitude [-].
+        """Excess beyond the violated bound, divided by the magnitude of this bound [-].
 
-        It is zero within the bounds, and not divided if the violated bound is zero.
+        It is zero within the bounds. The excess is not divided if the bound is zero.
         """
         beyond = 0.0
         if self.most is not None:

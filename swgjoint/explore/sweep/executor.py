@@ -146,7 +146,7 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
 
 
 def _address(reference: str) -> str:
-    """Address of a scheduler, checked, or read from a scheduler file.
+    """Check the address of a scheduler, or read it from a scheduler file.
 
     With an invalid address, dask's client would hang for half a minute.
 

@@ -53,7 +53,7 @@ class GainSearch:
     costs: list[Array] = field(default_factory=list)
     """Costs on every seed [rad], shape (n, seeds) each."""
     seconds: list[float] = field(default_factory=list)
-    """Computing time of each generation [s]."""
+    """Wall time of each generation [s]."""
 
     @property
     def evaluations(self) -> int:
