@@ -1,8 +1,8 @@
 r"""Two implicit-explicit splits, for comparison with the scheme of the joint.
 
-In the ``plain split``, a native tendon of stiffness :math:`K_0` connects rotor and
-link, which the ``discrete`` integrator treats implicitly. The rest of the drive is an
-explicit force. The ``corrected split`` also removes the integrator's own term
+In the ``plain split``, the ``discrete`` integrator treats a native tendon of stiffness
+:math:`K_0` between rotor and link implicitly. The rest of the drive is an explicit
+force. The ``corrected split`` also removes the integrator's own term
 :math:`-h K_0\,\dot l` along the tendon of length l and adds
 :math:`-\mu h K_0\,\dot\Delta` along the gradient of the torsion, with
 :math:`\mu = 0.2`.

@@ -65,7 +65,7 @@ def torque(part: float) -> dict[str, Any]:
 
 
 def angles(count: float) -> dict[str, Any]:
-    """Vary the number of positions, spaced as in the other sweeps; time of them all."""
+    """Vary the number of equally spaced positions; the time is that of all of them."""
     row = _measure(Design.load(DESIGN), positions=int(count))
     each = row.get("seconds")
     return row | {"seconds": None if each is None else each * count}

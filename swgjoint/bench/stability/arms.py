@@ -195,7 +195,7 @@ def _let_go(
         position=np.array([q for q, _ in states]),
         velocity=np.array([v for _, v in states]),
         energy=np.array(energy),
-        scale=max(stored),  # at rest, the initial value is no useful scale
+        scale=max(stored),  # the arm starts at rest, so its initial energy is small
         diverged=bool(bad),
         sub_steps=parts,
     )
