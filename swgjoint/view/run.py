@@ -24,6 +24,9 @@ class SceneRun(Run):
         """Write a recording for the rerun viewer and return its path.
 
         See :mod:`swgjoint.view.recording.recording`.
+
+        Raises:
+            ComputationError: If the file cannot be written.
         """
         from swgjoint.view.recording.recording import write_recording
 
@@ -44,29 +47,30 @@ def run_scene(
 ) -> SceneRun:
     """Simulate a scene from its initial equilibrium to its end.
 
-    A step outside the stability region of a joint is divided into
-    ``run.assembly.sub_steps`` equal sub-steps. The run records the steps of the scene
-    only.
+    If the step of the scene is outside the stability region of a joint, every step is
+    divided into ``run.assembly.sub_steps`` equal sub-steps. The run records only the
+    states at the steps of the scene.
 
     Args:
         scene: A scene, the path of a scene file, or the name of a bundled scene.
         overrides: New values for dotted keys of the scene, as a mapping or as
             ``key=value`` strings.
-        drives: Maps that replace the drive references of the scene, by reference.
+        drives: Maps to use for drive references of the scene, by reference.
         controller: Controller that replaces the control law of the scene. It acts once
             per control period on the sensor readings of the scene. Motor limits,
             payload, disturbances and initial state remain those of the scene. It reads
             the link angle if ``controller.feedback`` is ``link``, and the output torque
             if the scene has ``sensors.torque``.
-        known_drives: Drive maps that the controller assumes, by joint; it assumes the
-            simulated drive for all other joints.
+        known_drives: Drive maps that the controller assumes, by joint; for all other
+            joints it assumes the simulated drive.
         known_arm: Arm model that the controller assumes, for instance
             :class:`swgjoint.control.pinocchio_arm.PinocchioArm`; its torques enter the
-            feed-forward. None for the arm of the scene, with its payload if known.
+            feed-forward. None for the arm of the scene, with the payload that the
+            controller knows.
         name: Name of the run in recordings and progress; None for the scene's name.
-        recording: File for the viewer recording, which is written during the
-            simulation; :meth:`SceneRun.to_rerun` writes it afterwards. If it cannot be
-            written, an ``OutputWarning`` is given and the run is still returned.
+        recording: File for a viewer recording, which is written together with the run;
+            :meth:`SceneRun.to_rerun` writes the same recording later. If it cannot be
+            written, an ``OutputWarning`` is issued and the run is still returned.
         progress: Called with the stage, the number of completed steps and their total.
 
     Returns:

@@ -1,9 +1,9 @@
 """Quantified validity of the results of a run.
 
 Three things limit the accuracy of a figure: the map (its level, its torque range and
-the harmonics that its fit dropped), the orders that the step leaves out, and the
-integration error of the step. The integration error is estimated by a second run of the
-same motion with the same orders at half the step.
+the harmonics that its fit omitted), the orders that the step cannot resolve, and the
+integration error of the step. A second run of the same motion, with the same orders and
+half the step, estimates the integration error.
 """
 
 from __future__ import annotations
@@ -33,22 +33,23 @@ STEP_KEYS = {
 """Path of each reported figure in the metrics of a joint."""
 OFF_COMMAND, LAG = 0.1, 3.0
 """A warning is given if a link deviates from its command by more than ``OFF_COMMAND``
-[deg] and by more than ``LAG`` times the transmission error of its drive [-]."""
+[deg] and by more than ``LAG`` times the transmission error of its drive [-], taken as
+the absolute mean plus the peak to peak."""
 MAX_STEPS = 400_000
-"""Largest number of steps of the finer run, for a few seconds of computing time."""
+"""Largest number of steps of the finer run, which take a few seconds to compute."""
 
 
 def step_error(run: Run) -> dict[str, Any]:
     """Change of the figures of a run when its step is halved.
 
     The finer run has the same orders as the coarser one, so that the change contains
-    only the integration error. Orders that the step leaves out are listed separately
-    under ``unresolved`` with their amplitudes.
+    only the integration error. The metrics of a run list the orders that its step
+    leaves out, with their amplitudes, under ``unresolved``.
 
     Returns:
         ``step_s``, the step of the finer run [s], and ``joints``, the absolute change
         of each figure of :data:`STEP_KEYS` by joint; ``reason`` instead of ``joints``
-        if the finer run was not made.
+        if the finer run would take too many steps or fails.
     """
     step = 0.5 * run.assembly.step
     steps = run.assembly.scene.simulation.duration_s / step
@@ -77,7 +78,7 @@ def step_error(run: Run) -> dict[str, Any]:
 
 
 def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
-    """The scene with drives that have exactly the orders of the run."""
+    """The scene and its drives, reduced to the orders that the run simulates."""
     scene = run.assembly.scene
     sections, drives = {}, {}
     for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
@@ -96,7 +97,10 @@ def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
 
 
 def map_error(drive: DriveMap) -> list[str]:
-    """Validation and known errors of a map, one line each."""
+    """Result of the validation and known errors of a map, one line each.
+
+    Records of the map that are missing or not finite are omitted.
+    """
     info = drive.info
     validation, reason = map_validation(drive)
     lines = [reason or ""] if validation is None else [validation_summary(validation)]
@@ -107,15 +111,17 @@ def map_error(drive: DriveMap) -> list[str]:
     values = _numbers(source.get("energy_check"), "relative")
     if values is not None:
         lines.append(
-            "the map deviates from the input torque of the finite elements, which the"
-            f" fit did not use, by up to {100.0 * values[0]:.2g} % of its ripple"
+            "the input torque of the map differs from that of the finite elements,"
+            " which the fit did not use, by up to"
+            f" {100.0 * values[0]:.2g} % of its peak to peak"
         )
     keys = ("threshold", "torque_Nm", "kinematic_error_rad")
     values = _numbers(source.get("residual"), *keys)
     if values is not None:
         lines.append(
-            f"harmonics below {100.0 * values[0]:.2g} % are omitted; residual"
-            f" {values[1]:.2g} N·m, {values[2] / arcmin:.2g} arcmin"
+            f"harmonics below {100.0 * values[0]:.2g} % of the strongest one are"
+            f" omitted; largest residual {values[1]:.2g} N·m in torque,"
+            f" {values[2] / arcmin:.2g} arcmin in kinematic error"
         )
     stiffness = info.get("stiffness_range_Nm_rad")
     if isinstance(stiffness, list | tuple) and len(stiffness) == 2:
@@ -130,7 +136,7 @@ def map_error(drive: DriveMap) -> list[str]:
 
 
 def _numbers(table: Any, *keys: Any) -> list[float] | None:
-    """Values of a table in a map; None unless all are finite numbers."""
+    """Values of a table in a map, by key; None unless all are finite numbers."""
     values = [table.get(key) for key in keys] if isinstance(table, Mapping) else []
     numbers = [
         float(one)
@@ -143,8 +149,8 @@ def _numbers(table: Any, *keys: Any) -> list[float] | None:
 def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     """Warnings about the results of a run, one line each.
 
-    Conditions that invalidate a run are in its ``reasons`` instead, see
-    :mod:`swgjoint.sim.figures.verdict`.
+    Conditions that invalidate a run are listed in the ``reasons`` of its metrics
+    instead, see :mod:`swgjoint.sim.figures.verdict`.
 
     Args:
         joints: Figures by joint, see :meth:`swgjoint.sim.run.Run.metrics`.
@@ -160,9 +166,9 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
             )
         if joint["ripple_is_lower_bound"] and (carries := joint["resolving"]):
             lines.append(
-                f"{name}: ripple is a lower bound: the step leaves out orders of about"
-                f" {joint['ripple_left_out_percent']:.2g} % rms; order"
-                f" {carries['order']:.4g} needs a step of"
+                f"{name}: ripple is a lower bound: the step leaves out orders with"
+                f" about {joint['ripple_left_out_percent']:.2g} % of rated torque"
+                f" (rms); order {carries['order']:.4g} needs a step of"
                 f" {1e3 * carries['step_s']:.2g} ms or a speed of"
                 f" {carries['speed_deg_s']:.2g} deg/s"
             )
@@ -171,8 +177,9 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
         if off is not None and off > max(OFF_COMMAND, LAG * share):
             lines.append(
                 f"{name}: the link deviates from its command by up to {off:.2g} deg at"
-                f" constant speed; the drive causes {60.0 * share:.2g} arcmin of this,"
-                " the control loop the rest (friction, gains, motor limits)"
+                " constant speed; the drive accounts for at most"
+                f" {60.0 * share:.2g} arcmin of this, the control loop for the rest"
+                " (friction, gains, motor limits)"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:
@@ -187,7 +194,10 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
 
 
 def omissions_of(run: Run) -> list[str]:
-    """Parts that the model leaves out and why, one line per part and reason."""
+    """Effects that the model leaves out, with the reason and the affected joints.
+
+    There is one line per effect and reason; it names no joints if all are affected.
+    """
     joints: dict[tuple[str, str], list[str]] = {}
     for item in run.contains["left_out"]:
         joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
@@ -199,7 +209,7 @@ def omissions_of(run: Run) -> list[str]:
 
 
 def left_out_share(run: Run, j: int) -> float:
-    """Torque amplitude of the orders that the step leaves out, at rated torque [N·m].
+    """Combined torque amplitude at rated torque of the orders that the step leaves out.
 
     Args:
         run: The run.

@@ -10,10 +10,13 @@ _UNITS = {
     "mm": "N/mm",
     "factor": "",
 }
+"""Units by the last part of a key; ``mm`` is the end of ``N_mm``."""
 
 
 def words(key: str) -> tuple[str, str]:
     """Split a key of a spec sheet into its name in words and its unit.
+
+    The unit is empty if the key does not end in a known one.
 
     >>> words("lost_motion_arcmin")
     ('lost motion', 'arcmin')
@@ -27,7 +30,10 @@ def words(key: str) -> tuple[str, str]:
 
 
 def format_figure(value: object) -> str:
-    """Format a value: four significant digits, yes or no, a dash for None.
+    """Format a value for display.
+
+    Floating-point numbers get four significant digits (three below 1e-4), None becomes
+    a dash and a bool ``yes`` or ``no``. Everything else is converted by ``str``.
 
     >>> format_figure(0.123456), format_figure(None)
     ('0.1235', '-')
@@ -46,5 +52,5 @@ def format_figure(value: object) -> str:
 
 
 def short(joint: str) -> str:
-    """Name of a joint in words, without the suffix ``_joint``."""
+    """Name of a joint in words, without the suffix ``_joint`` unless that is all."""
     return joint.removesuffix("_joint").replace("_", " ") or joint

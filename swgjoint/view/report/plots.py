@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 _COLUMNS = 1500
-"""Number of minimum-maximum pairs per line; more are not visible at this size."""
+"""Number of minimum-maximum pairs per line; the picture cannot resolve more."""
 
 
 def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
@@ -28,7 +28,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
 
     The upper panels show the output torque, the torsion and the transmission error over
     time. The lower panels show the torque ripple, its order spectrum, and the torque
-    over the torsion.
+    over the torsion. Next to other runs, a rigid run appears only in the torque panel.
 
     Args:
         runs: Runs of one motion by name.
@@ -49,7 +49,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
         style: dict[str, Any] = {"color": color, "ls": dash, "lw": 0.9, "label": label}
         plot_over_time(axes[0, 0], run.time, run.output_torque[:, j], **style)
         if is_rigid(run) and len(runs) > 1:
-            continue  # its zero lines would only set the scale
+            continue  # its lines at zero would only widen the axes
         plot_over_time(axes[0, 1], run.time, run.torsion[:, j] / arcmin, **style)
         error = run.transmission_error[:, j] / arcmin
         plot_over_time(axes[0, 2], run.time, error, **style)
@@ -66,7 +66,8 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
     _label(axes[0, 0], "output torque", "output torque [N·m]")
     _label(axes[0, 1], "torsion", "torsion [arcmin]")
     _label(axes[0, 2], "transmission error", "output − ideal output [arcmin]")
-    _label(axes[1, 0], "torque ripple, last half turn", "ripple [% of rated torque]")
+    title = "torque ripple, last half turn of the input"
+    _label(axes[1, 0], title, "ripple [% of rated torque]")
     axes[1, 0].set_xlabel("input turns")
     _label(axes[1, 1], "order spectrum of the ripple", "amplitude [% of rated torque]")
     axes[1, 1].set_xlabel("order [cycles per input turn]")
@@ -84,7 +85,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
 def plot_over_time(
     axis: Any, time: NDArray[np.float64], values: NDArray[np.float64], **style: Any
 ) -> None:
-    """Draw a line that keeps every peak, with as many points as the picture can show.
+    """Draw a line with all its peaks, but no more points than the picture can show.
 
     Args:
         axis: Axes to draw on.
@@ -98,7 +99,9 @@ def plot_over_time(
 def envelope(
     x: NDArray[np.float64], y: NDArray[np.float64], columns: int = _COLUMNS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Reduce a signal to the minimum and maximum of every piece, in order.
+    """Reduce a signal to the minimum and maximum of each of its pieces.
+
+    The first and the last sample are kept as well.
 
     Args:
         x: Increasing abscissas. Shape (n,).
@@ -107,7 +110,7 @@ def envelope(
             samples is returned unchanged.
 
     Returns:
-        Abscissas and values of the kept samples.
+        Abscissas and values of the kept samples in their original sequence.
     """
     if y.size <= 2 * columns:
         return x, y

@@ -1,4 +1,4 @@
-"""Write runs as one self-contained HTML file, without scripts, links or fonts."""
+"""Write results as one HTML page that has no scripts and loads no other files."""
 
 from __future__ import annotations
 
@@ -54,10 +54,14 @@ def write_report(
         summary: Table at the top; None for :func:`summary_table` of the runs.
         pictures: PNG images below that table, by title.
         check_step: Whether to repeat every run at half its step.
-        progress: Called after every section with their number and total.
+        progress: Called with the stage, the number of finished sections and their
+            total.
 
     Returns:
         The path.
+
+    Raises:
+        InputError: If the file cannot be written.
     """
     runs = {label or run.name: run for label, run in runs.items()}
     first = next(iter(runs.values()))
@@ -126,7 +130,7 @@ def write_tables(
     pictures: Mapping[str, bytes],
     settings: Mapping[str, str],
 ) -> Path:
-    """Write results other than scene runs as a page of the same form.
+    """Write results other than scene runs as a page with the same layout.
 
     Args:
         path: File to write; its folder must exist.
@@ -138,6 +142,9 @@ def write_tables(
 
     Returns:
         The path.
+
+    Raises:
+        InputError: If the file cannot be written.
     """
     return _write_page(
         path,
@@ -170,7 +177,7 @@ def _write_page(
 
 
 def _drives(runs: Mapping[str, Run]) -> list[DriveMap]:
-    """Distinct drives of all runs."""
+    """Drives of all runs; drives of equal name, level and design hash appear once."""
     drives: dict[tuple[str, str, str], DriveMap] = {}
     for run in runs.values():
         for transmission in run.assembly.transmissions:

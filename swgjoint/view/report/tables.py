@@ -50,7 +50,7 @@ class Table:
     """A table of the report."""
 
     header: Sequence[tuple[str, str]]
-    """Name and unit of every column."""
+    """Name and unit of every column; the unit may be empty."""
     rows: Sequence[Sequence[Cell]]
     title: str = ""
     notes: Sequence[str] = ()
@@ -58,10 +58,10 @@ class Table:
 
 
 WINDOWS = {
-    "constant speed": "in the constant-speed part of the motion",
-    "motion": "over the whole motion",
+    "constant speed": "the constant-speed part of the motion",
+    "motion": "the whole motion",
 }
-"""Part of the motion from which the figures are computed."""
+"""Part of the motion from which the figures are computed, by ``window_of``."""
 
 
 def alerts(runs: Mapping[str, Run]) -> list[str]:
@@ -74,7 +74,7 @@ def alerts(runs: Mapping[str, Run]) -> list[str]:
 
 
 def summary_table(runs: Mapping[str, Run]) -> Table:
-    """Figures of the worst joint and of the tool, one row per run."""
+    """Figures of the worst joints and of the tool, one row per run."""
     rows, window = [], ""
     for label, run in runs.items():
         metrics = run.metrics()
@@ -105,9 +105,9 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
         header=[
             ("run", ""),
             ("verdict", ""),
-            ("ripple rms", "% of rated"),
-            ("ripple", "% of rated, pp"),
-            ("torsion, mean", "arcmin"),
+            ("torque ripple rms", "% of rated torque"),
+            ("torque ripple pp", "% of rated torque"),
+            ("torsion", "arcmin, mean"),
             ("transmission error", "arcmin, pp"),
             ("tool path error", "mm, rms"),
             ("peak torque", "of repeated peak"),
@@ -116,7 +116,9 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
         ],
         rows=rows,
         notes=[
-            f"Largest value of all joints, {WINDOWS[window]}.",
+            "Joint figures are the largest of all joints. Ripple, torsion and"
+            f" transmission error refer to {WINDOWS[window]}, tool path error and peak"
+            " torque to the whole run.",
             *_legend(
                 joint
                 for run in runs.values()
@@ -129,9 +131,8 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
 def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
     """Largest ripple of several joints, with its marks.
 
-    The text is a dash if no joint has a ripple figure. ``>`` marks a lower bound, for
-    which the step leaves out important orders. ``~`` and ``!`` mark the largest
-    difference of the maps of these joints from unseen solves.
+    The text is a dash if no joint has a ripple figure. ``>`` marks a lower bound, ``~``
+    an uncertain and ``!`` an invalid figure.
 
     Args:
         joints: Figures of the joints.
@@ -148,7 +149,7 @@ def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
 
 
 def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
-    """Peak-to-peak transmission error, marked like :func:`ripple_cell`.
+    """Peak-to-peak transmission error with the marks ``~`` and ``!``.
 
     Args:
         joints: Figures of the joints whose maps determine the mark.
@@ -159,7 +160,7 @@ def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
 
 
 def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Legend of the marks of the figures; empty without marks."""
+    """Legend of the marks ``~`` and ``!`` of these joints; empty if there are none."""
     marks = set()
     for joint in joints:
         error = joint["transmission_error_arcmin"]["pp"]
@@ -221,18 +222,18 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
             ("joint", ""),
             ("level", ""),
             ("drive (source)", ""),
-            ("map covers", "N·m"),
+            ("torque range of the map", "N·m"),
             ("highest resolved order", "per input turn"),
             ("orders left out", "per input turn"),
-            ("torque of these orders", "N·m, at rated torque"),
-            ("ripple rms ±", "% of rated"),
-            ("transm. error ±", "arcmin"),
-            ("torsion ±", "arcmin"),
+            ("amplitude of these orders", "N·m, at rated torque"),
+            ("torque ripple rms ±", "% of rated torque"),
+            ("transmission error ±", "arcmin, pp"),
+            ("torsion ±", "arcmin, mean"),
         ],
         rows=rows,
         notes=[
-            "± is the change when the step is halved and the orders are unchanged. The"
-            " error due to the step is up to twice this change."
+            "± is the change of a figure when the step is halved and the orders remain"
+            " the same. The error due to the step is at most twice this change."
         ],
     )
     return {"title": label, "lines": lines, "table": table}
@@ -273,28 +274,28 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
     return Table(
         header=[
             ("run", ""),
-            ("torsion, mean", "arcmin"),
-            ("torsion, pp", "arcmin"),
-            ("transm. error, mean", "arcmin"),
-            ("transm. error, pp", "arcmin"),
-            ("ripple rms", "% of rated"),
-            ("ripple, pp", "% of rated"),
-            ("strongest orders", "per input turn"),
+            ("torsion", "arcmin, mean"),
+            ("torsion", "arcmin, pp"),
+            ("transmission error", "arcmin, mean"),
+            ("transmission error", "arcmin, pp"),
+            ("torque ripple rms", "% of rated torque"),
+            ("torque ripple pp", "% of rated torque"),
+            ("strongest orders", "per input turn (% of rated torque)"),
             ("peak torque", "N·m"),
             ("cubic mean torque", "N·m"),
-            ("input speed", "rpm"),
+            ("largest input speed", "rpm"),
             ("within ratings", ""),
         ],
         rows=rows,
         notes=[
-            "* no order of this joint's drive: vibration, modulation or another joint.",
+            "* not an order of this drive: vibration, modulation or another joint.",
             *_legend(run.metrics()["joints"][joint] for run in runs.values()),
         ],
     )
 
 
 def sheet_table(drive: DriveMap) -> dict[str, Any]:
-    """Template section: spec sheet of one drive, with the manufacturer's values."""
+    """Template section: spec sheet of a drive, with the manufacturer's known values."""
     sheet = measure_spec(drive)
     stated = drive.info.get("stated")
     stated = stated if isinstance(stated, Mapping) else {}
@@ -395,5 +396,5 @@ def _cells(*values: Any) -> list[Cell]:
 
 
 def inline_picture(data: bytes) -> str:
-    """Base64 text of a picture that is embedded in the page."""
+    """Picture as base64 text, for embedding in the page."""
     return base64.b64encode(data).decode("ascii")
