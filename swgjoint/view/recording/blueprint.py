@@ -23,16 +23,16 @@ TITLES = {
     "torsion_arcmin": "torsion [arcmin]",
     "transmission_error_arcmin": "transmission error [arcmin]",
     "output_torque_Nm": "output torque [N·m]",
-    "torque_deviation_Nm": "torque minus that of the rigid arm [N·m]",
+    "torque_deviation_Nm": "output torque minus rigid-arm torque [N·m]",
     "motor_torque_Nm": "motor torque [N·m]",
     "position_deg": "link angle [deg]",
     "reference_deg": "commanded angle [deg]",
 }
 """Titles of the plots by signal."""
 ZERO = ("torsion_arcmin", "transmission_error_arcmin", "torque_deviation_Nm")
-"""Signals that are zero for a rigid arm, which is therefore not drawn."""
+"""Signals that are zero for a rigid arm; their plots therefore omit rigid runs."""
 SPACING = 0.75
-"""Distance between the arms of several runs [m]."""
+"""Distance between the arms of neighbouring runs [m]."""
 
 
 def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
@@ -69,7 +69,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
             bars = [
                 f"{prefixes[label]}joint/{joint}/ripple_orders" for label in flexible
             ]
-            title = "ripple by order per input turn [% of rated]"
+            title = "torque ripple over order per input turn [% of rated torque]"
             pictures.append(
                 rrb.BarChartView(
                     name=title,
@@ -145,11 +145,11 @@ def has_torsion(transmission: Transmission) -> bool:
 
 
 def joints_shown(scenes: Mapping[str, Assembly]) -> list[str]:
-    """Joints of the scene's layout; if it names none, all joints, most loaded first.
+    """Joints named in the scene's recording layout, or else all, most loaded first.
 
-    The load is the largest torque of the rigid arm on the commanded motion over the
-    rated torque. Joints whose strongest order is not resolved come last. The order is
-    known before a run.
+    The load is the largest torque of the rigid arm on the commanded motion, relative to
+    the rated torque. Joints whose strongest order is not resolved come last. The
+    sequence does not depend on simulated results, so it is known before a run.
     """
     first = next(iter(scenes.values()))
     if first.scene.recording.joints:
@@ -168,9 +168,11 @@ def joints_shown(scenes: Mapping[str, Assembly]) -> list[str]:
 
 
 def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
-    """All joints, sorted by decreasing ripple.
+    """All joints, sorted by the peak to peak of their torque deviation, largest first.
 
-    Joints whose strongest order is not resolved come last.
+    The deviation [N·m] is that of :func:`swgjoint.sim.figures.metrics.torque_deviation`
+    in the part of the motion that the figures use. Joints whose strongest order is not
+    resolved come last.
     """
     first = next(iter(runs.values()))
     window = first.steady
@@ -193,7 +195,7 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
     Args:
         title: Title of the view.
         paths: Entity paths, one per line.
-        signal: Component to draw; None for ``Scalars``.
+        signal: Component to draw; None for the component of the archetype ``Scalars``.
     """
     import rerun as rr
     import rerun.blueprint as rrb
@@ -210,7 +212,7 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
             source_component=signal,
         )
         drawn = {p: rr.SeriesLines().visualizer(mappings=[source]) for p in paths}
-    # a single line keeps the default legend, because the title describes the line
+    # a single line needs no particular legend, because the title describes it
     legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop) if len(paths) > 1 else None
     return rrb.TimeSeriesView(
         name=title,
@@ -222,7 +224,7 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
 
 
 def _drive(assembly: Assembly, joint: str, label: str) -> Any:
-    """View of the drive of a joint along its axis."""
+    """View of the drive of a joint; the camera of :func:`eye` looks at it."""
     import rerun.blueprint as rrb
 
     fields = fields_of(assembly, joint)
@@ -239,7 +241,7 @@ def _drive(assembly: Assembly, joint: str, label: str) -> Any:
 
 
 def _eye(scenes: Mapping[str, Assembly]) -> Any:
-    """Camera that shows all arms from the front, slightly from the side and above."""
+    """Camera in front of all arms, slightly to one side of them and above."""
     import rerun.blueprint as rrb
 
     model = next(iter(scenes.values())).arm.model

@@ -1,7 +1,7 @@
 """Columns of a recording that are passed to the encoder without conversion.
 
 The ``columns`` methods of the rerun archetypes convert, copy and partition their
-arguments, which takes longer than the encoding.
+arguments, which takes longer than the encoding itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 class Column:
-    """Values of one component for the rows of a call of ``send_columns``."""
+    """Values of one component for all rows of one ``send_columns`` call."""
 
     def __init__(
         self, descriptor: Any, values: NDArray[Any], dtype: Any, *, each: int = 1

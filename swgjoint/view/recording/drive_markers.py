@@ -1,8 +1,8 @@
 """Markers of the drives on the arm: a disc at every joint, coloured by its torque.
 
-A disc is green without load, yellow at half of the repeated peak torque and red from
-the full one. It is larger than the housing of the joint, so that it is visible; it does
-not show the size of the drive.
+A disc is green at zero torque, yellow at half the repeated peak torque, and red at or
+above the repeated peak torque. It is larger than the housing of the joint so that it
+remains visible; its size is not that of the drive.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 RADIUS = 0.03
-"""Radius of a disc if no housing is found [m]."""
+"""Smallest radius of a disc, also used if no housing is found [m]."""
 PROUD = 1.12
-"""Radius of a disc over that of the housing [-]."""
+"""Ratio of the radius of a disc to that of the housing [-]."""
 WIDTH = 0.35
-"""Width of a disc over its radius [-]."""
+"""Ratio of the width of a disc to its radius [-]."""
 _SCALE = np.array([[44, 160, 44], [240, 200, 30], [214, 39, 40]], dtype=float)
 
 
 def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
-    """Log a disc for every driven joint, attached to the body that the joint moves.
+    """Log a disc for every driven joint, fixed to the body that the joint moves.
 
     Args:
         stream: Rerun recording stream.
@@ -60,7 +60,7 @@ def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
 def send_loads(
     stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
 ) -> None:
-    """Send the colours of the discs at some samples.
+    """Send the colours of the discs at selected samples.
 
     Args:
         stream: Rerun recording stream.
@@ -88,15 +88,16 @@ def _paths(prefix: str, assembly: Assembly) -> list[str]:
 
 
 def housing_radius(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> float:
-    """Radius of the housing around a joint [m].
+    """Radius of the housing around a joint [m], at least ``RADIUS / PROUD``.
 
-    It is the largest radius of the geoms of the moved body and its parent: cylinders
-    and capsules that are coaxial with the joint, and meshes, whose radius is the median
-    distance from the axis of the vertices within 1 cm of the joint along its axis.
+    It is the largest radius of the geoms of the moved body and its parent. Only
+    cylinders and capsules that are coaxial with the joint and meshes count. The radius
+    of a mesh is the median distance from the joint axis, taken over the vertices within
+    1 cm of the joint along that axis.
 
     Args:
         model: Compiled model of the arm.
-        data: Kinematics in any pose.
+        data: Data of the model with the kinematics of any pose.
         joint: Index of the joint.
     """
     body = int(model.jnt_bodyid[joint])
@@ -124,7 +125,7 @@ def housing_radius(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> fl
 
 
 def load_color(share: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Colours of torque over repeated peak torque as 0xRRGGBBAA. Shape (n,)."""
+    """Colours of torques relative to the repeated peak as 0xRRGGBBAA. Shape (n,)."""
     place = np.clip(share, 0.0, 1.0)
     parts = [np.interp(place, [0.0, 0.5, 1.0], column) for column in _SCALE.T]
     red, green, blue = (np.rint(part).astype(np.uint32) for part in parts)
@@ -132,7 +133,7 @@ def load_color(share: NDArray[np.float64]) -> NDArray[np.uint32]:
 
 
 def rotation_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion (x, y, z, w) that rotates the z axis to a direction. Shape (4,)."""
+    """Quaternion (x, y, z, w) that rotates the z axis onto an axis. Shape (4,)."""
     wxyz = np.zeros(4)
     mujoco.mju_quatZ2Vec(wxyz, np.asarray(axis, dtype=float))
     return quaternion_xyzw(wxyz)

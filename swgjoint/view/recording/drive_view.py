@@ -6,10 +6,10 @@ cover a run of any length, so that a recording stays small.
 
 =================================  ================================================
 ``drive/<joint>/<run>/flexspline``  surface, coloured by the von Mises stress
-``.../tooth``                       mark on one of its teeth, to show its rotation
+``.../tooth``                       dot on one tooth that shows the rotation
 ``.../circular_spline``             outline
 ``.../wave_generator``              outline
-``.../scale``                       label that explains the colours
+``.../scale``                       label with the stress range of the colours
 ``.../tooth_forces``                forces of the circular spline on the flexspline
 ``.../bore_forces``                 forces of the wave generator on the flexspline
 =================================  ================================================
@@ -37,12 +37,14 @@ if TYPE_CHECKING:
 FRAMES = 100
 """Largest number of frames of one drive in a recording."""
 BYTES = 6_000_000
-"""Approximate largest size of one drive in a recording [bytes]; half of it if the two
-lobes are identical."""
+"""Approximate upper bound of the size of one drive in a recording [bytes]. A drive with
+two identical lobes takes half of it."""
 ARROW = 0.2
-"""Length of the largest force arrow over the radius of the flexspline [-]."""
+"""Ratio of the length of the largest force arrow to the radius of the flexspline [-].
+"""
 LIFT = 0.004
-"""Distance of outlines and forces in front of the flexspline over its radius [-]."""
+"""Distance by which outlines and forces are drawn in front of the flexspline, relative
+to its radius [-]."""
 
 
 def drives_shown(scenes: Mapping[str, Assembly], joints: list[str]) -> dict[str, str]:
@@ -53,7 +55,7 @@ def drives_shown(scenes: Mapping[str, Assembly], joints: list[str]) -> dict[str,
         joints: Names of the joints in order of preference.
 
     Returns:
-        The same joint by name of each run in which its map has fields; empty if no map
+        That joint, by name of every run in which its map has fields; empty if no map
         has fields.
     """
     for joint in joints:
@@ -90,7 +92,8 @@ def frames_of(run: Run, joint: str, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         rows: Samples at which the arm is drawn, shape (n,).
 
     Returns:
-        Equally spaced elements of ``rows``.
+        Equally spaced elements of ``rows``, at most :data:`FRAMES`; fewer if the
+        recording would otherwise exceed :data:`BYTES`.
     """
     fields = fields_of(run.assembly, joint)
     assert fields is not None
@@ -102,12 +105,15 @@ def frames_of(run: Run, joint: str, rows: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def angles(layout: str, theta: Array, psi: Array) -> tuple[Array, Array, Array]:
-    """Rotations of flexspline, circular spline and wave generator [rad].
+    """Rotations of flexspline, circular spline and wave generator, in this sequence.
 
     Args:
         layout: Layout of the drive, which names the fixed member.
         theta: Rotation of the input relative to the fixed member [rad].
         psi: Rotation of the output relative to the fixed member [rad].
+
+    Returns:
+        Rotations relative to the fixed member [rad], each of the shape of ``theta``.
     """
     still = np.zeros_like(theta)
     return {
@@ -129,7 +135,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     """
     import rerun as rr
 
-    _turbo()  # load the colour map now, while the engine computes
+    _turbo()  # load the colour map while the engine is still computing
     drive = assembly.transmissions[assembly.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
@@ -186,7 +192,7 @@ def send_drive(
     time: Any,
     rows: NDArray[np.intp],
 ) -> None:
-    """Send everything of a drive that changes with time.
+    """Send the parts of a drive that change with time.
 
     Args:
         stream: Rerun recording stream.
@@ -248,7 +254,7 @@ def _send_forces(
     time: Any,
     parts: int,
 ) -> None:
-    """Send force arrows at the tooth tips and at the bore, both with the same scale."""
+    """Send force arrows at tooth tips and bore, to one scale, without axial parts."""
     import rerun as rr
 
     largest = max(
@@ -266,7 +272,7 @@ def _send_forces(
     ):
         vectors = all_around(np.float32(scale) * forces, parts)
         vectors[..., 2] = 0.0
-        # the head of an arrow is at the point of application
+        # the tip of an arrow is at the point of application
         origins = all_around(shape.points[:, :, node], parts) - vectors
         origins[..., 2] = z
         teeth = vectors.shape[1]
@@ -284,7 +290,7 @@ def _send_forces(
 
 
 def eye(fields: DriveFields) -> Any:
-    """Camera that looks along the axis, into the open end of a cup if there is one."""
+    """Camera that looks along the axis, or obliquely into the open end of a cup."""
     import rerun.blueprint as rrb
 
     side, r = float(np.sign(front_planes(fields))), radius(fields)
@@ -298,10 +304,10 @@ def eye(fields: DriveFields) -> Any:
 
 
 def front_planes(fields: DriveFields) -> float:
-    """Coordinate z at which outlines and forces are drawn [m].
+    """Coordinate z of the plane in which outlines and forces are drawn [m].
 
-    They are slightly in front of the open edge of a cup and slightly above a 2D model.
-    The distance is small, so that an oblique view does not displace them visibly.
+    The plane is slightly in front of the open edge of a cup, or slightly above a 2D
+    model. The distance is so small that no visible offset appears in an oblique view.
     """
     z = fields.points[:, 2]
     flat = float(np.ptp(z)) == 0.0
@@ -317,19 +323,19 @@ def rotate_points(points: Array, angle: float) -> Array:
     """Rotate points in the x-y plane about the z axis.
 
     Args:
-        points: Points of shape (..., 2) [m].
-        angle: Angle of rotation [rad].
+        points: Points of shape (..., 2), in any unit.
+        angle: Angle of rotation, counter-clockwise positive [rad].
     """
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
 def all_around(vectors: Table, parts: int) -> Table:
-    """Repeat the vectors of one sector in all identical sectors of the circle.
+    """Repeat the vectors of one sector in all sectors of the full circle.
 
     Args:
         vectors: Vectors of the first sector, shape (n, n_teeth / parts, 3).
-        parts: Number of sectors.
+        parts: Number of identical sectors.
 
     Returns:
         Vectors of all sectors, shape (n, n_teeth, 3).
@@ -348,13 +354,16 @@ def about_z(angle: Array) -> Array:
 
 
 def stress_color(share: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
-    """Colours of stress over largest stress as 0xRRGGBBAA. Shape as ``share``."""
+    """Colours of stresses relative to the largest one as 0xRRGGBBAA.
+
+    The result has the shape of ``share``, the ratio of stress to largest stress [-].
+    """
     return np.asarray(_turbo()[np.clip(256.0 * share, 0.0, 255.0).astype(np.uint8)])
 
 
 @cache
 def _turbo() -> NDArray[np.uint32]:
-    """Colours from the smallest to the largest value. Shape (256,)."""
+    """Colour map ``turbo`` from the smallest to the largest value. Shape (256,)."""
     from matplotlib import colormaps
 
     rgba = colormaps["turbo"](np.arange(256) / 255.0, bytes=True).astype(np.uint32)

@@ -1,6 +1,6 @@
 """Entities of a recording.
 
-Entity paths, prefixed by ``<run>/`` if a recording contains several runs:
+If a recording contains several runs, ``<run>/`` precedes these entity paths:
 
 =====================================  ============================================
 ``arm/<body>``                         pose in the world, at the scene's pose rate
@@ -10,20 +10,21 @@ Entity paths, prefixed by ``<run>/`` if a recording contains several runs:
 ``joint/<joint>``                      signals of the joint, one component each:
   ``output_torque_Nm``                 torque of the drive on the link
   ``torque_deviation_Nm``              output torque minus that of the rigid arm
-  ``motor_torque_Nm``
-  ``torsion_arcmin``
-  ``transmission_error_arcmin``
+  ``motor_torque_Nm``                  torque of the motor within its limits
+  ``torsion_arcmin``                   torsion of the drive
+  ``transmission_error_arcmin``        output minus ideal output
   ``position_deg``                     link angle
-  ``reference_deg``                    commanded angle
-``joint/<joint>/ripple_orders``        amplitude over order per input turn, static
+  ``reference_deg``                    commanded link angle
+``joint/<joint>/ripple_orders``        ripple amplitude over order per input turn,
+                                       static
 ``tool/error_mm``                      distance from the commanded path, or from the
                                        rigid arm if its run is in the recording
 =====================================  ============================================
 
-Signals are recorded at every step on the timeline ``time``. Outside the path of the
-runs, a recording contains the drive of one joint (see
-:mod:`swgjoint.view.recording.drive_view`) and, at ``phase/<joint>/<run>``, a plot of
-torque against torsion with a point at the current state.
+Signals are recorded at every step of the scene on the timeline ``time``. Outside the
+paths of the runs, a recording contains the drive of one joint (see
+:mod:`swgjoint.view.recording.drive_view`) and, below ``phase/<joint>``, a plot of
+torque against torsion with a point at the current state of every run.
 """
 
 from __future__ import annotations
@@ -66,9 +67,11 @@ if TYPE_CHECKING:
 
 
 TIMELINE = "time"
+"""Name of the timeline; its values are simulated times."""
 COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))
 """RGB colours of the runs, also used in plots."""
 LABEL_COLOR = 0xFAFAFAFF
+"""Colour of the names below the arms, 0xRRGGBBAA."""
 
 
 def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
@@ -94,7 +97,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
 
 
 def signal(name: str) -> Any:
-    """Component of a joint for one signal of :func:`signals_of`."""
+    """Descriptor of the component that contains one signal of :func:`signals_of`."""
     import rerun as rr
 
     return rr.ComponentDescriptor(name, component_type="rerun.components.Scalar")
@@ -103,7 +106,7 @@ def signal(name: str) -> Any:
 def log_known(
     stream: Any, scenes: Mapping[str, Assembly], *, drives: Mapping[str, str]
 ) -> None:
-    """Log everything that is known before the runs: shapes and styles of lines.
+    """Log what is known before the runs: labels, shapes, and styles of lines.
 
     Args:
         stream: Rerun recording stream.
@@ -149,7 +152,7 @@ def log_known(
 
 
 def log_measured(stream: Any, runs: Mapping[str, Run], scales: Scales) -> None:
-    """Log static results of the runs: paths and spectra.
+    """Log static results of the runs: tool paths, spectra, torque against torsion.
 
     Args:
         stream: Rerun recording stream.
@@ -185,7 +188,7 @@ def log_moving(
     rigid: Run | None = None,
     part: slice = slice(None),
 ) -> None:
-    """Send everything that changes with time: signals, poses, loads of the drives.
+    """Send what changes with time: signals, poses, drives, and loads of the joints.
 
     Args:
         stream: Rerun recording stream.
@@ -193,7 +196,8 @@ def log_moving(
         scales: From :func:`swgjoint.view.recording.joint_pictures.phase_scales`.
         drives: Joint with a drawn drive by name of the run, from
             :func:`swgjoint.view.recording.drive_view.drives_shown`.
-        rigid: Run from which tool errors are measured; None for the commanded path.
+        rigid: Run of the rigid arm to which tool errors refer; None for the commanded
+            path.
         part: Samples to send; all by default.
     """
     import rerun as rr
@@ -240,7 +244,7 @@ def log_moving(
 
 
 def color_of_run(k: int) -> int:
-    """Colour of run ``k`` as 0xRRGGBBAA, the form that rerun reads fastest."""
+    """Colour of run number ``k`` as 0xRRGGBBAA, the form that rerun reads fastest."""
     return int.from_bytes(bytes((*COLORS[k % len(COLORS)], 255)), "big")
 
 
@@ -278,7 +282,7 @@ def _log_shapes(stream: Any, prefix: str, assembly: Assembly) -> None:
 def _send_poses(
     stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
 ) -> None:
-    """Send poses of the bodies at some samples; those of fixed bodies are static."""
+    """Send poses of the bodies at selected samples; fixed bodies are static."""
     import rerun as rr
 
     arm, model = run.assembly.arm, run.assembly.arm.model
@@ -298,7 +302,7 @@ def _send_poses(
 
 
 def pose_rows(run: Run) -> NDArray[np.intp]:
-    """Samples whose poses are recorded, including first and last. Shape (n_poses,)."""
+    """Samples whose poses are recorded, with the first and last. Shape (n_poses,)."""
     scene = run.assembly.scene
     stride = round(1.0 / (scene.recording.pose_rate_Hz * scene.simulation.step_s))
     rows = np.arange(0, run.time.size, max(1, stride))

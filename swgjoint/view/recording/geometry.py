@@ -15,14 +15,14 @@ def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
     """Convert a geom to a rerun archetype in the frame of the geom.
 
     Cylinders, capsules, spheres, ellipsoids, boxes and meshes are converted. Planes and
-    height fields are part of the surroundings and are not drawn.
+    height fields belong to the surroundings and are not drawn.
 
     Args:
         model: Compiled model of the arm.
         geom: Index of the geom.
 
     Returns:
-        The archetype; None for a kind that is not drawn.
+        The archetype; None for any other kind of geom.
     """
     import rerun as rr
 

@@ -20,11 +20,14 @@ if TYPE_CHECKING:
 BARS = 400
 """Largest number of bars of a spectrum; a bar is the largest amplitude in its range."""
 WIDTH = 1.6
-"""Half width of the plot of torque against torsion over its half height [-]."""
+"""Ratio of width to height of the plot of torque against torsion [-]."""
 Scales = dict[str, tuple[float, float] | None]
-"""Largest torsion [arcmin] and torque [N·m] by joint; None without torsion."""
+"""Largest magnitudes of torsion [arcmin] and torque [N·m] by joint; None if either is
+zero."""
 _POINTS = 2000
+"""Approximate number of points of a curve of torque against torsion."""
 _FRAME = 0x787878FF
+"""Colour of axes and their labels, 0xRRGGBBAA."""
 
 
 def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
@@ -35,10 +38,10 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
         j: Index of the joint.
 
     Returns:
-        Mean order of every bar [cycles per input turn] and largest amplitude in it,
-        zero to peak [% of rated torque], both of shape (n,). None if the joint does not
-        move at constant speed, turns its input by less than half a turn, or has no
-        order that the step resolves.
+        Mean order of every bar [cycles per input turn] and its largest amplitude, zero
+        to peak [% of rated torque], both of shape (n,). None if the joint does not move
+        at constant speed, if its input turns less than half a turn or has fewer than 16
+        samples, or if the step resolves no order.
     """
     from scipy.fft import next_fast_len
 
@@ -50,8 +53,9 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     if travel.size < 16 or travel[-1] < np.pi:
         return None
     rated = run.assembly.transmissions[j].drive.ratings.rated_torque
-    # linear interpolation lowers the highest orders by 2 %, which is accurate enough
-    # for a plot; the splines of the metrics would take half of the recording time
+    # linear interpolation reduces the amplitude of the highest orders by 2 %, which is
+    # acceptable in a plot; the splines of the metrics would take half of the time that
+    # a recording takes
     grid = np.linspace(0.0, travel[-1], travel.size)
     ripple = np.interp(grid, travel, torque_ripple(run, j)) * np.hanning(grid.size)
     size = next_fast_len(2 * grid.size, real=True)
@@ -89,7 +93,7 @@ def log_ripple(stream: Any, path: str, bars: tuple[Array, Array], color: int) ->
 
 
 def phase_scales(runs: Mapping[str, Run]) -> Scales:
-    """Largest torsion [arcmin] and torque [N·m] by joint; None without torsion."""
+    """Largest magnitudes of torsion and torque over all runs, see ``Scales``."""
     first = next(iter(runs.values()))
     torsion, torque = (
         np.max([np.abs(one).max(axis=0) for one in signals], axis=0)
@@ -110,7 +114,10 @@ def phase_points(
     scales: tuple[float, float],
     rows: slice | NDArray[np.intp] = slice(None),
 ) -> Array:
-    """Points of torque (upwards) against torsion (to the right) in plot coordinates.
+    """Points of torque against torsion in plot coordinates.
+
+    Torsion increases to the right and torque upwards; the vertical coordinate of the
+    plot increases downwards.
 
     Args:
         run: The run.
@@ -126,7 +133,7 @@ def phase_points(
 
 
 def log_phase_axes(stream: Any, joint: str) -> None:
-    """Log the axes of torque against torsion.
+    """Log the axes of the plot of torque against torsion.
 
     Args:
         stream: Rerun recording stream.
@@ -140,7 +147,7 @@ def log_phase_axes(stream: Any, joint: str) -> None:
 
 
 def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None:
-    """Log the values at the ends of the axes of torque against torsion.
+    """Log the values at the ends of the axes of the plot of torque against torsion.
 
     Args:
         stream: Rerun recording stream.
@@ -171,7 +178,7 @@ def log_phase_path(
     scales: tuple[float, float],
     color: int,
 ) -> None:
-    """Log the curve of torque against torsion of one run.
+    """Log the curve of torque against torsion of one run, thinned for display.
 
     Args:
         stream: Rerun recording stream.
@@ -190,7 +197,7 @@ def log_phase_path(
 
 
 def log_phase_point(stream: Any, path: str, color: int) -> None:
-    """Log the style of the point that shows the current state.
+    """Log the style of the point that shows the current torque and torsion.
 
     Args:
         stream: Rerun recording stream.
@@ -204,7 +211,7 @@ def log_phase_point(stream: Any, path: str, color: int) -> None:
 
 
 def send_phase(stream: Any, path: str, points: Array, time: Any) -> None:
-    """Send the point that shows the current state at some samples.
+    """Send the positions of the point that shows the current torque and torsion.
 
     Args:
         stream: Rerun recording stream.

@@ -1,9 +1,9 @@
 """Send runs to an open viewer on this machine.
 
 By default the server of the viewer would listen on all network interfaces. It is
-therefore started on the loopback interface, and other addresses are rejected. A run is
-simulated much faster than real time, so it is sent after the simulation, either at once
-or in real time.
+therefore started on the loopback interface, and addresses of other machines are
+rejected. A simulation is usually much faster than real time, so a run is sent when it
+is finished, either at once or at a given pace.
 """
 
 from __future__ import annotations
@@ -42,21 +42,23 @@ def stream_runs(
     rigid: Run | None = None,
     pace: float | None = None,
 ) -> str:
-    """Send runs of one motion to a viewer; return when everything is sent.
+    """Send runs of one motion to a viewer and return when everything has been sent.
 
     Args:
         runs: Runs by the name that the viewer shows; a single run may be called ``""``.
         url: Address of an open viewer, such as ``rerun+http://127.0.0.1:9876/proxy``;
             None starts a viewer.
-        rigid: Run from which tool errors are measured; None for the commanded path.
+        rigid: Run of the rigid arm to which tool errors refer; None for the commanded
+            path.
         pace: Simulated time per real time [-]; None sends everything at once.
 
     Returns:
         Address of the viewer.
 
     Raises:
-        InputError: If the address is not on this machine, or the pace is not positive.
-        ComputationError: If no viewer answers.
+        InputError: If the address is not on this machine, or the pace is not a positive
+            finite number.
+        ComputationError: If the viewer is not installed or does not answer.
     """
     import rerun as rr
 
@@ -87,7 +89,7 @@ def stream_runs(
 
 
 def loopback_port(url: str) -> int:
-    """Port of a viewer address on this machine.
+    """Port of a viewer address on this machine; :data:`DEFAULT_PORT` if it names none.
 
     Raises:
         InputError: If the address is malformed or on another machine.
@@ -107,7 +109,7 @@ def loopback_port(url: str) -> int:
 
 
 def _parcels(times: NDArray[np.float64], length: float | None) -> list[slice]:
-    """Divide the samples into parts that are sent together, one per ``length`` [s]."""
+    """Divide the samples into parts of about ``length`` [s]; a single part for None."""
     if length is None:
         return [slice(0, times.size)]
     count = max(1, round(float(times[-1] - times[0]) / length))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 
 def part_of_path(label: str) -> str:
-    """Escape the name of a run, which may be a file name, as one part of a path."""
+    """Name of a run, possibly a file name, escaped as one part of an entity path."""
     import rerun as rr
 
     return str(rr.escape_entity_path_part(label))
 
 
 def prefix_of(label: str) -> str:
-    """Path prefix of a run with a trailing slash; empty for a single, unnamed run."""
+    """Entity path of a run with a trailing slash; empty for a single, unnamed run."""
     return f"{part_of_path(label)}/" if label else ""
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 
 PART = 100_000
-"""Number of samples that are sent at a time, which bounds the memory that the
-recording of a long run needs."""
+"""Number of samples that are sent at a time; it bounds the memory that the recording of
+a long run needs."""
 
 FLUSH = 120.0
 """Longest time to wait until a part is written to the file [s]."""
@@ -39,7 +39,8 @@ def write_recording(
     Args:
         runs: Runs by the name that the viewer shows; a single run may be called ``""``.
         path: File to write; its folder is created if necessary.
-        rigid: Run from which tool errors are measured; None for the commanded path.
+        rigid: Run of the rigid arm to which tool errors refer; None for the commanded
+            path.
 
     Returns:
         Path of the file.
@@ -55,11 +56,11 @@ def write_recording(
 
 
 class Recorder:
-    """Recording of one run that is started while the simulation is still running.
+    """Recording of one run that starts while the simulation is still running.
 
     Layout and shapes are known in advance. A thread sends them during the simulation,
-    which does not occupy the Python interpreter. The recorder is a context manager; at
-    its end the file is complete, or absent after a failure.
+    while the engine leaves the Python interpreter free. The recorder is a context
+    manager; at its exit the file is complete, or absent after a failure.
     """
 
     def __init__(self, assembly: Assembly, path: str | Path) -> None:
@@ -81,7 +82,7 @@ class Recorder:
         return self
 
     def begin(self) -> None:
-        """Start to send what is known before the run; further calls have no effect."""
+        """Start to send layout and shapes; further calls have no effect."""
         if self._begun is None:
             self._begun = self._thread.submit(_begin, self._beside, self._scenes)
 
@@ -134,7 +135,7 @@ def _flush(stream: Any, path: str | Path) -> None:
 
 
 def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, str]]:
-    """Start a recording; return its stream and the joint with a drawn drive by run."""
+    """Start a recording; return its stream and the joint whose drive each run shows."""
     import rerun as rr
 
     stream = rr.RecordingStream(stream_name(scenes))

@@ -19,15 +19,15 @@ STARTED: list[subprocess.Popen[bytes]] = []
 def start_viewer(
     *options: str, port: int | None = None
 ) -> tuple[subprocess.Popen[bytes], str]:
-    """Start a viewer, or its server, that keeps running after this process ends.
+    """Start a viewer or its server; it continues to run after this process ends.
 
     Args:
-        *options: Command-line arguments of the viewer: files, ``--serve-web``,
-            ``--serve-grpc``.
+        *options: Command-line arguments of the viewer, such as files,
+            ``--serve-web`` or ``--serve-grpc``.
         port: Port that receives streams; None selects a free one.
 
     Returns:
-        The process and the address for streams.
+        The process and the address to which streams are sent.
 
     Raises:
         ComputationError: If the viewer is not installed.
@@ -58,7 +58,7 @@ def viewer_program() -> Path:
 
 
 def free_port() -> int:
-    """Return a loopback port on which nothing listens at present."""
+    """Return a loopback port on which no process currently listens."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])
@@ -74,7 +74,8 @@ def wait_for(
 
     Args:
         port: Loopback port.
-        process: Process that should listen; it is terminated if it does not in time.
+        process: Process that should listen; it is terminated if nothing listens in
+            time. None if another program started it.
         limit: Longest waiting time [s].
 
     Raises:
@@ -84,7 +85,8 @@ def wait_for(
     while time.monotonic() < end:
         if process is not None and process.poll() is not None:
             raise ComputationError(
-                f"the rerun viewer exited during start with status {process.returncode}"
+                "the rerun viewer exited during startup with status"
+                f" {process.returncode}"
             )
         with socket.socket() as probe:
             if probe.connect_ex((LOOPBACK, port)) == 0:
