@@ -1,4 +1,4 @@
-"""Picture of the study of the articles."""
+"""Picture of ``swgjoint study articles``, which recomputes articles on flexsplines."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 def articles_picture(
     parts: Sequence[str], results: Mapping[str, Found]
 ) -> bytes | None:
-    """Draw radial stiffnesses, lobe forces, stress amplitudes and safety as PNG.
+    """Draw radial stiffness, lobe force, stress amplitude and safety factor as PNG.
 
     Args:
         parts: Names of the computed parts.
-        results: Results by task.
+        results: Results by name of the task.
 
     Returns:
         The PNG file; None if no computed part has a panel.
@@ -42,7 +42,7 @@ def articles_picture(
 
 
 def _force(ax: Any, results: Mapping[str, Found]) -> None:
-    """Draw the radial stiffness of every variant at three places of the load."""
+    """Draw the radial stiffness of every variant for three places of the loads."""
     named = {
         name.removeprefix("force, ").replace("force", "as bundled"): result
         for name, result in results.items()
@@ -62,9 +62,9 @@ def _force(ax: Any, results: Mapping[str, Found]) -> None:
 
 
 def _lobes(ax: Any, results: Mapping[str, Found]) -> None:
-    """Draw the lobe force and the play of the output over the lobe deflection."""
+    """Draw the force on a lobe and the play of the output over the lobe deflection."""
     result = results.get("force, lobes", {})
-    ax.set_title("between two lobes, large rotations", fontsize="medium")
+    ax.set_title("cup between two lobes, large rotations", fontsize="medium")
     ax.set_xlabel("deflection of a lobe [mm]")
     ax.set_ylabel("force on a lobe [N]")
     ax.grid(alpha=0.3)
@@ -88,20 +88,21 @@ def _lobes(ax: Any, results: Mapping[str, Found]) -> None:
 _LINES = (
     ("four", "mid_face", "four forces, mid-face", "tab:green", "-"),
     ("fatigue", "mid_face", "ellipse, mid-face", "tab:blue", "-"),
-    ("fatigue", "worst_section", "ellipse, worst", "tab:blue", "--"),
+    ("fatigue", "worst_section", "ellipse, worst section", "tab:blue", "--"),
     ("fatigue, crowned", "mid_face", "crowned, mid-face", "tab:red", "-"),
-    ("fatigue, crowned", "worst_section", "crowned, worst", "tab:red", "--"),
+    ("fatigue, crowned", "worst_section", "crowned, worst section", "tab:red", "--"),
 )
+"""Name of the task, section, label, colour and line style of each line."""
 
 
 def _amplitude(ax: Any, results: Mapping[str, Found]) -> None:
-    """Draw the amplitude of the circumferential normal stress at the roots."""
+    """Draw the amplitude of the circumferential normal stress at the tooth roots."""
     _over_torque(ax, results, "normal_amplitude_MPa")
-    ax.set_ylabel("normal stress amplitude at the roots [MPa]")
+    ax.set_ylabel("normal stress amplitude at the tooth roots [MPa]")
 
 
 def _safety(ax: Any, results: Mapping[str, Found]) -> None:
-    """Draw the safety factors, with those of shell theory."""
+    """Draw the fatigue safety factors, compared with those of shell theory."""
     _over_torque(ax, results, "S")
     known = [f["by_torque"] for f in results.values() if "by_torque" in f]
     rows = known[0] if known else []
@@ -110,16 +111,17 @@ def _safety(ax: Any, results: Mapping[str, Found]) -> None:
     ax.plot(torque, theory, "k:", label="shell theory")
     ax.axhline(1.5, color="0.6", lw=0.8)
     ax.set_ylim(0.0, 1.05 * max([1.5, *theory]))
-    ax.set_ylabel("safety factor")
+    ax.set_ylabel("fatigue safety factor")
     ax.legend(fontsize="small")
 
 
 def _over_torque(ax: Any, results: Mapping[str, Found], key: str) -> None:
+    """Draw one figure over the output torque for every line of ``_LINES``."""
     for name, section, label, colour, style in _LINES:
         rows = results.get(name, {}).get("by_torque", [])
         torque = [row["torque_Nm"] for row in rows]
         values = [row[section][key] for row in rows]
         ax.plot(torque, values, color=colour, ls=style, marker=".", label=label)
-    ax.set_xlabel("torque [N·m]")
+    ax.set_xlabel("output torque [N·m]")
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)

@@ -8,7 +8,7 @@ from typing import Any
 from swgjoint.pictures import png
 
 STYLES = {
-    "ring": ("C2", "^", "ring"),
+    "ring": ("C2", "^", "thin rings"),
     "2d linear": ("C0", "x", "2D, linear"),
     "2d": ("C0", "s", "2D"),
     "3d linear": ("C3", "x", "3D, linear"),
@@ -26,7 +26,7 @@ def cost_picture(
     bounds: Collection[float],
     seconds: Callable[[Mapping[str, Any]], float],
 ) -> bytes:
-    """Draw the absolute error over CPU time with the Pareto front as PNG.
+    """Draw the magnitude of the error over CPU time with the Pareto front as PNG.
 
     Args:
         result: Result of :func:`swgjoint.bench.fe.cost.run_fe_cost`.
@@ -72,5 +72,5 @@ def cost_picture(
         ax.set(xlabel="CPU time [s]", ylabel="error [%]")
         ax.margins(x=0.12, y=0.1)
     panels[0, 0].legend(fontsize="small")
-    figure.suptitle(f"{result['design']}, reference: {reference}")
+    figure.suptitle(f"{result['design']}; reference: {reference}")
     return png(figure, dpi=100)

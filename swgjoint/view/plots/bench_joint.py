@@ -32,7 +32,10 @@ _TITLES = {
 
 
 def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
-    """Draw the error of every quantity over cost, and numerical damping, as PNG.
+    """Draw the error of every quantity over cost, and the effect of the step, as PNG.
+
+    The last two panels show the numerical damping ratio, and the error of the link
+    angle that the step alone causes, over the step.
 
     Args:
         scene: Name of the scene.
@@ -60,11 +63,12 @@ def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
         axes[5].plot([], [], _MARKERS[name], color="black", mfc="none", label=name)
     axes[5].legend(fontsize="x-small")
     against = next(row["reference"] for row in rows)
-    figure.suptitle(f"scene {scene}, reference: {against}")
+    figure.suptitle(f"scene {scene}; reference: {against}")
     return png(figure, dpi=90)
 
 
 def _points(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw error over cost, one point per setting."""
     for row in rows:
         marker, colour = _MARKERS[row["integrator"]], _COLOURS[row["model"]]
         axis.loglog(row["cost"], row["error"], marker, color=colour, ms=5)
@@ -93,13 +97,13 @@ def _damping(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _own_error(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw the error due to the step alone over the step."""
+    """Draw the error of the link angle that the step alone causes, over the step."""
     known = [r for r in rows if r["quantity"] == "link_angle" and r["own_error"]]
     _over_step(axis, known, "own_error")
     axis.set(
         xscale="log",
         yscale="log",
-        title="link angle, error relative to the same level",
+        title="link angle, rms of the worst joint, error due to the step",
         xlabel="step [ms]",
         ylabel="error [arcmin]",
     )
@@ -107,7 +111,13 @@ def _own_error(axis: Any, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _over_step(axis: Any, rows: Sequence[dict[str, Any]], value: str) -> None:
-    """Draw one line per level and integrator."""
+    """Draw one line per level and integrator.
+
+    Args:
+        axis: Axes to draw on.
+        rows: Rows of one quantity.
+        value: Key of the values to draw.
+    """
     for key in dict.fromkeys((row["model"], row["integrator"]) for row in rows):
         points = sorted(
             (1e3 * row["step_s"], row[value])

@@ -1,4 +1,4 @@
-"""Picture of the comparison with the catalogue: ratio of model to catalogue."""
+"""Picture of the comparison with the catalogue: model value over catalogue value."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ if TYPE_CHECKING:
     from swgjoint.validation.rows import Row
 
 PANELS = ("K1", "K2", "K3", "ratcheting torque")
+"""Quantities that get a panel."""
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
 def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
-    """Draw the ratio of model to catalogue over gear ratio and size as PNG.
+    """Draw the ratio of model to catalogue by gear ratio and size as PNG.
 
-    Bars are the brackets of the variants.
+    A bar extends from the smallest to the largest result of the variants, and a dot is
+    the middle between them. A triangle is a lower bound. Grey areas show which ratios
+    meet the accuracy goal.
 
     Args:
         rows: Rows of the study.
@@ -55,7 +58,7 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
                 )
         axis.set_title(name)
         axis.set_xticks(range(len(ratios)), [f"{ratio}:1" for ratio in ratios])
-        axis.set_xlabel("ratio")
+        axis.set_xlabel("gear ratio")
         axis.grid(axis="y", alpha=0.3)
     highest = max(
         row.more["high_over_source"] or row.more["low_over_source"]
@@ -69,6 +72,7 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
     axes[0].legend(fontsize="small")
     axes[0].set_ylabel("model / catalogue")
     figure.suptitle(
-        "middle and bracket of the variants; triangle: lower bound; grey: goal"
+        "bar and dot: range of the variants and its middle; triangle: lower bound;"
+        " grey: goal"
     )
     return png(figure, dpi=130)

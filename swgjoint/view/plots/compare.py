@@ -17,25 +17,25 @@ if TYPE_CHECKING:
     from swgjoint.explore.compare.compare import Compared
 
 HEADER = {
-    "ripple_rms_percent": ("ripple rms", "% of rated"),
-    "ripple_pp_percent": ("ripple", "% of rated, pp"),
-    "transmission_error_ripple_arcmin": ("error ripple", "arcmin, pp"),
-    "transmission_error_arcmin": ("transm. error", "arcmin, pp"),
+    "ripple_rms_percent": ("torque ripple rms", "% of rated torque"),
+    "ripple_pp_percent": ("torque ripple pp", "% of rated torque"),
+    "transmission_error_ripple_arcmin": ("transmission error ripple", "arcmin, pp"),
+    "transmission_error_arcmin": ("transmission error", "arcmin, pp"),
     "torsion_arcmin": ("torsion", "arcmin, mean"),
     "tool_path_rms_mm": ("tool path error", "mm, rms"),
     "K1_Nm_rad": ("K1", "N·m/rad"),
-    "von_mises_MPa": ("von Mises", "MPa"),
-    "fatigue_safety_factor": ("fatigue safety", ""),
-    "peak_torque_of_rating": ("peak", "of rating"),
-    "wall_s": ("computed in", "s"),
+    "von_mises_MPa": ("von Mises stress", "MPa"),
+    "fatigue_safety_factor": ("fatigue safety factor", ""),
+    "peak_torque_of_rating": ("peak torque", "of repeated peak"),
+    "wall_s": ("computing time", "s"),
 }
-"""Displayed name and unit of the figures of a row."""
+"""Displayed name and unit of the figures of a row, by key."""
 JUDGED_BY = {
     "ripple_rms_percent": tuple(QUANTITIES),
     "ripple_pp_percent": tuple(QUANTITIES),
     "transmission_error_ripple_arcmin": ("output_error",),
 }
-"""Quantities of the map validation on which a figure depends."""
+"""Quantities of the map validation on which a figure depends, by key of the figure."""
 _ERROR = "transmission_error_arcmin"
 PANELS = (
     "ripple_rms_percent",
@@ -46,6 +46,7 @@ PANELS = (
     "von_mises_MPa",
     "peak_torque_of_rating",
 )
+"""Keys of the figures that the picture shows, one panel each."""
 _WIDE = 30.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
@@ -53,8 +54,9 @@ _WIDE = 30.0
 def cell(row: Mapping[str, Any], key: str) -> str:
     """Format a figure with its marks.
 
-    The text is a dash if a ripple has no figure. ``>`` marks a ripple that is a lower
-    bound. ``~`` and ``!`` mark the difference of the map from unseen solves.
+    The text is a dash if the run reports no ripple. ``>`` marks a ripple that is a
+    lower bound, ``~`` an uncertain and ``!`` an invalid figure, see
+    :mod:`swgjoint.maps.sheet.validity_marks`.
 
     Args:
         row: JSON object of a row.
@@ -82,7 +84,7 @@ def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
 def comparison_table(
     rows: Sequence[Compared], spec: Mapping[str, float] | None = None
 ) -> Table:
-    """Table with one row per argument; figures that miss their limit are marked.
+    """Table with one row per argument; colours show which limits are met.
 
     Args:
         rows: Results of the comparison.
@@ -98,7 +100,7 @@ def comparison_table(
             cells.append(Cell(cell(row.to_json(), key), mark))
         if spec:
             met = not row.missed
-            cells.append(Cell("kept" if met else "missed", "good" if met else "bad"))
+            cells.append(Cell("met" if met else "missed", "good" if met else "bad"))
         lines.append(cells)
     limits = [
         f"{key} at {'least' if key in LOWER else 'most'} {limit:g}"
@@ -108,9 +110,10 @@ def comparison_table(
         header=[("argument", ""), ("level", ""), *shown_keys.values(), *verdict],
         rows=lines,
         notes=[
-            "Figures are those of the worst joint of the scene. K1 and the von Mises"
-            " stress (largest stress at rated torque, averaged over a pitch) are those"
-            " of the drive. Levels without compliance have no K1.",
+            "Joint figures are those of the worst joint of the scene. The transmission"
+            " error ripple is the strongest line at an order of the drive. K1 and the"
+            " von Mises stress (largest stress at rated torque, averaged over a pitch)"
+            " are those of the drive. Levels without compliance have no K1.",
             *([f"Limits of the spec: {', '.join(limits)}."] if limits else []),
             *left_out_notes(rows),
         ],
@@ -118,7 +121,7 @@ def comparison_table(
 
 
 def left_out_notes(rows: Sequence[Compared]) -> list[str]:
-    """Notes on incomplete ripple: orders that the step leaves out, uncertain maps."""
+    """Notes on orders that the step leaves out, and the legend of ``~`` and ``!``."""
     by_joints: dict[tuple[str, ...], list[str]] = {}
     for row in rows:
         by_joints.setdefault(row.strongest_order_left_out, []).append(row.argument)
@@ -177,7 +180,7 @@ def _bars(
     colors: Sequence[tuple[float, ...]],
     limit: float | None,
 ) -> None:
-    """Draw one figure of all rows, with its value at every bar."""
+    """Draw one figure of all rows as bars, with its value next to each bar."""
     values = [row.figure(key) for row in rows]
     heights = [value or 0.0 for value in values]
     seen = [value for value in heights if value > 0.0]

@@ -12,10 +12,14 @@ if TYPE_CHECKING:
     from swgjoint.validation.control.ladder import Ladder
 
 COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
+"""Colours of the controllers, in the sequence of the ladder."""
 
 
 def ladder_table(ladder: Ladder) -> list[str]:
-    """Lines of a text table: mean ± standard deviation, one row per controller."""
+    """Lines of a text table: mean ± standard deviation of the specimens.
+
+    There is one row per controller and one column per figure.
+    """
     header = ["", *ladder.units]
     rows = [["", *ladder.units.values()]]
     for rung, figures in ladder.figures.items():
@@ -34,7 +38,7 @@ def ladder_table(ladder: Ladder) -> list[str]:
 
 
 def ladder_picture(name: str, ladder: Ladder) -> bytes:
-    """Draw the signals of the first specimen, and the figures of all, as PNG.
+    """Draw signals of the first specimen, and figures of all specimens, as PNG.
 
     Args:
         name: Name of the drive.
@@ -56,10 +60,16 @@ def ladder_picture(name: str, ladder: Ladder) -> bytes:
             axes[0, 1],
             "output",
             "positioning",
-            "output [deg]",
-            "link error in the slow turn\nminus mean [arcmin]",
+            "output angle [deg]",
+            "link error in the slow turn\nminus its mean [arcmin]",
         ),
-        (axes[0, 2], "even_time", "ripple", "time [s]", "output torque - mean [N·m]"),
+        (
+            axes[0, 2],
+            "even_time",
+            "ripple",
+            "time [s]",
+            "output torque minus its mean [N·m]",
+        ),
     )
     rungs = dict(zip(ladder.made_for, COLORS, strict=True))
     for ax, x, y, along, label in signals:
@@ -79,10 +89,11 @@ def ladder_picture(name: str, ladder: Ladder) -> bytes:
             ax.plot(np.full(row.size, k), row, "k.", ms=2)
         ax.set_yscale("log")
         ax.set_xticks(place, names, rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{key} [{ladder.units[key]}]")
+        ax.set(title=f"{key.replace('_', ', ')} [{ladder.units[key]}]")
         ax.grid(alpha=0.3, axis="y")
     count = next(iter(ladder.figures.values()))[bars[0]].size
     figure.suptitle(
-        f"{name}: one specimen (top); {count} specimens as dots and mean (bottom)"
+        f"{name}: one specimen (top); {count} specimens, dots, and their mean, bars"
+        " (bottom)"
     )
     return png(figure, dpi=100)

@@ -18,18 +18,19 @@ if TYPE_CHECKING:
     from swgjoint.gear.teeth.profile import ToothProfile
 
 _FLEXSPLINE, _CIRCULAR_SPLINE, _WAVE_GENERATOR = "tab:blue", "tab:red", "tab:green"
+"""Colours of the members."""
 _FOLLOWS = 0.02
-"""The rim is drawn along an outline whose length differs from that of the bore by less
-than this fraction [-]."""
+"""Largest relative difference between the lengths of wave-generator outline and bore at
+which the rim is drawn along the outline [-]."""
 
 
 def design_picture(design: Design) -> bytes:
-    """Draw teeth in mesh at a lobe, the wave generator enlarged, and the drive as PNG.
+    """Draw the mesh at a lobe, the magnified deflection, and the whole drive as PNG.
 
-    The flexspline is drawn with rigid teeth on the neutral line that follows the wave
-    generator. If the outline of the wave generator is much shorter than the bore, as
-    with rollers, the neutral line is that of a ring deflected by w_0 cos(lobes phi).
-    The picture shows neither forces nor elastic contact.
+    The flexspline has rigid teeth on the neutral line that follows the wave generator.
+    If the outline of the wave generator is much shorter than the bore, as with rollers,
+    the neutral line is that of a ring deflected by w_0 cos(lobes phi). The picture
+    shows neither forces nor elastic contact.
     """
     from matplotlib.figure import Figure
 
@@ -60,18 +61,21 @@ def _summary(design: Design) -> str:
 
 
 def _flank(profile: ToothProfile, count: int) -> Array:
-    """One tooth from root to root, counter-clockwise if it is external (n, 2) [m]."""
+    """Tooth on +y, from its clockwise to its counter-clockwise root (n, 2) [m]."""
     right, _, _ = profile.evaluate(np.linspace(0.0, profile.stations[-1], count))
     return np.concatenate([right[::-1], right[1:] * np.array([-1.0, 1.0])])
 
 
 def _flexspline(design: Design, theta: Array) -> tuple[Array, Array]:
-    """Points (n, 2) [m] and rotations (n,) [rad] of the neutral line at rim angles."""
+    """Points (n, 2) [m] and rotations (n,) [rad] of the neutral line at rim angles.
+
+    The angles count counter-clockwise from the +y axis [rad].
+    """
     bore = 2.0 * np.pi * design.flexspline_inner_radius
     if abs(wave_generator(design).perimeter / bore - 1.0) < _FOLLOWS:
         pose = neutral_line(design).pose(theta)
         return pose.point, pose.angle
-    # inextensible ring: w = w0 cos(n t), v = -w0/n sin(n t), turned by (v - w')/r
+    # inextensible ring: w = w0 cos(n t), v = -w0/n sin(n t), rotation t + (v - w')/r
     n, w0 = design.lobes, lobe_height(design)
     r = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
     w, v = w0 * np.cos(n * theta), -w0 / n * np.sin(n * theta)
@@ -82,7 +86,7 @@ def _flexspline(design: Design, theta: Array) -> tuple[Array, Array]:
 
 
 def _teeth(design: Design, theta: Array, count: int) -> Array:
-    """Outlines of the flexspline teeth at rim angles theta (n, points, 2) [m]."""
+    """Outlines of the flexspline teeth at rim angles theta (n, n_points, 2) [m]."""
     tooth = _flank(tooth_profile(design, "flexspline"), count)
     r = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
     point, angle = _flexspline(design, theta)
@@ -97,7 +101,11 @@ def _turned(points: Array, angle: Array) -> Array:
 
 
 def _spaces(design: Design, which: Array, count: int) -> Array:
-    """Teeth of the circular spline (n, points, 2) [m]; space 0 is on the +y axis."""
+    """Outlines of circular-spline teeth (n, n_points, 2) [m].
+
+    The tooth of a number is half a pitch counter-clockwise from the space of the same
+    number; space 0 is on the +y axis.
+    """
     tooth = _flank(tooth_profile(design, "circular_spline"), count)
     pitch = 2.0 * np.pi / design.drive.teeth_circular_spline
     return _turned(tooth, (which + 0.5) * pitch)
@@ -129,7 +137,7 @@ def _mesh(ax: Any, design: Design) -> None:
     for index, curve in enumerate(wave_generator(design).outlines(4001)):
         label = "wave generator" if index == 0 else None
         ax.plot(*(curve / mm).T, color=_WAVE_GENERATOR, lw=1.2, label=label)
-    # crop to the teeth without the outer halves of the last ones
+    # hide the outer halves of the last teeth
     half = 4.4 * np.pi * design.drive.module_mm
     ax.set_xlim(-half, half)
     ax.set_ylim(float(bore[:, 1].min()) - 1.2 * design.drive.module_mm, top)
@@ -138,7 +146,7 @@ def _mesh(ax: Any, design: Design) -> None:
 
 
 def _exaggerated(ax: Any, design: Design) -> None:
-    """Draw the outline with its distance from the undeformed bore enlarged."""
+    """Draw wave generator and bore with a magnified deflection."""
     bore, w0 = design.flexspline_inner_radius, lobe_height(design)
     factor = max(1.0, round(0.2 * bore / w0))
     turn = np.linspace(0.0, 2.0 * np.pi, 721)
@@ -158,7 +166,7 @@ def _exaggerated(ax: Any, design: Design) -> None:
     r = np.hypot(*line.T)
     shown = line * ((bore + factor * (r - bore)) / r)[:, None] / mm
     ax.plot(*shown.T, color=_FLEXSPLINE, lw=0.9, label="bore of the flexspline")
-    ax.set_title(f"distances from the undeformed bore times {factor:g}")
+    ax.set_title(f"distances from the undeformed bore, magnified {factor:g} times")
     ax.legend(loc="center", fontsize=8)
 
 

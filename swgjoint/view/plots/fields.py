@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 KINDS = ("tensile", "|compressive|", "von Mises")
 SHOWN_TEETH = 6.0
-"""Number of teeth drawn on either side of an axis."""
+"""Number of tooth pitches drawn on either side of an axis."""
 LEVELS = 12
 """Number of contour bands."""
 PALE = (0.9, 0.92, 0.97, 1.0)
 """Colour of the lowest band."""
 SNAPSHOTS = 4
-"""Largest number of positions that are drawn individually."""
+"""Largest number of wave-generator positions that are drawn individually."""
 MPa, N_mm = 1e6, 1e3
 
 
@@ -58,7 +58,8 @@ def field_pictures(run: MeshingRun) -> dict[str, bytes]:
 def contour_picture(run: MeshingRun, state: State) -> bytes:
     """Draw the stresses of both members near a lobe and near the minor axis as PNG.
 
-    Every row has one scale. The wave generator is grey, tooth forces are arrows.
+    Every row shows one kind of stress with a common scale. The wave generator is grey;
+    arrows show the forces of the circular spline on the flexspline.
 
     Args:
         run: The simulation.
@@ -85,7 +86,9 @@ def contour_picture(run: MeshingRun, state: State) -> bytes:
             _force_arrows(ax, run, state, turn, half_width)
             _frame(ax, run, half_width)
             ax.set_title(f"{kind} stress near {name}", fontsize="medium")
-        figure.colorbar(shades, ax=axes[row], label="[MPa]", pad=0.01, format="%.0f")
+        figure.colorbar(
+            shades, ax=axes[row], label="stress [MPa]", pad=0.01, format="%.0f"
+        )
     figure.suptitle(_title(run, state), fontsize="medium")
     return _png(figure)
 
@@ -93,7 +96,7 @@ def contour_picture(run: MeshingRun, state: State) -> bytes:
 def _contour(
     ax: Any, member: MemberField, row: int, turn: float, half_width: float, levels: Any
 ) -> Any:
-    """Draw filled contours of the sectors near the +y axis after a rotation [rad]."""
+    """Draw filled contours of the sectors that a rotation [rad] brings near +y."""
     from matplotlib import colormaps
 
     points = rotate(member.points, turn)
@@ -116,7 +119,7 @@ def _contour(
 def _force_arrows(
     ax: Any, run: MeshingRun, state: State, turn: float, half_width: float
 ) -> None:
-    """Draw the forces of the circular spline on the flexspline at their points."""
+    """Draw the tooth forces on the flexspline as arrows that end at their points."""
     contacts, model = state.contacts, run.model
     if contacts is None or not len(contacts):
         return
@@ -155,7 +158,7 @@ def _frame(ax: Any, run: MeshingRun, half_width: float) -> None:
 
 
 def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
-    """Draw the flank forces at single positions, and at all positions together, as PNG.
+    """Draw the flank forces at selected positions, and at all of them, as PNG.
 
     Args:
         run: The simulation.
@@ -164,7 +167,7 @@ def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
     model, pitch = run.model, 2.0 * pi / run.model.element.sectors
     angles = np.array([tooth_angles(model, state) for state in states])
     forces = np.array([tooth_forces(model, state) for state in states])
-    # number of the tooth from its closest lobe
+    # position of the tooth from its closest lobe in tooth pitches
     window = 2.0 * pi / run.design.lobes
     place = ((angles + 0.5 * window) % window - 0.5 * window) / pitch
     chosen = np.unique(np.linspace(0, len(states) - 1, SNAPSHOTS).astype(int))
@@ -185,7 +188,7 @@ def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
         at = states[k].wave_generator_angle / deg
         ax.text(0.02, 0.8, f"{at:.4g} deg", transform=ax.transAxes, fontsize="small")
         ax.set_ylabel("force [N]")
-    ax.set_xlabel("tooth from the first lobe, counter-clockwise positive")
+    ax.set_xlabel("position from the first lobe [pitches], counter-clockwise positive")
     whole = figure.add_subplot(grid[:, 1])
     for side, (name, colour) in enumerate(
         (("right (clockwise) flank", "tab:blue"), ("left flank", "tab:red"))
@@ -199,7 +202,9 @@ def tooth_force_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
     whole.grid(alpha=0.3)
     whole.legend(fontsize="small")
     whole.set_title("all positions, all lobes", fontsize="medium")
-    whole.set_xlabel("tooth from its lobe, counter-clockwise positive")
+    whole.set_xlabel(
+        "position from the closest lobe [pitches], counter-clockwise positive"
+    )
     whole.set_ylabel("normal force on a flank [N]")
     figure.suptitle(_title(run, None), fontsize="medium")
     return _png(figure)
@@ -240,10 +245,10 @@ def root_stress_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend(fontsize="small")
-        ax.set_ylabel("stress at the root [MPa]")
+        ax.set_ylabel("stress at the tooth root [MPa]")
         ax.set_ylim(bottom=0.0)
     axes[1].set_xlabel(
-        "angle of the lobe from the root [deg], negative before the lobe passes"
+        "angle from the tooth root to the lobe [deg], negative before the lobe passes"
         " (small dots: all teeth)"
     )
     figure.suptitle(_title(run, None), fontsize="medium")
@@ -251,9 +256,10 @@ def root_stress_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
 
 
 def contact_arc_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
-    """Draw the load of the wave generator and its contact arcs as PNG.
+    """Draw the load of the wave generator on the bore and its contact arcs as PNG.
 
-    The load is drawn along the bore, the arcs of the first lobe over the turn.
+    The load is drawn along the bore at selected positions. The contact arcs are those
+    of the first lobe, at all positions.
 
     Args:
         run: The simulation.
@@ -276,7 +282,7 @@ def contact_arc_picture(run: MeshingRun, states: Sequence[State]) -> bytes:
     load.set_xticks(range(-180, 181, 45))
     load.set_ylim(bottom=0.0)
     load.set_xlabel("angle along the bore from the first lobe [deg]")
-    load.set_ylabel("wave-generator load [N/mm],\nsmoothed over two tooth pitches")
+    load.set_ylabel("wave-generator load [N/mm],\naveraged over two tooth pitches")
     load.legend(fontsize="small", title="wave generator at", ncols=2)
     for state, contact in zip(states, contacts, strict=True):
         for low, high in contact.arcs[0]:
@@ -305,7 +311,7 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _title(run: MeshingRun, state: State | None) -> str:
-    """Drive, load and direction of the power flow."""
+    """Drive, load, direction of the power flow, and position of a single state."""
     turn = run.steps[-1].input_angle - run.steps[0].input_angle
     power = run.torque / run.design.ratio * turn
     flow = ""

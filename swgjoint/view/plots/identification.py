@@ -16,18 +16,19 @@ if TYPE_CHECKING:
     from swgjoint.identify.identification import Identified
 
 _TURNS = 4
+"""Number of input turns over which the kinematic error is drawn."""
 _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 
 
 def png(identified: Identified) -> bytes:
-    """The picture as a PNG file."""
+    """The picture of an identification as a PNG file."""
     out = io.BytesIO()
     save_png(picture(identified), out, dpi=120)
     return out.getvalue()
 
 
 def picture(identified: Identified) -> Figure:
-    """Draw every channel with its residual, the torsion loop and kinematic error."""
+    """Draw each torque channel with its residual, the torsion loop and the error."""
     from matplotlib.figure import Figure
 
     measured = identified.model.measured_torques()
@@ -60,7 +61,7 @@ def _line(ax: Any, x: Any, y: Any, label: str, **style: Any) -> None:
 
 
 def _loop(ax: Any, identified: Identified) -> None:
-    """Draw the torque over the torsion of the log, and the spring of the map."""
+    """Draw the measured torque over the torsion, and the spring curve of the map."""
     drive, model = identified.drive, identified.model
     values = np.array([e.value for e in identified.estimates.values()])
     a, b = model.amplitudes(values).T
@@ -69,16 +70,16 @@ def _loop(ax: Any, identified: Identified) -> None:
     if torque is None:
         torque = model.ratio * model.measured_torques()["motor_torque"]
     x = (model.torsion + error)[model.kept]
-    ax.plot(x / arcmin, torque, ".", ms=1.5, color="0.6", label="log")
+    ax.plot(x / arcmin, torque, ".", ms=1.5, color="0.6", label="measured")
     along = np.linspace(x.min(), x.max(), 400)
     ax.plot(
         along / arcmin,
         drive.coefficients(along, 1)[:, 0, 0],
         color="tab:blue",
-        label="spring of the map",
+        label="spring curve of the map",
     )
     ax.set_xlabel("torsion [arcmin]")
-    ax.set_ylabel("torque [N·m]")
+    ax.set_ylabel("output torque [N·m]")
     ax.legend(loc="upper left")
 
 

@@ -1,4 +1,4 @@
-"""Picture of a lot: distribution of its figures, and yield over the limit."""
+"""Picture of a lot: distribution of its figures, and yield as a function of limits."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ _LABELS = {
 
 
 def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | None:
-    """Draw the histogram of every figure, and the yield over its limit, as PNG.
+    """Draw the histogram of every figure, and the yield for any limit on it, as PNG.
 
     Args:
         result: Result of :func:`swgjoint.explore.lot.run_lot`.
-        lower: Figures that a spec limits from below.
+        lower: Keys of the figures that have a lower limit; the others have an upper
+            one.
 
     Returns:
         The PNG file; None if no drive was solved.
@@ -53,11 +54,11 @@ def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | No
                 axis.axvline(limit, color="tab:red", lw=1.2)
             alone = result["yield"]["by_limit"][key]["part"]
             below.set_title(f"limit {limit:g}: {100 * alone:.1f} % pass", fontsize=10)
-    axes[0][0].set_ylabel("drives")
+    axes[0][0].set_ylabel("number of drives")
     axes[1][0].set_ylabel("yield for this limit alone")
     meaning = {
-        "limit": "errors as large as the tolerances",
-        "uniform": "errors drawn between zero and the tolerances",
+        "limit": "sizes of the errors equal to the tolerances",
+        "uniform": "sizes of the errors drawn between zero and the tolerances",
     }[result["sizes"]]
     figure.suptitle(f"{result['design']}: {len(rows)} drives, {meaning}", fontsize=11)
     return png(figure, dpi=110)

@@ -1,4 +1,4 @@
-"""Picture of the course of a simulation of meshing."""
+"""Picture of a simulation of meshing: results over the wave-generator angle."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _KINDS = {"tensile": "tab:red", "compressive": "tab:blue", "von_mises": "0.3"}
 
 
 def meshing_picture(result: Mapping[str, Any]) -> bytes:
-    """Draw stress maxima, error, wave-generator torque and contacts per step as PNG.
+    """Draw stress, output error, wave-generator torque and contacts as PNG.
 
     Args:
         result: JSON object of ``swgjoint meshing``.
@@ -52,5 +52,5 @@ def meshing_picture(result: Mapping[str, Any]) -> bytes:
 
 
 def _gaps(values: list[float | None]) -> list[float]:
-    """Values with NaN for failed steps, which leave a gap in the line."""
+    """Values with NaN for failed steps, so that the line has gaps there."""
     return [float("nan") if value is None else value for value in values]

@@ -1,4 +1,4 @@
-"""Picture of a search: the front, the course of the search, and the parameters."""
+"""Picture of a search for designs: Pareto front, course of the search, parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Axes = Any  # matplotlib is imported only when a picture is drawn
 
 
 def optimum_picture(optimum: Optimum) -> bytes:
-    """Draw the front, the best value so far, and the parameters of the front as PNG."""
+    """Draw the Pareto front, the best values so far, and its parameters as PNG."""
     from matplotlib.figure import Figure
 
     canvas = Figure(figsize=(16.0, 5.4), layout="constrained")
@@ -33,7 +33,7 @@ def optimum_picture(optimum: Optimum) -> bytes:
 
 
 def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> Any:
-    """One figure of several designs; NaN if a design has no value."""
+    """Values of one figure for several designs; NaN if a design has no value."""
     values = []
     for candidate in candidates:
         record = candidate.confirmed if confirmed else candidate.record
@@ -43,7 +43,7 @@ def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> 
 
 
 def _front(axis: Axes, optimum: Optimum) -> None:
-    """Draw the first two objectives, or a single one over the sequence of designs."""
+    """Draw the first two objectives, or a single one over the number of the design."""
     names = [o.figure for o in optimum.file.objectives]
 
     def places(candidates: Sequence[Candidate], *, confirmed: bool) -> tuple[Any, Any]:
@@ -53,17 +53,17 @@ def _front(axis: Axes, optimum: Optimum) -> None:
         return first, _figures(candidates, names[1], confirmed=confirmed)
 
     x, y = places(optimum.tried, confirmed=False)
-    axis.plot(x, y, ".", color="0.75", ms=4, label="tried")
+    axis.plot(x, y, ".", color="0.75", ms=4, label="evaluated designs")
     if len(names) > 1:
         x, y = places(optimum.front, confirmed=False)
-        axis.plot(x, y, "o-", color="tab:blue", ms=5, lw=1.0, label="front")
+        axis.plot(x, y, "o-", color="tab:blue", ms=5, lw=1.0, label="Pareto front")
         axis.plot(
             *places(optimum.front, confirmed=True),
             "o",
             mfc="none",
             color="tab:red",
             ms=9,
-            label="front, confirmed",
+            label="Pareto front, confirmed",
         )
         rivals = (optimum.start, *optimum.beside)
         for rival, mark in zip(rivals, cycle("sD^vP*X"), strict=False):
@@ -73,7 +73,7 @@ def _front(axis: Axes, optimum: Optimum) -> None:
             there = places([rival], confirmed=True)
             axis.plot(*there, mark, mfc="none", color="tab:red", ms=11)
         _view(axis, optimum, names)
-    axis.set_xlabel(label_of(names[0]) if len(names) > 1 else "designs tried")
+    axis.set_xlabel(label_of(names[0]) if len(names) > 1 else "evaluated designs")
     axis.set_ylabel(label_of(names[min(1, len(names) - 1)]))
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
@@ -84,7 +84,7 @@ def _front(axis: Axes, optimum: Optimum) -> None:
 
 
 def _view(axis: Axes, optimum: Optimum, names: Sequence[str]) -> None:
-    """Crop the axes to the front and the compared designs."""
+    """Limit the axes to the front, the start design and the compared designs."""
     near = [*optimum.front, optimum.start, *optimum.beside]
     for name, limit in zip(names[:2], (axis.set_xlim, axis.set_ylim), strict=True):
         values = np.concatenate(
@@ -116,14 +116,14 @@ def _course(axis: Axes, optimum: Optimum) -> None:
             label=label_of(objective.figure),
         )
     axis.axhline(1.0, color="black", lw=0.8)
-    axis.set_xlabel("designs tried")
-    axis.set_ylabel("best value so far / value of the start")
+    axis.set_xlabel("number of evaluated designs")
+    axis.set_ylabel("best value so far / value of the start design")
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
 
 
 def _values(axis: Axes, optimum: Optimum) -> None:
-    """Draw the parameters of the front over their ranges.
+    """Draw the parameters of the front designs, relative to their ranges.
 
     The colour shows the first objective.
     """

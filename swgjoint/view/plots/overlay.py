@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def overlay_picture(name: str, laid: Overlay) -> bytes:
-    """Draw both loops over the torque, and the residuals by load direction, as PNG.
+    """Draw both loops over the torque, and the residual by load direction, as PNG.
+
+    A grey band shows the rms residual of each segment of the torque range.
 
     Args:
         name: Name of the drive.
@@ -29,7 +31,11 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
         torque, laid.measured.torsion / arcmin, color="0.55", lw=2.5, label="measured"
     )
     loops.plot(
-        torque, laid.predicted.torsion / arcmin, color="tab:red", lw=1.1, label="map"
+        torque,
+        laid.predicted.torsion / arcmin,
+        color="tab:red",
+        lw=1.1,
+        label="predicted",
     )
     loops.set_title("torque loop, input locked")
     loops.set_ylabel("torsion [arcmin]")
@@ -49,7 +55,7 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
             edges = sign * np.array([row["from_Nm"], row["to_Nm"]])
             band = np.full(2, row["rms_arcmin"])
             rest.fill_between(edges, -band, band, color="0.5", alpha=0.2, lw=0)
-    rest.set_title("measured minus predicted (grey: rms)")
+    rest.set_title("residual: measured minus predicted (grey band: rms)")
     rest.set_ylabel("residual torsion [arcmin]")
     rest.legend(fontsize="small")
     for axis in (loops, rest):

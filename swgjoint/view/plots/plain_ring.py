@@ -1,4 +1,4 @@
-"""Picture of the plain ring between two rollers."""
+"""Picture of a plain ring that two rollers in its bore pull apart."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ LARGER = 8.0
 def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes:
     """Draw the shape, the deflection around the ring, and b_G over a_G as PNG.
 
+    a_G is the outward deflection above a roller and b_G the inward deflection at 45 deg
+    from it.
+
     Args:
-        cases: Rings of different thickness; the first one is drawn in its shape.
+        cases: Rings of different thickness; shape and deflection are those of the first
+            one.
         fine: Mesh refinement of the results to draw.
         total: a_G + b_G at the last point of measurement [m].
     """
@@ -38,7 +42,7 @@ def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes
 
 
 def _shape(ax: Any, case: RingCase, fine: int) -> None:
-    """Draw the outside of the ring at rest and pulled, with enlarged deflections."""
+    """Draw the outer surface at rest and at the largest travel, magnified."""
     radius = case.ring.outer_radius
     phi = np.linspace(0.0, 2.0 * pi, 400)
     ax.plot(*(radius / mm * np.array([np.sin(phi), np.cos(phi)])), "k--", lw=0.8)
@@ -51,11 +55,11 @@ def _shape(ax: Any, case: RingCase, fine: int) -> None:
     ax.set_aspect("equal")
     ax.set_title(f"{case.name}, deflection x {LARGER:g}", fontsize="medium")
     ax.set_xlabel("x [mm]")
-    ax.set_ylabel("y [mm], along the rollers")
+    ax.set_ylabel("y [mm], through the rollers")
 
 
 def _around(ax: Any, case: RingCase, fine: int) -> None:
-    """Draw the deflection over the angle at the largest travel, with theory."""
+    """Draw the deflection over the angle at the largest travel, next to theory."""
     radius, quarter = case.ring.outer_radius, case.pulled[fine].outline[-1]
     polar, away = np.arctan2(*quarter.T), np.hypot(*quarter.T) - radius
     ax.plot(polar / deg, away / mm, label="finite elements")
@@ -71,7 +75,7 @@ def _around(ax: Any, case: RingCase, fine: int) -> None:
 
 
 def _inward(ax: Any, cases: Sequence[RingCase], fine: int, total: float) -> None:
-    """Draw b_G over a_G of all rings, the elastica and the closed form."""
+    """Draw b_G over a_G of all rings, and both thin-ring results."""
     for case in cases:
         deflection = case.pulled[fine].deflection
         ax.plot(deflection[:, 0] / mm, -deflection[:, 1] / um, ".-", label=case.name)
@@ -86,7 +90,7 @@ def _inward(ax: Any, cases: Sequence[RingCase], fine: int, total: float) -> None
     ax.set_xlim(left=0.0)
     ax.set_ylim(0.0, top)
     ax.set_title("inward deflection at 45 deg", fontsize="medium")
-    ax.set_xlabel("a_G above a roller [mm]")
-    ax.set_ylabel("b_G [µm]")
+    ax.set_xlabel("outward deflection a_G above a roller [mm]")
+    ax.set_ylabel("inward deflection b_G [µm]")
     ax.legend(fontsize="small")
     ax.grid(alpha=0.3)

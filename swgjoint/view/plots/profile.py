@@ -18,7 +18,7 @@ _COLOURS = {"flexspline": "tab:blue", "circular_spline": "tab:red"}
 
 
 def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> bytes:
-    """Draw one tooth of each member as PNG, with the pitch points at the same height.
+    """Draw one tooth of each member as PNG, with the pitch circles at the same height.
 
     The left panel shows both teeth and marks the junctions of their segments. The right
     panel shows the flexspline tooth in a tooth space of the circular spline.
@@ -44,7 +44,7 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
             for side in (1.0, -1.0):
                 mirror = np.array([side, 1.0])
                 rotation = np.array([[c, s], [-s, c]])
-                # the mirrored flank of the next tooth is the other side of the space
+                # the mirrored flank of the next tooth is on the other side of the space
                 points = (line * mirror) @ (rotation if side < 0 else rotation.T).T
                 x, y = (points - shift).T / mm
                 name = label if side > 0 else None
@@ -52,8 +52,8 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
                 if k == 0:
                     x, y = (marks * mirror - shift).T / mm
                     ax.plot(x, y, ".", color=colour, ms=5)
-    axes[0].set_title("one tooth of each member, dots at the junctions")
-    axes[1].set_title("tooth in a tooth space, pitch circles touching")
+    axes[0].set_title("one tooth of each member, dots at segment junctions")
+    axes[1].set_title("flexspline tooth in a tooth space, pitch circles touching")
     for ax in axes:
         ax.set_aspect("equal")
         ax.axhline(0.0, color="0.7", lw=0.8, ls="--")

@@ -30,12 +30,13 @@ if TYPE_CHECKING:
 def comparison_png(
     runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
 ) -> Path:
-    """Write the picture of :func:`comparison_figure`.
+    """Write the picture of :func:`comparison_figure` as a PNG file.
 
     Args:
         runs: Runs by name.
         path: PNG file to write.
-        rigid: Run to which tool errors refer; None for the commanded path.
+        rigid: Run of the rigid arm to which tool errors refer; None for the commanded
+            path.
 
     Returns:
         The path.
@@ -46,12 +47,14 @@ def comparison_png(
 def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> Figure:
     """Draw torsion, transmission error, ripple with its orders, and tool error of runs.
 
-    The plots over time show the joint with the largest ripple among those whose
-    strongest order is resolved. The bars show all joints.
+    Torsion, error and ripple are those of the joint with the largest torque deviation
+    [N·m] among those whose strongest order is resolved. The bars show all joints.
+    Rigid runs are omitted if another run is not rigid.
 
     Args:
         runs: Runs by name.
-        rigid: Run to which tool errors refer; None for the commanded path.
+        rigid: Run of the rigid arm to which tool errors refer; None for the commanded
+            path.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -80,7 +83,7 @@ def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> F
     steady = first.time[first.steady][[0, -1]]
     for axis in (axes[0, 0], axes[0, 1], axes[2, 0]):
         axis.axvspan(*steady, color="0.94", zorder=0)
-        axis.set_xlabel("time [s]   (shaded: constant speed, used for the figures)")
+        axis.set_xlabel("time [s]   (shaded: used for the figures)")
         axis.margins(x=0)
     _label(axes[0, 0], f"{name}: torsion", "torsion [arcmin]")
     _label(axes[0, 1], f"{name}: transmission error", "output − ideal output [arcmin]")
@@ -92,7 +95,7 @@ def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> F
         "amplitude [% of rated torque]",
     )
     axes[1, 1].set_xlabel("order [cycles per input turn]")
-    against = "the rigid arm" if rigid is not None else "the commanded path"
+    against = "that of the rigid arm" if rigid is not None else "the commanded path"
     _label(axes[2, 0], f"tool: distance from {against}", "distance [mm]")
     _label(axes[2, 1], "all joints: torque ripple", "peak to peak [% of rated torque]")
     handles, names = axes[0, 0].get_legend_handles_labels()
@@ -112,20 +115,24 @@ def draw_ripple(
 ) -> None:
     """Draw the ripple over the last half turn of the input, and its order spectrum.
 
+    No spectrum is drawn for a joint without constant speed or with less than half an
+    input turn.
+
     Args:
-        over_turns: Axes of the ripple.
-        over_order: Axes of the spectrum.
+        over_turns: Axes of the ripple, in percent of rated torque.
+        over_order: Axes of the spectrum, in percent of rated torque.
         run: The run.
         j: Index of the joint.
         style: Keyword arguments of the lines.
-        line: Function that draws the spectrum on given axes; None for their ``plot``.
+        line: Function that draws the spectrum; it takes the axes and then the arguments
+            of their ``plot`` method, which is the default.
     """
     transmission = run.assembly.transmissions[j]
     scale = 100.0 / transmission.drive.ratings.rated_torque
     angle = run.motor_position[run.steady, j]
     ripple = scale * torque_ripple(run, j)
     turns = np.abs(angle - angle[0]) / (2.0 * np.pi)
-    part = turns >= turns[-1] - 0.5  # in half a turn the tooth order is visible
+    part = turns >= turns[-1] - 0.5  # half a turn is short enough to show single teeth
     over_turns.plot(turns[part], ripple[part], **style)
     over_turns.margins(x=0)
     spectrum, highest = order_spectrum(angle, ripple), highest_resolved_order(run, j)
@@ -139,6 +146,7 @@ def draw_ripple(
 
 
 def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None:
+    """Draw the peak-to-peak torque ripple of all joints, one bar per run."""
     first = next(iter(runs.values()))
     width = 0.8 / len(runs)
     ticks = []

@@ -11,7 +11,7 @@ from swgjoint.pictures import png
 
 
 def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> bytes:
-    """Draw the time over the size with the fitted power law as PNG.
+    """Draw the CPU time over the size of the problem, with fitted power laws, as PNG.
 
     Args:
         result: JSON object of the benchmark, with ``rows`` and ``fits``.
@@ -30,7 +30,7 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
         if (fit := fits.get(sweep)) is not None:
             x = np.array([r["size"] for r in rows if r["size"] >= fit["from_size"]])
             y = fit["coefficient"] * x ** fit["exponent"]
-            ax.loglog(x, y, "k--", lw=1.0, label=f"power {fit['exponent']:.2f}")
+            ax.loglog(x, y, "k--", lw=1.0, label=f"exponent {fit['exponent']:.2f}")
             ax.legend(fontsize="small")
         ax.set(xlabel=label, ylabel="CPU time [s]")
         if rows:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 SHOWN = 0.2
-"""Upper bound of the drawn deflection, relative to the size of the section [-]."""
+"""Largest drawn deflection, relative to the size of the section [-]."""
 STATES = {
     "wave_generator": "wave generator alone",
     "meshed": "meshed",
@@ -28,7 +28,11 @@ STATES = {
 
 
 def solid_pictures(run: SolidRun) -> dict[str, bytes]:
-    """PNG files by name: the loaded cup, its coning, contacts of the last position."""
+    """PNG files by name: sections of the loaded cup, its coning, and contact forces.
+
+    The contact forces are those of the last solved position; without one they are
+    missing.
+    """
     pictures = {
         "cup_section": section_picture(run, run.setup[-1].state),
         "coning": coning_picture(run),
@@ -39,7 +43,7 @@ def solid_pictures(run: SolidRun) -> dict[str, bytes]:
 
 
 def contact_picture(run: SolidRun, state: SolidState) -> bytes:
-    """Draw the contact forces over face width and angle from the lobe as PNG.
+    """Draw the contact forces over the face width and the angle from the lobe as PNG.
 
     Args:
         run: The simulation.
@@ -53,8 +57,8 @@ def contact_picture(run: SolidRun, state: SolidState) -> bytes:
     angle, flanks, bore = contact_forces(run.model, state)
     width = float(np.median(np.diff(np.sort(angle)))) / deg
     for ax, force, title in (
-        (above, flanks, "force of the teeth of the circular spline [N per plane]"),
-        (below, bore, "force of the wave generator [N per plane and tooth]"),
+        (above, flanks, "force of the circular spline [N per axial plane and tooth]"),
+        (below, bore, "force of the wave generator [N per axial plane and tooth]"),
     ):
         order = np.argsort(angle)
         edges = np.append(angle[order] / deg - 0.5 * width, angle[order[-1]] / deg)
@@ -62,7 +66,7 @@ def contact_picture(run: SolidRun, state: SolidState) -> bytes:
         shown = np.ma.masked_less_equal(force[order].T, 0.0)
         mesh = ax.pcolormesh(edges, lines, shown, cmap="viridis")
         figure.colorbar(mesh, ax=ax)
-        ax.set(title=title, xlabel="tooth from the lobe [deg]")
+        ax.set(title=title, xlabel="angle of the tooth from the lobe [deg]")
         ax.set_ylabel("z [mm], open end below")
         ax.set_facecolor("0.95")
     return _png(figure)
@@ -79,8 +83,8 @@ def contact_forces(
 
     Returns:
         Angles of the teeth from the closer of two lobes (N,) [rad]; forces of the
-        circular spline, summed over both flanks, and forces of the wave generator, both
-        (N, n_planes) [N].
+        circular spline, with the magnitudes of both flanks added, and forces of the
+        wave generator, both (N, n_planes) [N].
     """
     sectors, planes = model.sectors, model.strip.planes
     x = model.masters(state).mean(axis=1)
@@ -95,7 +99,9 @@ def contact_forces(
 
 
 def section_picture(run: SolidRun, state: SolidState) -> bytes:
-    """Draw sections of the cup at both axes, at rest and deflected, as PNG.
+    """Draw axial sections of the cup at the major and minor axis as PNG.
+
+    Each section is shown at rest and with a magnified deflection.
 
     Args:
         run: The simulation.
@@ -128,7 +134,7 @@ def section_picture(run: SolidRun, state: SolidState) -> bytes:
             still = part.rest[outline(part.cells)] / mm
             ax.add_collection(LineCollection(list(still), colors="k", linewidths=0.6))
         ax.autoscale()
-        ax.set_title(f"{title} axis: deflection x {larger:g}, at rest in black")
+        ax.set_title(f"{title} axis: deflection × {larger:g} (black: at rest)")
         ax.set_xlabel("z [mm], open end on the left")
         ax.set_aspect("equal")
         ax.grid(alpha=0.3)
@@ -137,15 +143,15 @@ def section_picture(run: SolidRun, state: SolidState) -> bytes:
 
 
 def magnification(most: float, size: float) -> float:
-    """Magnification of a deflection: 1, 2 or 5 times a power of ten.
+    """Magnification of a deflection in a picture: 1, 2 or 5 times a power of ten.
 
     Args:
         most: Largest deflection [m].
-        size: Size of the picture [m].
+        size: Size of the drawn object [m].
 
     Returns:
-        Largest such factor with a drawn deflection of at most :data:`SHOWN` times the
-        size [-].
+        Largest such factor for which the drawn deflection is at most :data:`SHOWN`
+        times the size [-].
     """
     wanted = SHOWN * size / max(most, 1e-12)
     power = 10.0 ** np.floor(np.log10(wanted))
@@ -153,16 +159,16 @@ def magnification(most: float, size: float) -> float:
 
 
 def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Edges that belong to one quadrilateral only, as pairs of point numbers (n, 2)."""
+    """Edges that belong to a single quadrilateral, as pairs of point numbers (n, 2)."""
     edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
     unique, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     return np.asarray(unique[count == 1])
 
 
 def coning_picture(run: SolidRun) -> bytes:
-    """Draw the radial displacement under the teeth over the face width as PNG.
+    """Draw the radial displacement of the bore over the face width as PNG.
 
-    The lines are the states of the set-up.
+    Each line is a state of the set-up: wave generator inserted, meshed, loaded.
     """
     from matplotlib.figure import Figure
 

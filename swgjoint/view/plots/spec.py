@@ -1,4 +1,4 @@
-"""Picture of a spec sheet: loop, error over a turn, order spectrum, losses."""
+"""Picture of a spec sheet: torque loop, transmission error, orders, efficiency."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ _ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab
 
 
 def spec_picture(name: str, sheet: SpecSheet) -> bytes:
-    """Draw the curves from which the figures were read as PNG.
+    """Draw the curves from which the figures of a spec sheet were read as PNG.
 
-    A panel without a curve shows the reason.
+    A panel without a curve shows the reason; without friction there is no efficiency
+    panel.
 
     Args:
         name: Name of the drive.
@@ -111,7 +112,7 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
         largest = max(largest, float(amplitude.max(initial=0.0)))
         keep = amplitude > 1e-4 * amplitude.max(initial=1e-300)
         drawn |= set(order[keep].tolist())
-        shift = 1.0 + 0.02 * k  # side by side on the logarithmic axis
+        shift = 1.0 + 0.02 * k  # draws the lines side by side on a logarithmic axis
         ax.vlines(order[keep] * shift, 0.0, amplitude[keep], color=colour, label=label)
     ax.set_xscale("log")
     ax.xaxis.set_minor_formatter(NullFormatter())
@@ -125,7 +126,7 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
 
 
 def _losses(ax: Any, sheet: SpecSheet) -> None:
-    ax.set_title("efficiency over the load")
+    ax.set_title("efficiency over the output torque")
     ax.set_xlabel("output torque [N·m]")
     ax.set_ylabel("efficiency [%]")
     assert sheet.losses is not None
@@ -142,6 +143,7 @@ def _losses(ax: Any, sheet: SpecSheet) -> None:
 
 
 def _absent(ax: Any, reason: str) -> None:
+    """Show the reason why a panel has no curve."""
     ax.set_xlabel("")
     ax.set_ylabel("")
     ax.set_xticks([])

@@ -23,17 +23,20 @@ _SCHEMES = {
     "native tendon": "tab:olive",
     "RK4": "tab:red",
 }
+"""Colours of the schemes, in the sequence in which their bars are drawn."""
 
 
 def stability_picture(rows: Sequence[StabilityRow], *, scheme: str, free: str) -> bytes:
     """Draw the results of the stability study as PNG.
 
-    Panels: share of the outcomes by scheme and group, number of sub-steps, numerical
-    damping ratio, error of the link, and energy change of the long free runs.
+    The panels show the share of each outcome by scheme and group, the number of
+    sub-steps, the numerical damping ratio, the error of the link angle, and the energy
+    change of the long free runs.
 
     Args:
         rows: Rows of the study.
-        scheme: Scheme that the joint uses; the others are drawn for comparison.
+        scheme: Scheme that the joint uses, whose sub-steps are shown; the other schemes
+            are drawn for comparison.
         free: Group of the long free runs.
     """
     from matplotlib.figure import Figure
@@ -61,7 +64,11 @@ def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
             outcomes = [r.outcome for r in rows if (r.scheme, r.group) == name]
             share.append(100.0 * outcomes.count(outcome) / len(outcomes))
         axis.barh(
-            range(len(names)), share, left=left, color=_COLOURS[outcome], label=outcome
+            range(len(names)),
+            share,
+            left=left,
+            color=_COLOURS[outcome],
+            label=outcome.replace("_", " "),
         )
         left = [a + b for a, b in zip(left, share, strict=True)]
     axis.set_yticks(
@@ -76,7 +83,7 @@ def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Cumulative share of the runs over the number of sub-steps."""
+    """Cumulative share of the runs over the number of sub-steps, by time step."""
     for step in sorted({row.step_s for row in rows}):
         parts = sorted(row.sub_steps or 100 for row in rows if row.step_s == step)
         share = [100.0 * (k + 1) / len(parts) for k in range(len(parts))]
@@ -85,14 +92,14 @@ def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
     axis.set_xscale("log")
     axis.set_xlim(0.9, 100)
     axis.set_ylim(0, 101)
-    axis.set_xlabel("sub-steps (more than 64 are refused)")
+    axis.set_xlabel("number of sub-steps (runs that need more than 64 are refused)")
     axis.set_ylabel("share of the runs [%]")
-    axis.legend(fontsize="small", title="step")
+    axis.legend(fontsize="small", title="time step")
     axis.grid(alpha=0.3)
 
 
 def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Numerical damping ratio of the schemes, and damping ratio of the drives."""
+    """Damping ratios over the phase advance per step: of the schemes and the drives."""
     for scheme, colour in _SCHEMES.items():
         if scheme == "discrete, never cut":
             continue
@@ -121,7 +128,7 @@ def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Largest error of the link angle in the free runs."""
+    """Largest error of the link angle in the free runs over phase advance per step."""
     for scheme, colour in _SCHEMES.items():
         points = [
             (row.phase_step, row.error)
@@ -140,7 +147,7 @@ def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Relative energy change at the end of the free runs of ten seconds."""
+    """Relative energy change in the last tenth of the free runs of ten seconds."""
     known = [row for row in rows if row.energy_balance is not None]
     axis.plot(
         [row.phase_step for row in known],
@@ -152,7 +159,7 @@ def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
         axis.axhline(limit, color="0.6", lw=1)
     axis.set_xlabel("step times torsion frequency [rad]")
     axis.set_title(
-        "catalogue drives, 10 s free at 1 ms: energy change [%]", fontsize=10
+        "energy change [%], catalogue drives, 10 s free at 1 ms", fontsize=10
     )
     axis.grid(alpha=0.3)
 

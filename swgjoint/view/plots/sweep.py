@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from swgjoint.explore.sweep.sweep import SweepResult
 
 MOST = 6
-"""Largest number of parameters and of figures in a picture; the first are drawn."""
+"""Largest number of parameters, and of figures, in a picture; the first ones are
+drawn."""
 
 
 def sweep_picture(result: SweepResult) -> bytes:
@@ -75,7 +76,7 @@ def _numbers(values: Sequence[Any]) -> Any:
 
 
 def _places(values: Sequence[Any]) -> tuple[Any, list[str] | None]:
-    """Positions on the axis, and labels if the values are not numbers."""
+    """Positions on the axis, and tick labels if the values are not all numbers."""
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         return np.array(values, dtype=float), None
     labels = list(dict.fromkeys(str(value) for value in values))
@@ -84,7 +85,11 @@ def _places(values: Sequence[Any]) -> tuple[Any, list[str] | None]:
 
 
 def label_of(key: str) -> str:
-    """Last part of a key in words with its unit, followed by the joint, if any."""
+    """Last part of a dotted key in words, with its unit.
+
+    If only the part before it has a unit, the last part is the name of a joint, which
+    then follows after a comma.
+    """
     *above, last = key.split(".")
     name, unit = split_unit(last)
     joint = ""

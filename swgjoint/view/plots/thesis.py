@@ -1,4 +1,4 @@
-"""Plots of the recomputed figures of the thesis, one picture per part."""
+"""Pictures of the recomputed results of the thesis, one per part."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ _NOMINAL, _TENTH, _SOURCE = "tab:red", "tab:blue", "black"
 def group_picture(results: Sequence[CaseRecords]) -> bytes:
     """Draw the stresses of one part as PNG.
 
-    The upper panels show the largest stresses over the parameter, or as bars if the
-    part has no parameter. The lower panels show the stresses over the turn.
+    The upper panels show the stresses of all cases over the parameter, or as bars if
+    the part has no parameter. The lower panels show the von Mises stress over the turn.
+    T is the torque of the case.
 
     Args:
-        results: Cases of one group.
+        results: Cases of one part.
     """
     from matplotlib.figure import Figure
 
@@ -59,10 +60,10 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
 
 
 def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Draw the stress over the parameter at both torques on two meshes.
+    """Draw the stress over the parameter at T and T/10, with the printed values.
 
-    The meshes are refinement 1 and the finest one. Crosses are the values printed in
-    the thesis.
+    The meshes are refinement 1 and the finest one, if there is a finer one. Crosses are
+    the values that the thesis prints.
     """
     values = [result.case.entry.value for result in results]
     for tenth, colour, label in ((False, _NOMINAL, "T"), (True, _TENTH, "T/10")):
@@ -78,7 +79,7 @@ def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
 
 
 def _bars(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Draw bars of the thesis, T/10 and T; dashes are results of the finest mesh."""
+    """Draw bars of the thesis, T/10 and T; dashes are results on the finest mesh."""
     names = [result.case.group.name_of(result.case.entry) for result in results]
     series = (
         ("thesis", _SOURCE, [r.case.entry.printed[kind] for r in results], None),
@@ -105,7 +106,10 @@ def _bars(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
 
 
 def _turn(axis: Any, results: Sequence[CaseRecords], *, tenth: bool) -> None:
-    """Draw the von Mises stress over the turn, one line per case, as in the thesis."""
+    """Draw the von Mises stress over the turn, one line per case.
+
+    Cases with fewer than three positions, and repeated results, are omitted.
+    """
     from matplotlib import colormaps
 
     colours = colormaps["viridis"]
@@ -130,5 +134,5 @@ def _turn(axis: Any, results: Sequence[CaseRecords], *, tenth: bool) -> None:
 
 
 def _number(value: float | None) -> float:
-    """A number, or NaN for a missing value, which leaves a gap."""
+    """The value, or NaN if it is missing, which leaves a gap in a line."""
     return float("nan") if value is None else value

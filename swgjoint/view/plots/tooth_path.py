@@ -19,10 +19,10 @@ SHOWN = 25
 
 
 def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
-    """Draw a tooth at equal steps in its space, and its clearance, as PNG.
+    """Draw the positions of a tooth in its space, and its clearance, as PNG.
 
-    The teeth are rigid and follow the shape of the neutral line. Elastic deformation
-    must take up an overlap.
+    The tooth is rigid and follows the prescribed neutral line. In a real drive, elastic
+    deformation would have to take up an overlap.
 
     Args:
         design: The design.
@@ -34,7 +34,7 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     space, clearance = figure.subplots(1, 2)
     ring = tooth_profile(design, "circular_spline")
     outline, _, _ = ring.evaluate(np.linspace(0.0, ring.stations[-1], 200))
-    # the axis of the space is half a pitch from that of the tooth that bounds it
+    # the axis of the space is half a pitch from the axis of a tooth next to it
     cos, sin = np.cos(ring.half_pitch), np.sin(ring.half_pitch)
     x, y = -outline[:, 0], outline[:, 1]
     right = np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
@@ -53,7 +53,9 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     space.set_aspect("equal")
     space.set_xlabel("x [mm]")
     space.set_ylabel("y [mm]")
-    space.set_title("right flank in its space, path of the tip", fontsize="medium")
+    space.set_title(
+        "positions of the right flank, path of the tip (dotted)", fontsize="medium"
+    )
     clearance.plot(path.theta / deg, path.clearance / um, color="tab:blue")
     clearance.axhline(0.0, color="0.5", lw=0.8)
     worst = path.worst
@@ -65,7 +67,8 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     clearance.set_ylabel("clearance [µm] (negative: overlap)")
     where = path.where[worst].replace("_", " ")
     clearance.set_title(
-        f"smallest {path.smallest_clearance / um:.3g} µm ({where})", fontsize="medium"
+        f"smallest clearance {path.smallest_clearance / um:.3g} µm ({where})",
+        fontsize="medium",
     )
     clearance.grid(alpha=0.3)
     figure.suptitle(f"{design.drive.name}: passage of a rigid tooth")

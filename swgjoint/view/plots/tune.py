@@ -23,7 +23,7 @@ COLORS = ("0.45", "C1", "C2", "C0")
 
 
 def claims(tuned: Tuned) -> list[str]:
-    """Findings of a tuning run in sentences, one line each."""
+    """Findings of a tuning run, one line each; costs are mean ± standard deviation."""
     baseline, best = tuned.baseline, tuned.best
     better = int((best.held_out < baseline.held_out).sum())
     count = best.held_out.size
@@ -36,15 +36,15 @@ def claims(tuned: Tuned) -> list[str]:
         _, pd, ruled, _ = tuned.candidates
         lines += [
             f"tuning the two gains of PD alone: {_cost(pd)}, {_less(tuned, pd)}",
-            f"feed-forward alone, gains by the rule: {_cost(ruled)},"
+            f"feed-forward alone, with gains by the rule: {_cost(ruled)},"
             f" {_less(tuned, ruled)}; tuning changes this cost by"
             f" {100.0 * (best.held_out.mean() / ruled.held_out.mean() - 1.0):+.0f} %",
         ]
     wide = best.held_out.mean() / best.training.mean() - 1.0
     lines.append(
-        f"{best.name}: cost {best.training.mean() / arcmin:.3g} arcmin on the seeds of"
-        f" the search, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'} on"
-        " the held-out seeds"
+        f"{best.name}: cost {best.training.mean() / arcmin:.3g} arcmin on the training"
+        f" seeds, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'} on the"
+        " held-out seeds"
     )
     at_bound = [
         p.key
@@ -94,7 +94,7 @@ def write_files(tuned: Tuned, folder: Path) -> list[str]:
 
 
 def picture(tuned: Tuned) -> bytes:
-    """Draw the searches, the costs by held-out seed and one episode as PNG."""
+    """Draw the searches, the cost of every held-out seed and one episode as PNG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 7.5), layout="constrained")
@@ -117,9 +117,9 @@ def _draw_search(ax: Any, tuned: Tuned) -> None:
         ax.axhline(level, color=color, ls="--", lw=1.0, label=one.name)
     ax.set(
         yscale="log",
-        xlabel="candidates",
+        xlabel="number of evaluated candidates",
         ylabel="mean cost [arcmin]",
-        title=f"search on {tuned.settings.training} seeds",
+        title=f"search on {tuned.settings.training} training seeds",
     )
     _plain_ticks(ax)
     ax.legend()
@@ -135,7 +135,7 @@ def _draw_seeds(ax: Any, tuned: Tuned) -> None:
         yscale="log",
         xlabel="seed",
         ylabel="cost [arcmin]",
-        title="held-out seeds, and their means",
+        title="cost on held-out seeds (lines: means)",
     )
     # leave room for the legend above the points
     ax.set_ylim(top=4.0 * tuned.baseline.held_out.max() / arcmin)
@@ -154,12 +154,16 @@ def _draw_episode(axes: Any, tuned: Tuned) -> None:
         style = {"color": color, "lw": 1.0, "label": one.name}
         axes[0].plot(trace.time, trace.error[:, k] / arcmin, **style)
         axes[1].plot(trace.time, trace.torque[:, k], **style)
-    axes[0].set(ylabel="link minus reference [arcmin]", title=f"seed {seed}: error")
-    axes[1].set(ylabel="motor torque [N·m]", title=f"seed {seed}: torque, reference")
+    axes[0].set(
+        ylabel="link angle minus reference [arcmin]", title=f"seed {seed}: error"
+    )
+    axes[1].set(
+        ylabel="motor torque [N·m]", title=f"seed {seed}: motor torque and reference"
+    )
     other = axes[1].twinx()
     trace = tuned.best.trace
     other.plot(trace.time, np.degrees(trace.reference[:, k]), color="0.75", lw=1.0)
-    other.set_ylabel("reference of the link [deg] (grey)")
+    other.set_ylabel("reference of the link angle [deg] (grey)")
     for ax in axes:
         ax.set_xlabel("time [s]")
         ax.margins(x=0)
@@ -167,7 +171,7 @@ def _draw_episode(axes: Any, tuned: Tuned) -> None:
 
 
 def _plain_ticks(ax: Any) -> None:
-    """Plain numbers instead of powers of ten on a short logarithmic axis."""
+    """Label a short logarithmic axis with plain numbers instead of powers of ten."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -201,20 +205,22 @@ def _summary(tuned: Tuned) -> Table:
             ("controller", ""),
             ("cost, held-out seeds", "arcmin"),
             ("standard deviation", "arcmin"),
-            ("cost, seeds of the search", "arcmin"),
-            ("reduction against the textbook rule", "%"),
-            ("episodes with a broken limit", f"of {s.held_out}"),
+            ("cost, training seeds", "arcmin"),
+            ("reduction relative to the textbook rule", "%"),
+            ("held-out episodes that exceed a limit", f"of {s.held_out}"),
         ],
         rows=rows,
         notes=[
-            "Cost of an episode: square root of the mean of e² + s² w u², with the"
-            " error e of the link, the motor torque u over its limit, s ="
-            f" {tuned.error_scale / arcmin:g} arcmin, w = {tuned.effort_weight:g}; at"
-            f" most {tuned.worst / arcmin:.0f} arcmin.",
-            "Textbook rule: the natural frequency is a third of the anti-resonance of"
-            f" the nominal link on its drive, {tuned.anti_resonance:.3g} Hz; the"
-            " damping ratio is 0.7.",
-            f"Environment: {plant}. Optimiser {s.optimiser}, seed {s.seed},"
+            "The cost of an episode is the square root of the mean of e² + s² w u²,"
+            " with the error e of the link angle, the ratio u of the motor torque to"
+            f" its limit, s = {tuned.error_scale / arcmin:g} arcmin and"
+            f" w = {tuned.effort_weight:g}. It is at most"
+            f" {tuned.worst / arcmin:.0f} arcmin.",
+            "The textbook rule sets the natural frequency to one third of the"
+            " anti-resonance of the nominal link on its drive"
+            f" ({tuned.anti_resonance:.3g} Hz) and the damping ratio to 0.7.",
+            f"Settings of the environment: {plant}."
+            f" Optimiser {s.optimiser}, seed {s.seed},"
             f" {sum(x.evaluations for x in tuned.searches.values())} candidates,"
             f" {tuned.wall:.0f} s.",
         ],
@@ -242,7 +248,7 @@ def _gains(tuned: Tuned) -> Table:
         header=[
             ("gain", ""),
             *((one.name, "") for one in tuned.candidates),
-            ("bounds", ""),
+            ("bounds of the search", ""),
         ],
         rows=rows,
     )
@@ -266,12 +272,13 @@ def _by_seed(tuned: Tuned) -> Table:
     names = [(one.name, "arcmin") for one in tuned.candidates]
     return Table(
         title="Cost by held-out seed",
-        header=[("seed", ""), *names, ("reduction against the textbook rule", "%")],
+        header=[("seed", ""), *names, ("reduction relative to the textbook rule", "%")],
         rows=rows,
     )
 
 
 def _best_place(tuned: Tuned) -> list[float]:
+    """Positions of the tuned parameters between their bounds, logarithmic, 0 to 1."""
     values = tuned.best.values
     return [
         float(np.log(values[p.key] / p.low) / np.log(p.high / p.low))
@@ -280,10 +287,12 @@ def _best_place(tuned: Tuned) -> list[float]:
 
 
 def _cost(one: GainCandidate) -> str:
+    """Mean and standard deviation of the held-out costs as text."""
     mean, spread = one.held_out.mean() / arcmin, one.held_out.std(ddof=1) / arcmin
     return f"{mean:.3g} ± {spread:.2g} arcmin"
 
 
 def _less(tuned: Tuned, one: GainCandidate) -> str:
+    """Reduction of the cost compared with the textbook rule as text."""
     saved = 100.0 * tuned.improvement(one)
     return f"{abs(saved):.1f} % {'less' if saved >= 0 else 'more'}"
