@@ -202,8 +202,9 @@ def omissions_of(run: Run) -> list[str]:
     for item in run.contains["left_out"]:
         joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
     return [
-        f"left out: {part} ({reason})"
+        "left out"
         + ("" if len(names) == len(run.joints) else f" in {', '.join(names)}")
+        + f": {part}: {reason}"
         for (part, reason), names in joints.items()
     ]
 

@@ -8,7 +8,7 @@ from typing import Any
 from swgjoint.pictures import png
 
 STYLES = {
-    "ring": ("C2", "^", "thin rings"),
+    "ring": ("C2", "^", "thin ring"),
     "2d linear": ("C0", "x", "2D, linear"),
     "2d": ("C0", "s", "2D"),
     "3d linear": ("C3", "x", "3D, linear"),
