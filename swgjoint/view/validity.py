@@ -177,9 +177,8 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
         if off is not None and off > max(OFF_COMMAND, LAG * share):
             lines.append(
                 f"{name}: the link deviates from its command by up to {off:.2g} deg at"
-                " constant speed; the drive accounts for at most"
-                f" {60.0 * share:.2g} arcmin of this, the control loop for the rest"
-                " (friction, gains, motor limits)"
+                f" constant speed; the drive accounts for at most {share:.2g} deg of"
+                " this, the control loop for the rest (friction, gains, motor limits)"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:
