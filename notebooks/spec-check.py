@@ -70,9 +70,9 @@ for row in rows:
 
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained", sharey=True)
 titles = (
-    "peak torque of its rating",
-    "cubed mean of rated torque",
-    "tool off path [mm]",
+    "peak torque / repeated peak",
+    "cubic mean torque / rated torque",
+    "tool path error, rms [mm]",
 )
 for axis, (key, limit), title in zip(axes, spec.items(), titles, strict=True):
     values = [getattr(row, key) for row in rows]
@@ -118,7 +118,7 @@ whole = rows[sizes.index("CSG-20-100")].tool_path_rms_mm
 figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
 axis.barh([short(joint) for joint in shares], list(shares.values()))
 axis.axvline(whole, color="black", ls="--", lw=1, label="all joints together")
-axis.set_xlabel("tool off its path, rms [mm], drives of size 20")
+axis.set_xlabel("tool path error, rms [mm], drives of size 20")
 axis.invert_yaxis()
 axis.legend()
 for joint, share in shares.items():

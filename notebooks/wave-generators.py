@@ -108,8 +108,9 @@ assert error["elliptical"] == min(error.values())
 # %% [markdown]
 # ## On the arm
 #
-# A slow sweep of a UR5e, once with each drive in all joints. `error ripple` is what the
-# link trembles by at the tooth order, `torsion` what its weight winds up.
+# A slow sweep of a UR5e, once with each drive in all joints. `ripple rms` [% of rated
+# torque] and mean `torsion` [arcmin] are those of the worst joint; `tool` [mm, rms] is
+# the distance of the tool from that of the rigid arm.
 
 # %%
 scene = Scene.load_file("ur5e-sweep")

@@ -19,6 +19,8 @@ _LABELS = {
 def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | None:
     """Draw the histogram of every figure, and the yield for any limit on it, as PNG.
 
+    Drives without a solution count as drives that miss the limit.
+
     Args:
         result: Result of :func:`swgjoint.explore.lot.run_lot`.
         lower: Keys of the figures that have a lower limit; the others have an upper
@@ -39,7 +41,7 @@ def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | No
     for (above, below), key in zip(axes.T, keys, strict=True):
         values = np.sort([row[key] for row in rows if row[key] is not None])
         above.hist(values, bins="auto", color="tab:blue", alpha=0.6)
-        # drives without a solution count as not meeting the limit
+        # the total includes drives without a solution, which miss every limit
         part = np.arange(1, values.size + 1) / len(rows)
         if key in lower:
             part = part[::-1]

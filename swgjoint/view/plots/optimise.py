@@ -20,7 +20,7 @@ Axes = Any  # matplotlib is imported only when a picture is drawn
 
 
 def optimum_picture(optimum: Optimum) -> bytes:
-    """Draw the Pareto front, the best values so far, and its parameters as PNG."""
+    """Draw the Pareto front, the best values so far, and front parameters as PNG."""
     from matplotlib.figure import Figure
 
     canvas = Figure(figsize=(16.0, 5.4), layout="constrained")

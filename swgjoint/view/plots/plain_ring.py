@@ -75,7 +75,7 @@ def _around(ax: Any, case: RingCase, fine: int) -> None:
 
 
 def _inward(ax: Any, cases: Sequence[RingCase], fine: int, total: float) -> None:
-    """Draw b_G over a_G of all rings, and both thin-ring results."""
+    """Draw b_G over a_G of all rings, both thin-ring results, and the given total."""
     for case in cases:
         deflection = case.pulled[fine].deflection
         ax.plot(deflection[:, 0] / mm, -deflection[:, 1] / um, ".-", label=case.name)

@@ -99,7 +99,7 @@ def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Damping ratios over the phase advance per step: of the schemes and the drives."""
+    """Damping ratios of the schemes and drives over the phase advance per step."""
     for scheme, colour in _SCHEMES.items():
         if scheme == "discrete, never cut":
             continue
@@ -147,7 +147,7 @@ def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Relative energy change in the last tenth of the free runs of ten seconds."""
+    """Relative energy change after ten seconds, the mean over the last tenth."""
     known = [row for row in rows if row.energy_balance is not None]
     axis.plot(
         [row.phase_step for row in known],
