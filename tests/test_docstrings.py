@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -36,3 +38,30 @@ def test_there_are_examples():
         module = import_module(".".join(("swgjoint", *parts)))
         names |= {test.name for test in finder.find(module) if test.examples}
     assert len(names) >= 20
+
+
+def public_functions(node: ast.AST) -> Iterator[ast.FunctionDef]:
+    """Functions and methods whose name, like that of their class, is public."""
+    for child in ast.iter_child_nodes(node):
+        if getattr(child, "name", "_").startswith("_"):
+            continue
+        if isinstance(child, ast.ClassDef):
+            yield from public_functions(child)
+        elif isinstance(child, ast.FunctionDef):
+            yield child
+
+
+def test_arguments_are_described():
+    """Public functions with two or more arguments say what each means."""
+    silent = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for function in public_functions(ast.parse(path.read_text(encoding="utf-8"))):
+            if any(ast.unparse(one) == "overload" for one in function.decorator_list):
+                continue
+            given = function.args
+            names = [one.arg for one in [*given.posonlyargs, *given.args]]
+            names += [one.arg for one in given.kwonlyargs]
+            text = ast.get_docstring(function) or ""
+            if len(set(names) - {"self", "cls"}) > 1 and "Args:" not in text:
+                silent.append(f"{path.relative_to(PACKAGE)}: {function.name}")
+    assert silent == []
