@@ -1,4 +1,4 @@
-"""Reasons why a value differs from the printed one, derived from the runs."""
+"""Reasons why our values differ from printed ones, derived from the runs."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 WITHIN = 15.0
-"""Deviation beyond which a row needs a reason [%]."""
+"""Deviation from the printed value beyond which a row needs a reason [%]."""
 MESH = 5.0
-"""Change between the mesh of the thesis and the finest mesh that is reported [%]."""
+"""Change from the mesh of the thesis to the finest mesh beyond which the reason names
+the mesh [%]."""
 SETTLED = 2.0
-"""Largest change from the second finest to the finest mesh of a settled value [%]."""
+"""Change from the second finest to the finest mesh up to which a stress counts as
+settled [%]."""
 
 _PLACES = {
     "fillet": "in the tooth fillets",
@@ -32,9 +34,9 @@ class Facts:
     nominal: float | None
     """Stress at T."""
     away: float | None
-    """Stress at the judged load, away from loaded tooth contacts."""
+    """Stress at the judged load, away from loaded tooth contacts; None if unknown."""
     fine: float | None
-    """Stress at the judged load on the finest mesh."""
+    """Stress at the judged load on the finest mesh; None if it was not computed."""
     places: Mapping[str, int]
     """Number of positions with the largest stress at each place."""
     load: str = "T/10"
@@ -42,10 +44,12 @@ class Facts:
     tenth: float | None = None
     """Stress at T/10 if rows are judged at T."""
     by_mesh: Mapping[float, float] = field(default_factory=dict)
-    """Stress at T by refinement; empty unless every row reports it. The largest
-    stresses in 3D, at edge contacts, grow with mesh refinement."""
+    """Stress at T by mesh refinement, which the reason of every 3D row lists; empty in
+    2D. In 3D the largest stresses, at edge contacts, grow with mesh refinement."""
     failures: tuple[str, ...] = ()
+    """Messages of failed runs."""
     note: str = ""
+    """What the source leaves open."""
 
 
 def percent(value: float | None, reference: float | None) -> float | None:
@@ -61,12 +65,12 @@ def percent(value: float | None, reference: float | None) -> float | None:
 
 
 def reason_for(facts: Facts) -> str | None:
-    """Reason of a row; None if there is nothing to explain.
+    """Reason why a stress deviates from the printed value; None if none is needed.
 
     Failures are always listed, and so are the stresses by mesh if they are known. If
-    the deviation exceeds 15 % at the judged load (T/10, in 3D T), the reason names the
-    place of the stress, the influence of contacts and mesh, and what the source leaves
-    open. If it exceeds 15 % only at T, the reason is the torque.
+    the deviation exceeds 15 % at the judged load (T/10 in 2D, T in 3D), the reason
+    names the place of the stress, the influence of contacts and mesh, and what the
+    source leaves open. If it exceeds 15 % only at T, the reason is the torque.
     """
     parts = list(facts.failures)
     value = percent(facts.value, facts.printed)
@@ -84,7 +88,7 @@ def reason_for(facts: Facts) -> str | None:
 
 
 def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
-    """Stress by mesh, and whether it settles."""
+    """Stresses on all meshes and whether they converge; empty for a single mesh."""
     if len(by_mesh) < 2:
         return []
     *_, before, last = by_mesh.values()

@@ -1,8 +1,8 @@
 """``swgjoint study response``: two-mass frequency response of a joint.
 
 At level ``linear``, resonance and anti-resonance are compared with closed forms. At
-level ``full``, the same chirp with increasing torque shows how the amplitude-dependent
-stiffness, and the hysteresis if the map has one, change the resonance.
+level ``full``, the same chirp at increasing torque shows how the resonance shifts with
+the amplitude-dependent stiffness and, if the map has it, with hysteresis.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 LINK_RATIO = 1.0
-"""Default link inertia divided by the reflected rotor inertia [-]; with this value both
-masses take part in the resonance."""
+"""Default link inertia divided by the rotor inertia at the output [-]; at one, both
+masses affect the resonance equally."""
 ROTOR_INERTIA = 1e-4
-"""Default inertia of a small motor with wave generator [kg·m²]."""
+"""Default rotor inertia: a small motor with the wave generator [kg·m²]."""
 PERIOD = 16.0, 128.0
-"""Default and longest period of the chirp [s]; a low anti-resonance needs a long one.
-"""
+"""Default and longest period of the chirp [s]; a low anti-resonance requires a period
+longer than the default."""
 AMPLITUDES = (0.002, 0.02, 0.1, 0.3)
-"""Motor torque at the output divided by the rated torque [-]; the resonance amplifies
-it."""
+"""Amplitudes of the motor torque, referred to the output and divided by the rated
+torque [-]. At resonance the drive torque is larger."""
 STEP = 1e-4
 """Time step [s]."""
 
@@ -47,6 +47,7 @@ class Predicted:
     """Closed-form frequencies for one stiffness."""
 
     key: str
+    """``K1`` or ``mean``."""
     stiffness: float
     """Torsional stiffness [N·m/rad]."""
     meaning: str
@@ -59,22 +60,28 @@ class Predicted:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredResponse:
-    """One response with its closed forms and the response at half the time step."""
+    """Simulated response of one case, with closed forms and a run at half the step."""
 
     case: str
+    """Level, and the motor torque at level ``full``."""
     response: FrequencyResponse
     half_step: FrequencyResponse | None
     """Response at half the time step; None if it was not computed."""
     expected: tuple[float, float] | None
-    """Closed forms of anti-resonance and resonance [Hz]."""
+    """Anti-resonance and resonance in closed form [Hz]; None where the closed forms do
+    not apply."""
     reason: str | None = None
+    """Remark in the rows of this case."""
 
 
 def run_response(options: StudyOptions) -> StudyResult:
-    """Measure the response of one joint; ``only`` names other drives, maps or designs.
+    """Simulate the response of a joint for every drive.
+
+    ``only`` names drives, maps or designs to use instead of the default drive.
 
     Raises:
-        InputError: If a drive is unknown or a fidelity does not fit it.
+        InputError: If a drive is unknown, if a model is given for a drive that is not a
+            design, or if the frequencies are outside the range of the simulation.
     """
     references = options.only or (DRIVE,)
     drives = {
@@ -113,14 +120,16 @@ def run_response(options: StudyOptions) -> StudyResult:
 
 
 def _masses(drive: DriveMap, options: StudyOptions) -> TwoMass:
-    """Inertias of the options, or the defaults of the study."""
+    """Inertias from the options, with the defaults of the study for missing ones."""
     rotor = options.rotor_inertia or ROTOR_INERTIA
     load = options.load_inertia or LINK_RATIO * drive.ratio**2 * rotor
     return TwoMass(rotor_inertia=rotor, link_inertia=load)
 
 
 def predictions(drive: DriveMap, masses: TwoMass) -> list[Predicted]:
-    """Closed-form frequencies for K1 and for the mean stiffness up to rated torque.
+    """Closed-form frequencies for K1, if known, and for the mean stiffness.
+
+    The mean stiffness is the secant of the torsion curve up to rated torque.
 
     Args:
         drive: Map of the drive.
@@ -197,7 +206,7 @@ def _closed_summary(
 def _measured(
     drive: DriveMap, masses: TwoMass, progress: Any
 ) -> list[MeasuredResponse]:
-    """Measure level ``linear`` at two time steps, then ``full`` at every amplitude."""
+    """Simulate level ``linear`` at two time steps, then ``full`` at every amplitude."""
 
     def expected(stiffness: float) -> tuple[float, float]:
         resonance = masses.resonance(stiffness, drive.ratio)
@@ -288,7 +297,7 @@ def _summary(name: str, found: list[MeasuredResponse]) -> list[str]:
 
 
 def response_picture(name: str, found: list[MeasuredResponse]) -> bytes:
-    """PNG: magnitude of rotor and link speed per motor torque over frequency.
+    """Plot rotor and link speed per motor torque over frequency, as PNG.
 
     Args:
         name: Name of the drive, for the titles.

@@ -1,12 +1,12 @@
 """``swgjoint study ring``: the deflection test of a plain ring, thesis appendix A.
 
 Two rollers in the bore pull a ring apart. a_G is the outward deflection above a roller
-and b_G the inward deflection at 45 deg. The thesis requires a_G + b_G to reach the
-whole depth of the teeth. Finite elements with large displacements are compared with a
-thin ring, both for small deflections (closed form) and for large rotations (elastica).
-The two thin-ring results differ by a factor of two in b_G: the deflection at 45 deg
-almost vanishes for small deflections, while the loss of mean radius of the bent ring
-grows with the square of the deflection.
+and b_G the inward deflection at 45 deg from the rollers. The thesis requires a_G + b_G
+to reach the whole depth of the teeth. Finite elements with large displacements are
+compared with thin-ring theory, both for small deflections (closed form) and for large
+rotations (elastica). Large rotations almost double b_G at a_G = 1.5 mm: in the
+small-deflection theory b_G is only 4 % of a_G, and the loss of mean radius grows with
+the square of the deflection.
 """
 
 from __future__ import annotations
@@ -32,24 +32,25 @@ MODULE_mm, WHOLE_DEPTH_mm = 1.122112, 1.570957
 DIAMETRAL_mm, DEFLECTED_DIAMETER_mm, NOMINAL_mm = 3.141914, 133.3069, 2.693069
 GROUND_mm = 4.5  # section A.3
 TOTAL_mm = 1.575  # section A.7, a_G + b_G at the last point of measurement
-# steel 6150; no deflection depends on the modulus
+# steel 6150; at a given a_G, b_G does not depend on the modulus
 YOUNGS_MODULUS, POISSON_RATIO = 210e9, 0.29
 
 CROWN_mm = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 TRAVEL_mm = (0.001, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 REFINEMENTS = (1, 2, 4)
 ANGLES = np.array([0.0, pi / 4, pi / 2])
-HELD_BACK = "thesis Table A.2 is held back"
+HELD_BACK = "the thesis withholds the values of Table A.2"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RingCase:
-    """A ring of one thickness on all meshes."""
+    """Results of one ring on all meshes."""
 
     name: str
+    """Kind and value of the radial thickness."""
     ring: FreeRing
     pulled: dict[int, PulledRing]
-    """Results by mesh refinement."""
+    """Equilibria by mesh refinement."""
 
     def inward(self, crown: float, refinement: int) -> float:
         """Inward deflection b_G at a given a_G [m].
@@ -72,24 +73,25 @@ class RingCase:
         return float(CubicSpline(found[:, 0] - found[:, 1], found[:, 0])(total))
 
     def elastica_inward(self, crown: float) -> float:
-        """Inward deflection b_G of a thin ring with the same mean radius [m]."""
+        """Inward deflection b_G of the elastica with the same mean radius [m]."""
         return -float(elastica(self.ring.mean_radius, crown, ANGLES).deflection[1])
 
     def elastica_crown_at(self, total: float) -> float:
-        """Deflection a_G of the thin ring at which a_G + b_G reaches a total [m]."""
+        """Deflection a_G of the elastica at which a_G + b_G reaches a total [m]."""
         crown = np.linspace(0.8, 1.0, 5) * total
         inward = np.array([self.elastica_inward(float(a)) for a in crown])
         return float(CubicSpline(crown + inward, crown)(total))
 
 
 def run_ring(options: StudyOptions) -> StudyResult:
-    """Run the study: scaling of Table A.1, then the ring at two thicknesses.
+    """Compare the scaling of Table A.1 and the deflections at two thicknesses.
 
     Raises:
-        InputError: If parts are chosen, because the study has none.
+        InputError: If ``only`` is given; the study has no parts.
+        ComputationError: If an equilibrium of the ring is not found.
     """
     if options.only:
-        raise InputError(f"--only {','.join(options.only)}: the ring has no parts")
+        raise InputError(f"--only {','.join(options.only)}: study ring has no parts")
     cases: list[RingCase] = []
     thicknesses = {"ground": GROUND_mm, "nominal": NOMINAL_mm}
     for name, thickness in thicknesses.items():
@@ -118,7 +120,7 @@ def run_ring(options: StudyOptions) -> StudyResult:
 
 
 def _scaling() -> list[Row]:
-    """Dimensions of Table A.1, scaled from the reference design."""
+    """Rows of the dimensions in Table A.1, scaled from the reference design."""
     module = OUTSIDE_mm / REFERENCE_OUTSIDE_mm
     depth = (ADDENDUM + DEDENDUM) * module
     outside = (TEETH + 2.0 * ADDENDUM) * module
@@ -146,7 +148,7 @@ def _scaling() -> list[Row]:
 
 
 def _rows(case: RingCase) -> list[Row]:
-    """Deflections of one ring, compared with thin-ring theory."""
+    """Rows of the deflections of one ring, with those of thin-ring theory."""
     first, fine = REFINEMENTS[0], REFINEMENTS[-1]
     small = -float(small_deflection(pi / 4))
 
@@ -202,6 +204,7 @@ def _summary(case: RingCase) -> str:
     small = -float(small_deflection(pi / 4))
     return (
         f"{case.name}: a_G {b:.4f} mm and b_G {inward:.4f} mm at a total of"
-        f" {TOTAL_mm:g} mm (last refinement changes it by {1e3 * abs(a - b):.2g} µm);"
-        f" with small deflections b_G would be {TOTAL_mm * small / (1 + small):.4f} mm"
+        f" {TOTAL_mm:g} mm (the last refinement changes them by"
+        f" {1e3 * abs(a - b):.2g} µm); small-deflection theory gives b_G ="
+        f" {TOTAL_mm * small / (1 + small):.4f} mm"
     )

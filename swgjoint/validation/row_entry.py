@@ -1,4 +1,4 @@
-"""Rows of a study file: printed value, location of our value, and reason."""
+"""Rows of a study file: printed value, path of our value, and reason."""
 
 from __future__ import annotations
 
@@ -16,30 +16,33 @@ Path = Annotated[tuple[Text, ...], Field(strict=False, min_length=2)]
 """Name of a computation, followed by the keys of its result."""
 
 Values = Mapping[str, Mapping[str, Any]]
-"""Results by the name of the computation; ``fault`` is the only key of a failed one."""
+"""Results by name of the computation; a failed one has the message under ``fault`` and
+no results."""
 
 
 class RowEntry(Section):
-    """One row; ``$name`` in a text is replaced by a text of the study."""
+    """One row; ``$name`` in ``quantity`` and ``reason`` is replaced by the study."""
 
     quantity: Text
     unit: Text
     source_value: float | None = None
     """Printed value; None if the source withholds it or prints none."""
     source: Path | None = None
-    """Path of the printed value, if it is one of a series."""
+    """Path of the printed value in a series; None if ``source_value`` is used."""
     ours: Path
     """Path of our value."""
     converged: Path | None = None
-    """Path of the value on a finer mesh."""
+    """Path of the value on a finer mesh; None if there is none."""
     reason: Text
     """Why our value differs, or what the source leaves open."""
     columns: Mapping[str, Path] = {}
-    """Further columns of the row."""
+    """Paths of the values of further columns, by name of the column."""
 
 
 def value_at(values: Values, path: Sequence[str] | None) -> Any:
-    """Value at a path; None without a path, or if its computation failed.
+    """Value at a path; None without a path, or if the path leads to no value.
+
+    A path leads to no value if its computation failed.
 
     Args:
         values: Results by computation.
@@ -61,11 +64,12 @@ def fill_rows(
     case: str,
     **more: Any,
 ) -> list[Row]:
-    """Rows of a study file with their values.
+    """Fill the rows of a study file with values.
 
     Args:
         entries: Rows as described in the file.
-        values: Results by computation; a failure becomes the reason of its rows.
+        values: Results by computation; if the computation of ``ours`` failed, its
+            message replaces the reason of the row.
         texts: Replacements for ``$name`` in quantities and reasons, by name.
         case: Case of all rows.
         **more: Further columns, equal in all rows.

@@ -1,4 +1,4 @@
-"""Rows that every study returns: our values compared with those of a source."""
+"""Rows of all studies: our values compared with those of a source."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from swgjoint.errors import InputError
 from swgjoint.progress import Progress, silent
 
 Page = Callable[[], bytes | str | None]
-"""Function that makes the content of a file when it is written; None writes no file."""
+"""Function that returns the content of a file, called when the file is written. If it
+returns None, no file is written."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions:
-    """Options of ``swgjoint study``; a study refuses options that it does not use."""
+    """Options of ``swgjoint study``; options that a study does not use are rejected."""
 
     only: tuple[str, ...] = ()
-    """Parts to run; empty for all."""
+    """Parts to run, or drives for ``response`` and ``control``; empty for the default
+    of the study."""
     model: str | None = None
     """Model, ``2d`` or ``3d``; None for the default of the study."""
     jobs: int = 1
@@ -27,15 +29,16 @@ class StudyOptions:
     seeds: int | None = None
     """Number of specimens to draw; None for the default of the study."""
     folder: Path | None = None
-    """Folder for tables, report and plots; None writes nothing."""
+    """Folder for tables, report and plots; None if nothing is to be written."""
     load_inertia: float | None = None
     """Load inertia about the output [kg·m²]; None for the default of the study."""
     rotor_inertia: float | None = None
     """Inertia of rotor and wave generator about the input [kg·m²]; None for the
     default of the study."""
     closed_form: bool = False
-    """Whether closed forms are enough, without simulation."""
+    """Whether only closed forms are evaluated, without simulation."""
     progress: Progress = silent
+    """Called with the stage, the number of finished computations and the total."""
 
     def chosen(self, parts: Sequence[str]) -> list[str]:
         """Parts of a study to run, in the order of the study.
@@ -60,34 +63,35 @@ class Row:
     quantity: str
     unit: str
     source_value: float | None
-    """Value of the source; None if the source withholds it or prints none."""
+    """Printed value; None if the source withholds it or prints none."""
     ours: float | None
     """Our value; None if the computation failed, see ``reason``."""
     converged: float | None = None
-    """Mesh-converged value; None if it was not computed."""
+    """Value on a finer mesh, or at half the time step for ``response``; None if it was
+    not computed."""
     reason: str | None = None
     """Why our value differs or is missing."""
     more: dict[str, Any] = field(default_factory=dict)
-    """Further columns of this study."""
+    """Further columns of this study, by name."""
 
     def to_json(self) -> dict[str, Any]:
-        """All columns of the row."""
+        """All columns of the row, by name."""
         named = {k: getattr(self, k) for k in self.__dataclass_fields__ if k != "more"}
         return named | self.more
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyResult:
-    """Rows of a study, their summary, and the files written."""
+    """Rows of a study, with summary, pages and the paths of its files."""
 
     rows: tuple[Row, ...]
     summary: tuple[str, ...] = ()
     """Lines for the terminal."""
     more: dict[str, Any] = field(default_factory=dict)
-    """Further keys of the JSON object."""
+    """Further keys of the JSON object that ``--json`` prints."""
     content: Mapping[str, Any] | None = None
     """Keys of the JSON file besides ``rows``; if None, the file is a list of rows."""
     pages: Mapping[str, Page] = field(default_factory=dict)
-    """Pictures and texts by file name."""
+    """Functions that return pictures and texts, by file name."""
     files: tuple[str, ...] = ()
-    """Paths of the written files."""
+    """Paths of the written files; empty until they are written."""

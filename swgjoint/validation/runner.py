@@ -1,4 +1,4 @@
-"""Runner of all studies: computations, rows and files.
+"""List of all studies, and functions that run them and write their files.
 
 A study is a function that takes :class:`StudyOptions` and returns a
 :class:`StudyResult`. It does not write to disk; :func:`run_study` writes its files.
@@ -29,12 +29,12 @@ class StudyEntry:
     title: str
     """Description of the comparison in one line."""
     models: tuple[str, ...] = ()
-    """Accepted values of ``--model``; empty if the study sets its own models."""
+    """Accepted values of ``--model``; empty if the option is not accepted."""
     model_reason: str = ""
     """Why no other model is accepted."""
 
     def load(self) -> Callable[[StudyOptions], StudyResult]:
-        """Import the function of the study."""
+        """Import and return the function of the study."""
         module, _, function = self.function.partition(":")
         loaded: Callable[[StudyOptions], StudyResult] = getattr(
             import_module(f"swgjoint.validation.{module}"), function
@@ -45,27 +45,27 @@ class StudyEntry:
 STUDIES = {
     "thesis": StudyEntry(
         function="thesis.thesis:run_thesis",
-        title="stresses of the thesis, chapters 4 to 6, with the 2D model",
+        title="stresses of the thesis, chapters 4 to 6 in 2D or chapter 7 in 3D",
         models=("2d", "3d"),
     ),
     "ring": StudyEntry(
         function="ring:run_ring",
-        title="deflection of a plain ring between two rollers, thesis appendix A",
+        title="deflection of a plain ring pulled apart by two rollers, thesis"
+        " appendix A",
         models=("2d",),
         model_reason="the plain ring is two-dimensional",
     ),
     "articles": StudyEntry(
         function="articles.articles:run_articles",
-        title="force, deflection, stress and fatigue of three articles, with the 3D"
-        " model",
+        title="force, deflection, stress and fatigue results of three articles, in 3D",
         models=("3d",),
         model_reason="the articles need the 3D model",
     ),
     "catalogue": StudyEntry(
         function="catalogue.catalogue:run_catalogue",
-        title="stiffness, losses and ratcheting of a family of drives, compared with"
-        " a catalogue",
-        model_reason="the model of each quantity is fixed",
+        title="stiffness, accuracy, losses and ratcheting of a family of drives,"
+        " compared with a catalogue",
+        model_reason="the study fixes the model of each quantity",
     ),
     "response": StudyEntry(
         function="response:run_response",
@@ -74,7 +74,7 @@ STUDIES = {
     ),
     "control": StudyEntry(
         function="control.ladder:run_control",
-        title="controllers of one joint from PD to learning, on ten specimens of a"
+        title="controllers of one joint, from PD to learning and MPC, on specimens of a"
         " drive",
         models=("2d", "3d"),
     ),
@@ -91,13 +91,13 @@ def run_study(name: str, options: StudyOptions) -> StudyResult:
 
     Args:
         name: Key of :data:`STUDIES`.
-        options: Parts, model, processes and folder.
+        options: Parts, model, number of processes and folder.
 
     Returns:
         Rows and summary, with the paths of the files.
 
     Raises:
-        InputError: If the study is unknown or does not accept an option.
+        InputError: If the study is unknown or does not accept the model or a part.
     """
     entry = STUDIES.get(name)
     if entry is None:
@@ -139,7 +139,7 @@ class Computation(Protocol):
 
     @property
     def name(self) -> str:
-        """Unique name."""
+        """Name that identifies the computation and its result."""
 
     @property
     def work(self) -> float:
@@ -157,13 +157,15 @@ def compute_all(
     *,
     stage: str = "computations",
 ) -> dict[str, Found]:
-    """Results of all computations by name; computations of equal name run once.
+    """Run computations and return their results by name.
+
+    Computations with equal names are run only once.
 
     Args:
         compute: Picklable function of one task, called in other processes.
         tasks: Computations of all parts.
-        options: Number of processes and progress.
-        stage: Name of the stage for the progress.
+        options: Options, of which the number of processes and the progress are used.
+        stage: Name of the stage in progress reports.
     """
     by_name = {task.name: task for task in tasks}
     ordered = sorted(by_name.values(), key=lambda task: -task.work)

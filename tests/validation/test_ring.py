@@ -106,7 +106,7 @@ def test_study_ring(monkeypatch, capsys, tmp_path):
         assert {"case", "quantity", "unit", "source_value"} <= set(row)
         assert row["converged"] == pytest.approx(row["ours"], rel=5e-3)
         if row["source_value"] is None:
-            assert "held back" in row["reason"]
+            assert "withholds" in row["reason"]
         else:
             assert row["ours"] == pytest.approx(row["source_value"], rel=1e-6)
     total = [r for r in rows if r["quantity"].endswith("= 1.575 mm")]

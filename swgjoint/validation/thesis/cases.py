@@ -30,26 +30,35 @@ class CaseEntry(Section):
     """One case: a design, a load and the printed values of the source."""
 
     name: Text | None = None
-    """Name; None for a name made of the parameter of the group."""
+    """Name, which follows the parameter value if there is one; required without a
+    parameter value."""
     value: float | None = None
-    """Value of the parameter of the group."""
+    """Value of the parameter of the group, in the unit of the group; None if the group
+    has no parameter."""
     base: Text | None = None
+    """Bundled design; None for that of the group."""
     changes: Mapping[str, Any] = {}
+    """Changes of the design by dotted key, in addition to those of the group."""
     torque_Nm: Torque | None = None
+    """Nominal output torque T [N·m]; None for that of the group."""
     state: Literal["turn", "wave_generator", "meshed"] = "turn"
-    """Mean over the turn of the largest stress at each position, or one state of the
-    set-up."""
+    """``turn`` for the mean over the turn of the largest stress at each position;
+    otherwise the state of the set-up at which the stress is read."""
     angle_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Wave-generator angle at which the stress is read [deg]; None for the turn."""
+    """Wave-generator angle at which the stress is read [deg]; None for the mean over
+    the turn."""
     tensile_MPa: Stress | None = None
+    """Printed tensile stress [MPa]; None if it is withheld or not printed."""
     compressive_MPa: Stress | None = None
+    """Magnitude of the printed compressive stress [MPa]; None as above."""
     von_mises_MPa: Stress | None = None
+    """Printed von Mises stress [MPa]; None as above."""
     note: str = ""
     """What the source leaves open about this case."""
 
     @property
     def printed(self) -> dict[Kind, float | None]:
-        """Values of the source [MPa]."""
+        """Printed values by kind of stress [MPa]; None if withheld or not printed."""
         return {kind: getattr(self, f"{kind}_MPa") for kind in KINDS}
 
 
@@ -57,32 +66,46 @@ class GroupEntry(Section):
     """Cases of one section or table of the source."""
 
     id: Annotated[str, Field(pattern=r"^[\w.-]+$", max_length=40)]
+    """Identifier that ``--only`` accepts: a section number or a table."""
     title: Text
     source: Text
+    """Section, figures or table of the source."""
     base: Text
+    """Bundled design of the cases."""
     changes: Mapping[str, Any] = {}
+    """Changes of the design by dotted key."""
     torque_Nm: Torque | None = None
+    """Nominal output torque T [N·m]; None for that of the file."""
     positions: Annotated[int, Field(ge=1, le=1000)] | None = None
     """Number of wave-generator positions over the turn; None for the value of the file.
     """
     turn_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Turn of the input [deg]; None for the value of the file."""
+    """Input rotation over which the positions are distributed [deg]; None for the value
+    of the file."""
     keys: Annotated[tuple[str, ...], Listed] = ()
-    """Parameter: dotted keys of the design that take the value of a case."""
+    """Dotted keys of the design that take the parameter value of a case; empty if the
+    group has no parameter."""
     symbol: str = ""
+    """Symbol of the parameter."""
     unit: str = ""
+    """Unit of the parameter."""
     lowest: Mapping[Kind, float] = {}
-    """Parameter value of the lowest stress according to the source, by stress."""
+    """Parameter value at which the source states the lowest stress, by kind of stress.
+    """
     highest: Mapping[Kind, float] = {}
-    """Parameter value of the highest stress according to the source, by stress."""
+    """Parameter value at which the source states the highest stress, by kind of stress.
+    """
     flat: Annotated[tuple[Kind, ...], Listed] = ()
-    """Stresses that do not depend on the parameter according to the source."""
+    """Kinds of stress that do not depend on the parameter according to the source."""
     flat_range: Annotated[tuple[float, float], Listed] | None = None
-    """Range of the parameter for ``flat``; None for all values."""
+    """Parameter range in which ``flat`` applies; None for all values."""
     over: str | None = None
-    """Group with the same parameter whose von Mises stress is the reference."""
+    """Identifier of another group with the same parameter. Further rows list the
+    increase of the von Mises stress over that group."""
     statement: str = ""
+    """Statement of the source that the report quotes."""
     note: str = ""
+    """What the source leaves open about all cases."""
     converge: bool = False
     """Whether the cases are also computed on finer meshes."""
     rank: bool = False
@@ -128,21 +151,23 @@ class StudyFile(Section):
     """A file of ``models/studies``."""
 
     source: Text
+    """Chapters of the source."""
     torque_Nm: Torque
+    """Nominal output torque T [N·m]."""
     model: Literal["2d", "3d"] = "2d"
     positions: Annotated[int, Field(ge=1, le=1000)]
     """Number of wave-generator positions over the turn."""
     turn_deg: Annotated[float, Field(gt=0, le=360)] = 180.0
-    """Turn of the input [deg]."""
+    """Input rotation over which the positions are distributed [deg]."""
     refinements: Annotated[tuple[Refinement, ...], Listed] = (2.0, 3.0)
-    """Refinements of the finer meshes, for groups with ``converge``."""
+    """Refinements of the finer meshes [-], for groups with ``converge``."""
     fine_positions: Annotated[int, Field(ge=1, le=1000)] = 12
     """Number of positions on the finer meshes, over one pitch of the fixed member.
-    Without tolerances the pattern repeats with that pitch, and 35 positions over half a
-    turn (61 pitches) are 35 equidistant phases of the pitch. The mean over 12 phases
+    Without tolerances the stresses repeat with that pitch, so 35 positions over half a
+    turn (61 pitches) sample 35 equidistant phases of the pitch. The mean over 12 phases
     agrees with the mean over 35 within 0.1 %."""
     contradictions: Annotated[tuple[Text, ...], Listed] = ()
-    """Contradictions inside the source, and the version that the cases follow."""
+    """Contradictions within the source, and the version that the cases follow."""
     group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
@@ -166,14 +191,14 @@ class StudyFile(Section):
         """Read a study file, given as a path or as the name of a bundled one.
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file is missing or invalid, with one line per fault.
         """
         path = find(reference, "studies", ".toml", what="study")
         return validate(cls, read_toml(path, what="study"), where=str(path))
 
     @property
     def by_tenth(self) -> bool:
-        """Whether rows are judged at T/10: only those of the 2D model."""
+        """Whether rows are judged at T/10 (2D model) instead of T (3D model)."""
         return self.model == "2d"
 
     def chosen(self, only: tuple[str, ...]) -> tuple[GroupEntry, ...]:
@@ -205,24 +230,25 @@ class Case:
     group: GroupEntry
     entry: CaseEntry
     design: Design | None
-    """Design; None if it is refused, see ``fault``."""
+    """Design; None if it is invalid."""
     fault: str | None
+    """Why the design is invalid; None if it is valid."""
     torque: float
     """Nominal torque T [N·m]."""
 
     @property
     def name(self) -> str:
-        """Group and case."""
+        """Identifier of the group and name of the case."""
         return f"{self.group.id} {self.group.name_of(self.entry)}"
 
     @property
     def note(self) -> str:
-        """What the source leaves open."""
+        """What the source leaves open about the case, or else about its group."""
         return self.entry.note or self.group.note
 
 
 def case_of(study: StudyFile, group: GroupEntry, entry: CaseEntry) -> Case:
-    """Build the design of a case: its base with the changes of group and case.
+    """Build a case; its design is the base with the changes of group and case.
 
     Args:
         study: Study file.

@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from swgjoint.validation.thesis.rows import CaseRecords
 
 RANK_GAP = 0.05
-"""Smallest relative difference of two printed values that have a rank [-]; in the mesh
-study of the thesis, the values of one design differ by 15 %."""
+"""Smallest relative difference between two printed values whose order is checked [-].
+For comparison, the values of one design differ by 15 % in the mesh study of the thesis.
+"""
 TIE = 0.02
-"""Relative difference below which a stress counts as equal to the extreme one [-]."""
+"""Largest relative difference at which a stress counts as equal to the extreme [-]."""
 FLAT = 0.05
-"""Largest relative spread over a sweep that counts as no influence [-]."""
+"""Largest relative spread over a sweep at which a stress counts as constant [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,16 +28,18 @@ class RankCheck:
     """Whether the von Mises stresses of a table have the printed order."""
 
     part: str
+    """Identifier of the group."""
     tenth: bool
     """Whether the load is T/10 instead of T."""
     pairs: int
-    """Number of pairs whose printed values differ by more than 5 %."""
+    """Number of pairs whose printed values differ by at least 5 %."""
     swapped: tuple[tuple[str, str], ...]
     """Pairs (printed lower, printed higher) that we find in the opposite order."""
     missing: tuple[str, ...]
-    """Cases without a value."""
+    """Cases with a printed value but without a computed one."""
     added: dict[str, float]
-    """Stress increase from T/10 to T by case [MPa], which explains a swap at T."""
+    """Stress increase from T/10 to T by case [MPa], which may explain pairs that are
+    swapped at T."""
 
     @property
     def agrees(self) -> bool:
@@ -63,7 +66,7 @@ class RankCheck:
         return "-" if value is None else f"{value:+.0f}"
 
     def to_json(self) -> dict[str, Any]:
-        """All fields and whether it agrees."""
+        """All fields, whether the order agrees, and the line of text."""
         return {**vars(self), "agrees": self.agrees, "text": self.text}
 
 
@@ -72,16 +75,21 @@ class TrendCheck:
     """Whether a stress is lowest, highest or constant as the source states."""
 
     part: str
+    """Identifier of the group."""
     kind: Kind
     tenth: bool
+    """Whether the load is T/10 instead of T."""
     claim: str
     """``lowest``, ``highest`` or ``flat``."""
     stated: float | None
-    """Parameter value stated by the source."""
+    """Parameter value stated by the source; None for ``flat``."""
     ours: float | None
-    """Parameter value that we find; for ``flat`` the spread, largest/smallest - 1."""
+    """Parameter value that we find, or for ``flat`` the spread, largest/smallest - 1;
+    None with fewer than two computed values."""
     agrees: bool
+    """Whether we confirm the statement, within :data:`TIE` or :data:`FLAT`."""
     refinement: float
+    """Mesh refinement [-]."""
 
     @property
     def text(self) -> str:
@@ -100,7 +108,7 @@ class TrendCheck:
         return f"{load}: {kind} stress {place}, {end}{stated}"
 
     def to_json(self) -> dict[str, Any]:
-        """All fields and one line."""
+        """All fields and the line of text."""
         return {**vars(self), "text": self.text}
 
 
@@ -110,7 +118,7 @@ def _groups(results: Sequence[CaseRecords]) -> Iterator[list[CaseRecords]]:
 
 
 def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
-    """Checks of the rank order at T/10 and at T, for all groups with ``rank``."""
+    """Check the rank order of all groups with ``rank``, at T/10 and at T."""
     checks = []
     for cases in _groups(results):
         group = cases[0].case.group
@@ -154,7 +162,7 @@ def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
 
 
 def trend_checks(results: Sequence[CaseRecords]) -> list[TrendCheck]:
-    """Checks of the stated extremes and constant stresses, at T/10 and at T.
+    """Check the stated extremes and constant stresses, at T/10 and at T.
 
     If a sweep was also run on finer meshes, the finest mesh is checked as well.
     """
@@ -185,7 +193,7 @@ class _Sweep:
     refinement: float
 
     def values(self, kind: Kind) -> list[tuple[float, float]]:
-        """Pairs (parameter, stress), where both are known."""
+        """Pairs (parameter value, stress [MPa]) of the cases that have both."""
         return [
             (case.case.entry.value, value)
             for case in self.cases

@@ -1,4 +1,4 @@
-"""Record of one meshing simulation, with the values that the study stores."""
+"""Record of one meshing simulation: the values that the thesis study stores."""
 
 from __future__ import annotations
 
@@ -29,13 +29,15 @@ class RunSpec:
     torque: float
     """Output torque [N·m]."""
     positions: int
+    """Number of wave-generator positions."""
     turn: float
     """Input rotation over which the positions are distributed [turns]."""
     model: str = "2d"
+    """``2d`` or ``3d``."""
 
     @property
     def parts(self) -> dict[str, Any]:
-        """Parts of the cache key: design, load and the code of the record."""
+        """Parts of the cache key: inputs, and the code that determines a record."""
         return {
             "study": _own_version(),
             "design": self.design.content_hash(),
@@ -47,12 +49,12 @@ class RunSpec:
 
     @property
     def name(self) -> str:
-        """Hash of the parts and of the other code of the package."""
+        """Cache key: hash of the parts and of the code that computes maps."""
         return key_of(self.parts)
 
     @property
     def work(self) -> float:
-        """Estimated work, so that long runs start first: positions times nodes."""
+        """Estimated relative work, positions times nodes; long runs start first."""
         fine = float(self.design.mesh.refinement)
         work = fine**2 if self.model == "2d" else 30.0 * fine**3
         return self.positions * work
@@ -67,28 +69,37 @@ def _own_version() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class RunRecord:
-    """Stresses of the flexspline by kind [MPa]; None if there is no value."""
+    """Outcome of a run, and stresses of the flexspline by kind [MPa].
+
+    A stress is None if it was not computed.
+    """
 
     outcome: str
     """``converged``, the outcome of the first failed position, ``failed`` if the set-up
     was not solved, or ``refused`` for an invalid design."""
     message: str | None = None
+    """Message of the first failure; None if there was none."""
     failed_positions: int = 0
+    """Number of positions that were not solved."""
     wall_s: float = 0.0
+    """Wall time of the run [s]."""
     average: Mapping[str, NUMBER] = field(default_factory=dict)
-    """Largest nodal stress, averaged over the positions."""
+    """Largest nodal stress, averaged over the solved positions."""
     away: Mapping[str, NUMBER] = field(default_factory=dict)
-    """``average`` without the nodes next to loaded tooth contacts."""
+    """``average`` without the nodes next to loaded tooth contacts; None in 3D."""
     last: Mapping[str, NUMBER] = field(default_factory=dict)
     """Largest nodal stress at the last position."""
     places: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    """Number of positions with the largest stress at each place, by kind."""
+    """Number of positions with the largest stress at each place, by kind; in 3D only
+    for the von Mises stress, with the part of the flexspline as place."""
     setup: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """Largest stresses by state of the set-up."""
+    """Largest stresses by state of the set-up, then by kind."""
     per_position: Mapping[str, list[NUMBER]] = field(default_factory=dict)
     """Largest nodal stress at each position, by kind."""
     angle_deg: list[float] = field(default_factory=list)
+    """Input angle at each position [deg]."""
     pairs_in_contact: list[int | None] = field(default_factory=list)
+    """Number of tooth pairs in contact at each position."""
 
     @property
     def ok(self) -> bool:
@@ -97,7 +108,7 @@ class RunRecord:
 
 
 def record_run(spec: RunSpec) -> RunRecord:
-    """Record of a run, from the cache or computed and stored."""
+    """Record of a run, read from the cache or computed and stored there."""
     return recall("studies", spec.parts, RunRecord, lambda: compute(spec))
 
 
@@ -124,10 +135,12 @@ def compute(spec: RunSpec) -> RunRecord:
 
 
 _Largest = tuple[dict[str, float], dict[str, float], dict[str, str]]
-"""By kind: largest stress over all nodes, and away from tooth contacts [Pa]; place."""
+"""Three mappings by kind of stress: largest stress over all nodes [Pa], largest stress
+away from tooth contacts [Pa], and place of the former."""
 
 
 def _plane(run: Any) -> list[_Largest | None]:
+    """Largest stresses of the 2D model at each position; None if not solved."""
     from swgjoint.validation.thesis.stress_places import StressPlaces
 
     places = StressPlaces(model=run.model)
@@ -137,7 +150,11 @@ def _plane(run: Any) -> list[_Largest | None]:
 
 
 def _solid(run: Any) -> list[_Largest | None]:
-    """Largest stresses of the 3D model, which does not mark nodes next to contacts."""
+    """Largest stresses of the 3D model at each position; None if not solved.
+
+    Stresses away from tooth contacts are missing, because the 3D model does not mark
+    the nodes next to contacts.
+    """
     rows: list[_Largest | None] = []
     for step in run.steps:
         if step.stress is None:

@@ -34,17 +34,18 @@ _HEAD = """\
 The tables list the largest nodal stress of the flexspline in MPa, averaged over
 {positions} positions of the wave generator in half a turn (refinement 1, the mesh of
 the thesis). T is the stated torque. {tenth}
-Deviations are those of our values from the thesis. "fine" is the finest mesh
+Deviations of our values are relative to the thesis. "fine" is the finest mesh
 (refinement {finest:g}, mean over {fine_positions} positions in one pitch).
 
 {summary}
 """
 _TENTH = {
-    "2d": """T/10 is the torque that the thesis probably applied: its
-stresses increase with torque about ten times less than the statics of a ring of the
-stated width requires.""",
+    "2d": """T/10 is the torque that the thesis probably applied:
+in the thesis, the stress increase with torque is only about a tenth of what static
+equilibrium of a ring of the stated face width requires.""",
     "3d": """T/10 is listed because the 2D stresses of the thesis
-suggest this torque. Rows in 3D are judged at T, and finer meshes are at T only.""",
+suggest this torque. Rows in 3D are judged at T, and
+finer meshes are computed at T only.""",
 }
 
 
@@ -55,7 +56,7 @@ def report_pages(
     trends: Sequence[TrendCheck],
     summary: Sequence[str],
 ) -> dict[str, Page]:
-    """``thesis.md`` and one plot per part, by file name.
+    """Functions that return ``thesis.md`` and one plot per part, by file name.
 
     Args:
         study: Study file.
@@ -102,7 +103,7 @@ def _markdown(
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:
-    """Markdown table of one part, followed by its reasons."""
+    """Lines of the Markdown table of one part, followed by the reasons of its rows."""
     plain_rows = [row.to_json() for row in rows]
     # omit empty columns
     keys = [k for k in _COLUMNS if any(row[k] is not None for row in plain_rows)]

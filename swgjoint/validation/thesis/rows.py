@@ -14,7 +14,7 @@ from swgjoint.validation.thesis.record import RunRecord
 
 @dataclass(frozen=True, kw_only=True)
 class CaseRecords:
-    """All runs of a case: nominal and tenth torque, by refinement."""
+    """All runs of a case, at T and T/10 and on all meshes."""
 
     case: Case
     nominal: Mapping[float, RunRecord]
@@ -30,7 +30,7 @@ class CaseRecords:
         return tuple(sorted(self.nominal))
 
     def stress_by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
-        """Stress by refinement, where known [MPa].
+        """Stress by mesh refinement [MPa], without meshes that have no value.
 
         Args:
             kind: Kind of stress.
@@ -44,7 +44,11 @@ class CaseRecords:
     def value(
         self, kind: Kind, *, tenth: bool, refinement: float = 1, away: bool = False
     ) -> float | None:
-        """Stress [MPa]; None if the run failed or does not exist.
+        """Stress of the case [MPa]; None if it is unknown.
+
+        The stress is that of the state, angle or mean over the turn that the case asks
+        for. It is unknown if the run failed or does not exist. Away from contacts, only
+        means over the turn are known, and only in 2D.
 
         Args:
             kind: Kind of stress.
@@ -84,7 +88,7 @@ class CaseRecords:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Failures with their torques; each message appears once."""
+        """Failures on the mesh of the thesis with their torques, each message once."""
         lines: dict[str, list[str]] = {}
         for name, record in (("T", self.nominal[1]), ("T/10", self.tenth[1])):
             if not record.ok:
@@ -95,12 +99,16 @@ class CaseRecords:
 
 
 def stress_rows(results: Sequence[CaseRecords]) -> list[Row]:
-    """Three rows per case, one for each kind of stress."""
+    """Rows of the stresses: three per case, one for each kind."""
     return [_row(result, kind) for result in results for kind in KINDS]
 
 
 def increase_rows(results: Sequence[CaseRecords]) -> list[Row]:
-    """Increase of the von Mises stress over the group with less torque, if run."""
+    """Rows of the increase of the von Mises stress over another group.
+
+    Only cases whose group names another group in ``over``, and whose counterpart in
+    that group was run, have a row.
+    """
     known = {(r.case.group.id, r.case.entry.value): r for r in results}
     rows = []
     for result in results:
@@ -204,7 +212,7 @@ _NUMBERS = (
 
 
 def _columns(result: CaseRecords, kind: Kind, **known: Any) -> dict[str, Any]:
-    """Further columns of the study, equal for every row; unknown values are None."""
+    """Further columns; every row has the same ones, and unknown values are None."""
     case = result.case
     return {
         "part": case.group.id,

@@ -1,4 +1,4 @@
-"""Place of the largest stress of the flexspline: fillet, bore, contact or inside."""
+"""Place of the largest stress in the 2D flexspline, such as a fillet or the bore."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from swgjoint.fe.plane.stress import KINDS, flexspline_stress
 PLACES = ("fillet", "flank", "bore", "inside", "contact")
 NEAR = 0.25
 """Distance from a loaded tooth contact within which a node counts as next to it
-[modules]. It is a length instead of a number of elements, so that it does not depend on
-the mesh. The contact patches are smaller."""
+[modules]. It is a length instead of a number of elements, so that the place does not
+depend on the mesh. Contact patches are smaller than this distance."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StressPlaces:
-    """Place of every node in a flexspline sector of a model."""
+    """Places of the nodes in the flexspline sectors of a model."""
 
     model: SectorModel
 
     @cached_property
     def _of_node(self) -> NDArray[np.int64]:
-        """Index into :data:`PLACES` without contacts, shape (n_nodes,)."""
+        """Indices of nodes into :data:`PLACES`, without contacts, shape (n_nodes,)."""
         element = self.model.element
         mesh, profile = element.mesh, element.profile
         place = np.full(mesh.mesh.p.shape[1], PLACES.index("inside"))
@@ -44,7 +44,7 @@ class StressPlaces:
         return place
 
     def near_contact(self, state: State) -> NDArray[np.bool_]:
-        """Nodes next to a loaded tooth contact, shape (n_sectors, n_nodes)."""
+        """Mask of nodes next to a loaded tooth contact, shape (n_sectors, n_nodes)."""
         element = self.model.element
         points = element.mesh.mesh.p.T
         near = np.zeros((self.model.sectors, len(points)), dtype=bool)
@@ -62,12 +62,12 @@ class StressPlaces:
     def largest(
         self, state: State
     ) -> tuple[dict[str, float], dict[str, float], dict[str, str]]:
-        """Largest nodal stress, also away from tooth contacts, and its place.
+        """Find the largest nodal stress, overall and away from tooth contacts.
 
         Returns:
             Three mappings by kind: largest stress over all nodes [Pa]; largest stress
-            over the nodes that are not next to a tooth contact [Pa]; place of the
-            former.
+            over the nodes that are not next to a loaded tooth contact [Pa]; place of
+            the former.
         """
         near = self.near_contact(state)
         stresses = stress_maxima(flexspline_stress(self.model, state))

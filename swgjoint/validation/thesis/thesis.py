@@ -3,13 +3,13 @@
 By default these are the studies of chapters 4 to 6 with the 2D model; with
 ``--model 3d`` they are those of chapter 7.
 
-Every case is simulated at the nominal torque T and at T/10. The printed stress
-increments with torque are about ten times too small for the stated torque and face
-width. T is therefore the physical load, and T/10 the load that the thesis probably
-applied. Nothing else is scaled. All rows use the same mesh (refinement 1) and the same
-quantity: the largest nodal stress of the flexspline, averaged over the positions. The
-same average away from loaded tooth contacts is also listed. 3D rows are judged at T;
-T/10 is also listed, and finer meshes are computed at T only.
+Every case is simulated at the stated torque T and at T/10. The printed stresses
+increase with torque about ten times less than the stated torque and face width require,
+so the thesis probably applied T/10. Nothing else is scaled. Unless a case reads one
+state or angle, its value is the largest nodal stress of the flexspline, averaged over
+the positions, on the mesh of the thesis (refinement 1). The average without nodes next
+to loaded tooth contacts, and the values on finer meshes, are additional columns. 2D
+rows are judged at T/10, 3D rows at T; in 3D, finer meshes are computed at T only.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TENTH = 0.1
 
 
 def run_thesis(options: StudyOptions) -> StudyResult:
-    """Run the chosen parts, or all of them.
+    """Run the chosen parts of the study of the chosen model, or all of them.
 
     Raises:
         InputError: If a part is unknown.
@@ -51,6 +51,9 @@ def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
     Args:
         study: Study file.
         options: Parts, number of processes and progress.
+
+    Raises:
+        InputError: If a part is unknown.
     """
     begin = time.perf_counter()
     cases = [
@@ -166,7 +169,7 @@ def _result(
 
 
 def _share(rows: Sequence[Row], column: str) -> dict[str, int]:
-    """Numbers of rows with a printed value, computed, and within the limit."""
+    """Count the rows with a printed value, those computed, and those within 15 %."""
     printed = [row for row in rows if row.source_value is not None]
     found = [d for row in printed if (d := row.more[column]) is not None]
     within = sum(abs(d) <= WITHIN for d in found)
