@@ -108,9 +108,9 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     assert stiffness["low"] < stiffness["high"]
     lobe = {key[1]: row for key, row in by.items() if key[0] == "xb1-100-80"}
     assert lobe["lobe force at w_0"]["ours"] == pytest.approx(26.0)
-    assert lobe["the same with teeth"]["ours"] is None  # beyond 0.36 mm
+    assert lobe["lobe force at w_0 with teeth"]["ours"] is None  # beyond 0.36 mm
     assert lobe["lobe force at which play vanishes"]["ours"] == pytest.approx(22.75)
-    take_up = lobe["play that a micrometre of lobe takes up"]["ours"]
+    take_up = lobe["play taken up per micrometre of lobe deflection"]["ours"]
     assert take_up == pytest.approx(20e-6 * 10800 / pi, rel=0.01)
     name = "springs, constant force of 20 N: "
     assert lobe[name + "lobe force"]["ours"] == pytest.approx(20.0)

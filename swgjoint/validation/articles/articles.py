@@ -1,10 +1,11 @@
 """``swgjoint study articles``: recomputation of three articles on flexsplines.
 
-The parts are ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, and
-``stress`` and ``fatigue`` of a cup. The printed closed forms are compared with 3D
-finite elements. Where computed, ``converged`` is the result on a finer mesh: for small
-deflections refinement 2 instead of 1, and with a wave generator in contact refinement 1
-instead of 0.6. Refinement 1 is the mesh of the thesis.
+The parts are ``deflection``, the deflection of the 80:1 drive; ``force``, the force
+that deforms the flexspline XB1-100-80; and ``stress`` and ``fatigue`` of a cup. The
+printed values and closed forms are compared with 3D finite elements. If the result was
+also computed on a finer mesh, ``converged`` contains it. The refinement is then 2
+instead of 1 for the linear models, and 1 instead of 0.6 for those with a wave generator
+in contact. Refinement 1 is the mesh of the thesis.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from swgjoint.validation.runner import compute_all
 PARTS = ("deflection", "force", "stress", "fatigue")
 FINE = {"mesh.refinement": 2}
 COARSE = {"mesh.refinement": 0.6}
-"""The coarsest mesh with a plane in the middle of the face width."""
+"""Coarsest mesh with a plane of nodes in the middle of the face width."""
 FINE_TORQUES = slice(0, None, 3)
 """Torques at which the finer mesh is also computed."""
 
@@ -124,7 +125,7 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
 
 
 def _deflected(name: str, design: Design, *, fine: bool = False) -> list[ArticleTask]:
-    """Deflection on the wave generator, on one or two meshes."""
+    """Computations of the cup on the wave generator, on one or two meshes."""
     coarse = design.with_changes(COARSE)
     tasks = [ArticleTask(name=name, kind="deflected", design=coarse, work=2)]
     if fine:

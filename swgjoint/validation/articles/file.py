@@ -21,52 +21,61 @@ Series = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
 
 class ArticleVariation(Section):
-    """Another choice for something that a source leaves open."""
+    """Alternative to an assumption where a source leaves something open."""
 
     name: Text
     changes: Mapping[str, Any]
+    """Changes of the design by dotted key."""
 
 
 class Deflection(Section):
-    """Deflection of the 80:1 drive."""
+    """Section of the file on the deflection of the 80:1 drive."""
 
     source: Text
     base: Text
+    """Bundled design."""
     coefficient: Positive
     """Printed lobe height divided by the theoretical one, w_0* [-]."""
     varied_quantity: Text
-    """Quantity that the rows of the variations compare."""
+    """Quantity that is computed for every variation."""
     variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
+    """Variations, each applied alone."""
     rows: Rows
 
 
 class Springs(Section):
-    """An assumed elastic wave generator; the source prints none."""
+    """Assumed springs of an elastic wave generator; the source prints no values."""
 
     name: Text
     stiffness_N_mm: Annotated[float, Field(ge=0, le=1e6)]
-    """Stiffness of each lobe."""
+    """Stiffness of each lobe [N/mm]."""
     preload_N: Annotated[float, Field(ge=0, le=1e6)]
-    """Force of each lobe at the lobe height of the drive."""
+    """Force of each lobe at the lobe height of the drive [N]."""
 
 
 class Force(Section):
-    """Deformation force of XB1-100-80."""
+    """Section of the file on the force that deforms the flexspline XB1-100-80."""
 
     source: Text
     base: Text
+    """Bundled design."""
     radius_mm: Positive
+    """Radius of the middle of the wall in the printed formula [mm]."""
     series_sum: Positive
+    """Printed sum of the series in this formula [-]."""
     rows: Rows
     variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
+    """Variations, each applied alone."""
     springs: Annotated[tuple[Springs, ...], Field(strict=False)] = ()
+    """Assumed elastic wave generators."""
 
 
 class StressAndFatigue(Section):
-    """Stress and fatigue of a cup without and with torque."""
+    """Section of the file on stress and fatigue of a cup, with and without torque."""
 
     source: Text
     base: Text
+    """Bundled design."""
     rows: Rows
     """Stress without torque."""
     fatigue_rows: Rows
@@ -74,12 +83,17 @@ class StressAndFatigue(Section):
     torque_rows: Rows
     """Stress and fatigue at each torque."""
     crowned: Mapping[str, Any]
-    """Micro-geometry of the wave generator for comparison."""
+    """Changes of the design that crown and slope the wave generator, for comparison."""
     torques_Nm: Series
+    """Output torques [N·m]."""
     nodal_force_N: Series
+    """Printed nodal force at each torque [N]."""
     nodes: Annotated[int, Field(gt=0, le=1000)]
+    """Number of nodes that share the torque."""
     von_mises_MPa: Series
+    """Largest equivalent stress at each torque, from the printed fit [MPa]."""
     allowable: Positive
+    """Safety factor that the source requires [-]."""
 
     @model_validator(mode="after")
     def _same_length(self) -> StressAndFatigue:
@@ -92,7 +106,7 @@ class StressAndFatigue(Section):
 
 
 class ArticlesFile(Section):
-    """File of the study."""
+    """Content of the study file."""
 
     source: Text
     deflection: Deflection
@@ -104,7 +118,7 @@ class ArticlesFile(Section):
         """Read a study file, given as a path or as the name of a bundled one.
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file is missing or invalid, with one line per fault.
         """
         path = find(reference, "studies", ".toml", what="study")
         data = read_toml(path, what="study", error=InputError)

@@ -1,4 +1,7 @@
-"""Rows of an elastic wave generator, for which the article needs the force."""
+"""Rows of the force and play of the deflected cup, and of elastic wave generators.
+
+The article computes the force to design an elastic wave generator.
+"""
 
 from __future__ import annotations
 
@@ -18,17 +21,17 @@ from swgjoint.validation.rows import Row
 
 PLACE = "two loads at mid-face, large rotations"
 LOADED = (
-    "the article's text applies 2P at each of two points, its expression for the work"
-    " and the formula that follows apply P"
+    "the article's text applies 2P at each of two points, but its expression for the"
+    " work and the resulting formula apply P"
 )
 PRELOAD = (
-    "in the article this force preloads the teeth; in fact it bends the cup, and the"
-    " play of the teeth assumed here vanishes at the force listed below"
+    "according to the article, this force preloads the teeth; in fact it bends the cup,"
+    " and with the teeth assumed here, the play vanishes at the force listed below"
 )
 
 
 def characteristic_of(found: Found) -> LobeCharacteristic:
-    """Characteristic from a result of ``run_task`` of kind ``lobes``, in SI units."""
+    """Convert a result of kind ``lobes`` to a characteristic in SI units."""
     return LobeCharacteristic(
         height=found["height_mm"] * mm,
         deflection=np.array(found["deflection_mm"]) * mm,
@@ -40,7 +43,7 @@ def characteristic_of(found: Found) -> LobeCharacteristic:
 
 
 def lobe_rows(own: Force, found: Found) -> list[Row]:
-    """Force and play of the deflected cup, and working points with springs.
+    """Rows of force and play of the deflected cup, and of working points with springs.
 
     Args:
         own: Section of the study file.
@@ -73,20 +76,26 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
             slope = before / arcmin / (step / 1e-6)
     rows = [
         row("lobe force at w_0", "N", nominal, f"{PLACE}; {LOADED}; {PRELOAD}"),
-        row("the same with teeth", "N", wedged, "teeth and circular spline elastic"),
+        row(
+            "lobe force at w_0 with teeth",
+            "N",
+            wedged,
+            "teeth and circular spline are elastic",
+        ),
         row(
             "lobe deflection at which play vanishes",
             "mm",
             None if cup is None else cup.take_up / mm,
-            "not printed; smaller under two loads than on an ellipse, because the cup"
-            " becomes pointed",
+            "not printed; smaller under two loads than on an ellipse, because two loads"
+            " bend the cup to a more pointed shape",
         ),
         row("lobe force at which play vanishes", "N", closed, "not printed"),
         row(
-            "play that a micrometre of lobe takes up",
+            "play taken up per micrometre of lobe deflection",
             "arcmin",
             slope,
-            "not printed; approximately 2 tan(alpha)/r of the flanks",
+            "not printed; approximately 2 tan(alpha)/r with the pressure angle alpha of"
+            " the flanks",
         ),
     ]
     for springs in own.springs:

@@ -1,4 +1,4 @@
-"""Rows of the articles study: closed forms, computed values and open points."""
+"""Rows of the articles study: closed forms, finite elements and variations."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PLACES = ("mid_face", "open_edge", "face_width")
 
 
 def deflection_rows(own: Deflection, found: Mapping[str, Found]) -> list[Row]:
-    """Deflection of the 80:1 drive, and place of its largest stress.
+    """Rows of deflection and largest stress of the 80:1 drive.
 
     Args:
         own: Section of the study file.
@@ -69,7 +69,7 @@ def deflection_rows(own: Deflection, found: Mapping[str, Found]) -> list[Row]:
 def _varied(
     variation: ArticleVariation, part: str, key: str, unit: str, quantity: str = ""
 ) -> RowEntry:
-    """Row of a variation, which changes one point that an article leaves open."""
+    """Row of a variation, which changes one assumption that an article leaves open."""
     return RowEntry(
         quantity=f"{quantity}, {variation.name}" if quantity else variation.name,
         unit=unit,
@@ -79,7 +79,7 @@ def _varied(
 
 
 def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
-    """Deformation force of XB1-100-80: formula, finite elements, and open points.
+    """Rows of the force that deforms XB1-100-80: formula, finite elements, variations.
 
     Args:
         own: Section of the study file.
@@ -109,7 +109,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         low, high = (min(known), max(known)) if known else (None, None)
         values[f"variations, {place}"] = {"low": low, "high": high}
         texts[f"span_{place}"] = (
-            f"; {low:.3g} to {high:.3g} over its open points" if known else ""
+            f"; {low:.3g} to {high:.3g} over the variations" if known else ""
         )
     base = found["force"]
     values["influence"] = (
@@ -123,7 +123,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
 
 
 def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
-    """Stress without torque: shell theory and finite elements.
+    """Rows of the stress without torque: shell theory and finite elements.
 
     Args:
         own: Section of the study file.
@@ -148,7 +148,7 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
 
 
 def _at(found: Found, torque: float) -> Found:
-    """Result of a computation at one torque; empty if it was not computed there."""
+    """Result of a computation at one torque [N·m]; empty if not computed there."""
     if "fault" in found:
         return found
     rows = found["by_torque"]
@@ -175,7 +175,7 @@ def _safety(shell: ShellDimensions, torque: float, steel: Material) -> float:
 
 
 def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
-    """Safety factors over the torque.
+    """Rows of safety factor, nodal force and stress at each torque.
 
     Args:
         own: Section of the study file.

@@ -26,13 +26,14 @@ Found = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class ArticleTask:
-    """One computation; a failed one returns ``fault`` as its only key."""
+    """One computation of the study."""
 
     name: str
     kind: str
     """Key of :data:`KINDS`."""
     design: Design
     toothless: bool = False
+    """Whether the cup has no teeth, for kind ``pinched``."""
     torques: tuple[float, ...] = ()
     """Output torques [N·m]."""
     work: float = 1.0
@@ -40,7 +41,7 @@ class ArticleTask:
 
 
 def run_task(task: ArticleTask) -> Found:
-    """Run a computation; a failure is part of the result, not an error."""
+    """Run a computation; if it fails, the result has the message under ``fault``."""
     try:
         return KINDS[task.kind](task)
     except (ComputationError, DesignError) as error:
@@ -48,7 +49,7 @@ def run_task(task: ArticleTask) -> Found:
 
 
 def _pinched(task: ArticleTask) -> Found:
-    """Radial stiffness [N/mm] by place of the loads."""
+    """Radial stiffness [N/mm] under two opposite loads, by place of the loads."""
     cup = pinched_cup(task.design, toothless=task.toothless)
     return {
         place: cup.pull(1.0, place).stiffness / 1e3
@@ -57,7 +58,11 @@ def _pinched(task: ArticleTask) -> Found:
 
 
 def _rotated(task: ArticleTask) -> Found:
-    """Radial stiffness [N/mm] at mid-face with large rotations, near lobe height."""
+    """Secant radial stiffness [N/mm] at mid-face with large rotations.
+
+    The loads, outward and inward, are those that deflect the cup by the lobe height in
+    the linear model.
+    """
     cup = pinched_cup(task.design)
     deflection = 0.5 * task.design.drive.module_mm * task.design.tooth_difference * mm
     force = cup.pull(1.0).stiffness * deflection
@@ -68,7 +73,7 @@ def _rotated(task: ArticleTask) -> Found:
 
 
 def _lobes(task: ArticleTask) -> Found:
-    """Force [N] and play [mrad] over the deflection of a lobe [mm]."""
+    """Force of a lobe [N] and play [mrad] as functions of its deflection [mm]."""
     found = lobe_characteristic(task.design)
     return {
         "height_mm": found.height / mm,
@@ -81,7 +86,11 @@ def _lobes(task: ArticleTask) -> Found:
 
 
 def _four(task: ArticleTask) -> Found:
-    """Load case of the article by torque: radial displacement [mm], stress [MPa]."""
+    """Stress [MPa], radial displacement [mm] and safety factors, by torque.
+
+    The load case is that of the article: four forces in the bore instead of a wave
+    generator.
+    """
     cup = pinched_cup(task.design)
     shell = ShellDimensions.from_design(task.design)
     loaded = four_forces(cup, shell.deflection)
@@ -107,7 +116,7 @@ def _four(task: ArticleTask) -> Found:
 
 
 def _fatigue(task: ArticleTask) -> Found:
-    """Safety factors by torque on the wave generator of the design."""
+    """Safety factors by torque, with the wave generator of the design."""
     return {"by_torque": [a.to_json() for a in fatigue(task.design, task.torques)]}
 
 

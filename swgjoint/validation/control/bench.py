@@ -2,8 +2,8 @@
 
 The motions are a fast move (tracking), one slow output turn in one direction
 (positioning), and a turn at constant speed after some turns of learning (ripple). Each
-runs on one specimen of a drive. The controllers know the load except for an unknown
-part. The encoders are noisy, and their readings are one control period old.
+motion runs on one specimen of a drive. The controllers know only a part of the load.
+The encoders are noisy, and their readings are one control period old.
 """
 
 from __future__ import annotations
@@ -28,15 +28,18 @@ from swgjoint.validation.control.specimens import nominal, specimen
 from swgjoint.view.run import run_scene
 
 FREQUENCY = 20.0
-"""Natural frequency of the motor loop of every controller [Hz]; damping ratio 1."""
+"""Natural frequency of the motor loop of every controller [Hz]; the damping ratio is 1.
+"""
 LOAD, RECORD_LOAD = 0.3, 0.6
-"""Known load of the motions and of the record, divided by the rated torque [-]."""
+"""Known load of the motions, and of the record for identification, divided by the rated
+torque [-]."""
 UNKNOWN = 0.1
-"""Largest unknown part of the load, as a fraction of the known load [-]."""
+"""Largest magnitude of the unknown load, divided by the known load [-]."""
 MOTOR_COUNTS, LINK_NOISE, DELAY = 2**17, 2.0, 1e-3
 """Counts per turn of the motor encoder, noise of the link encoder [arcsec], and age of
 both readings [s]. The age is one control period, and the controllers know it."""
 TWO_PER_TURN = ((2, 0), (0, 2), (1, 1))
+"""Orders (p, q) of the ripple at about two periods per input turn."""
 
 UNITS = {
     "tracking_rms": "arcmin",
@@ -46,9 +49,9 @@ UNITS = {
     "two_per_turn": "N·m",
     "effort_rms": "N·m",
 }
-"""Figures of a controller with their units: link error during the move, peak-to-peak
-link error on the slow turn, ripple of the output torque at constant speed and its
-component at 2 per turn, and motor torque during the move."""
+"""Figures of a controller with their units: rms and largest link error during the move,
+peak-to-peak link error on the slow turn, ripple of the output torque at constant speed
+and its component at 2 per turn, and rms motor torque during the move."""
 
 MOVE: dict[str, Any] = {
     "trajectory": {
@@ -79,7 +82,9 @@ MOTIONS = {"move": MOVE, "slow": SLOW, "even": EVEN}
 
 
 def record_turn(drive: DriveMap, seed: int) -> JointRecord:
-    """Record a noisy slow turn at another load, with another random part of the drive.
+    """Record a slow output turn of a specimen, from which its errors are identified.
+
+    Load, noise and random part of the errors differ from those of the motions.
 
     Args:
         drive: Nominal drive.
@@ -100,7 +105,7 @@ def run_motion(
     load: float = LOAD,
     delay: float = DELAY,
 ) -> Run:
-    """Run one motion of a specimen with unknown load, delay and noise.
+    """Run one motion of a specimen with unknown load, and with delay and noise.
 
     Args:
         drive: Nominal drive, which the controller knows.
@@ -151,7 +156,7 @@ def run_motion(
 
 
 def figures_of(runs: dict[str, Run]) -> dict[str, float]:
-    """Figures of :data:`UNITS` from the runs by motion."""
+    """Figures in the units of :data:`UNITS`, from the runs by motion."""
     move, slow, even = (runs[motion] for motion in MOTIONS)
     moving = move.time >= MOVE["trajectory"]["hold_s"]
     off = (move.position - move.reference)[moving, 0] / arcmin
@@ -186,7 +191,7 @@ def two_per_turn(run: Run) -> float:
 
 
 def signals_of(runs: dict[str, Run]) -> dict[str, Array]:
-    """Signals of the runs by motion, for the picture."""
+    """Signals to plot, from the runs by motion."""
     move, slow, even = (runs[motion] for motion in MOTIONS)
     turn = slice(slow.steady.start, slow.steady.stop, 10)
     last = slice(even.time.size - 1000, even.time.size)

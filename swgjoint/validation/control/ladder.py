@@ -1,15 +1,18 @@
 """``swgjoint study control``: a ladder of baseline controllers for one joint.
 
-The controllers run on specimens of a drive on the bench joint, ten by default. Phases
+The controllers run on the bench joint with specimens of a drive, ten by default. Phases
 of the errors, friction, load and sensor noise of a specimen are random. Every
-controller adds one feature to another one and targets one figure, which :data:`RUNGS`
-named before any run; the target of predictive control was chosen after a trial on two
-specimens. The figures come from three motions: a fast move (tracking), one slow output
-turn in one direction (positioning), and a turn at constant speed after learning
-(ripple). All controllers read the motor encoder. Learning and predictive control also
-read the link encoder, which was used to record the table as well. Readings are one
-control period of 1 ms old, as in the environments. The controllers know this age and
-compare a reading with the plan at the time of the reading.
+controller except the first one extends another controller by one feature and targets
+one figure. These targets were chosen before any run, except that of predictive control,
+which was chosen after a trial on two specimens. The figures come from three motions: a
+fast move (tracking), one slow output turn in one direction (positioning), and a turn at
+constant speed after learning (ripple).
+
+All controllers read the motor encoder. Learning and predictive control also read the
+link encoder, and so does the recorder of the turn from which the error table is
+identified. Readings are one control period of 1 ms old, as in the environments. The
+controllers know this age and compare a reading with the plan at the time of the
+reading.
 """
 
 from __future__ import annotations
@@ -52,8 +55,9 @@ from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 SEEDS = 10
+"""Default number of specimens."""
 LEARNED = ((1, 1), *((p, 0) for p in range(1, 9)), *((0, q) for q in range(1, 9)))
-"""Learned orders: up to 8 of either member."""
+"""Learned orders (p, q): 1 to 8 of either member, and their combination (1, 1)."""
 
 Build = Callable[[KinematicErrorTable], Controller]
 
@@ -66,9 +70,9 @@ class Rung:
     build: Build
     """Function that builds the controller from the error table of the specimen."""
     made_for: str | None = None
-    """Figure of :data:`UNITS` that the controller targets."""
+    """Figure of :data:`UNITS` that the controller targets; None for the first rung."""
     over: str | None = None
-    """Rung that this one extends; None for the first."""
+    """Name of the rung that this one extends; None for the first rung."""
 
 
 def _plan(planner: Any) -> Build:
@@ -135,9 +139,10 @@ class Ladder:
 
     drive: DriveMap
     figures: dict[str, dict[str, Array]]
-    """Values by rung and figure, shape (n_seeds,) each."""
+    """Values by rung and figure, in the units of :data:`UNITS`, shape (n_seeds,) each.
+    """
     shown: dict[str, dict[str, Array]]
-    """Signals of the first seed by rung, for the picture."""
+    """Signals to plot by rung, for the first specimen."""
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -150,10 +155,11 @@ class Ladder:
         return {rung.name: rung.made_for for rung in RUNGS}
 
     def improvement(self, rung: Rung) -> tuple[float, int]:
-        """Improvement of the target figure compared with the extended rung.
+        """Compare the target figure of a rung with that of the rung it extends.
 
         Returns:
-            Ratio of the mean figures [-], and the number of seeds that improved.
+            Ratio of the means, smaller than one for an improvement [-], and the number
+            of specimens on which the figure improved.
         """
         assert rung.made_for is not None and rung.over is not None
         after, before = (
@@ -178,6 +184,9 @@ def climb(
         jobs: Number of processes.
         rungs: Names of the rungs to run.
         progress: Called with the stage, the number of finished specimens and the total.
+
+    Returns:
+        Figures of all specimens, and signals of the first one.
     """
     tasks = [(drive, seed, rungs) for seed in range(seeds)]
     found = run_all(_one_seed, tasks, jobs=jobs, stage="specimens", progress=progress)
@@ -212,17 +221,20 @@ def _one_seed(
 
 
 def run_control(options: StudyOptions) -> StudyResult:
-    """Run the ladder; ``only`` names other drives, maps or designs.
+    """Run all controllers on specimens of every drive.
+
+    ``only`` names drives, maps or designs to use instead of the default drive.
 
     Raises:
-        InputError: If a drive is unknown or a fidelity does not fit it.
+        InputError: If a drive is unknown, or if a model is given for a drive that is
+            not a design.
     """
     from swgjoint.view.plots.control import ladder_picture, ladder_table
 
     pages: dict[str, Page] = {}
     references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
     drives = {
-        # the study draws its own errors, with more orders
+        # the specimens get their own kinematic errors, which have more orders
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
         for name in references
     }
@@ -252,7 +264,7 @@ def run_control(options: StudyOptions) -> StudyResult:
 
 
 def ladder_rows(name: str, found: Ladder) -> list[Row]:
-    """One row per rung and figure.
+    """Rows of the mean figures, one per rung and figure.
 
     Args:
         name: Name of the drive.
@@ -275,7 +287,7 @@ def ladder_rows(name: str, found: Ladder) -> list[Row]:
 
 
 def ladder_claims(found: Ladder) -> list[str]:
-    """One line per rung: the change of its target figure."""
+    """Lines on the target figures: one per rung that extends another one."""
     lines = []
     for rung in RUNGS:
         if rung.made_for is None or not {rung.name, rung.over} <= set(found.figures):
@@ -283,7 +295,7 @@ def ladder_claims(found: Ladder) -> list[str]:
         share, better = found.improvement(rung)
         count = len(found.figures[rung.name][rung.made_for])
         lines.append(
-            f"{rung.name}: {rung.made_for} {share:.3g} times that of {rung.over!r},"
+            f"{rung.name}: {rung.made_for} is {share:.3g} times that of {rung.over!r},"
             f" better on {better} of {count} specimens"
         )
     return lines

@@ -1,11 +1,12 @@
 """Specimens of one drive, which differ within manufacturing tolerances.
 
-The errors of a specimen are drawn as a spectrum. The amplitudes come from finite
-elements of a drive at the limits of its tolerances
+The kinematic error of a specimen is drawn as a spectrum. The amplitudes come from
+finite elements of a drive at the limits of its tolerances
 (:mod:`swgjoint.maps.fit.error_spectrum`), the phases from a seed. The *systematic* part
 belongs to the specimen: low orders from cumulative pitch error, roundness and centring.
-The *random* part has higher orders from single pitch errors and a separate seed.
-A record can therefore be taken on a drive that differs from the compensated one.
+The *random* part, higher orders from single pitch errors, has a separate seed. The
+record for identification can therefore have another random part than the drive whose
+error is compensated.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ RANDOM = 0.07
 """Amplitude of each of :data:`RANDOM_ORDERS`, which single pitch errors cause, relative
 to the amplitude of order 2 alpha [-]."""
 RANDOM_ORDERS = (*((p, 0) for p in range(5, 13)), *((0, q) for q in range(5, 13)))
+"""Orders (p, q) of the random part."""
 LOW = 4
-"""Largest order of a map that belongs to its systematic part."""
+"""Largest order of a map with kinematic error that belongs to its systematic part."""
 ACCURACY = 1.0
 """Transmission accuracy of a drive whose catalogue states none [arcmin]."""
 FRICTION = 0.2
@@ -34,10 +36,11 @@ FRICTION = 0.2
 def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
     """Draw one specimen of a drive.
 
-    A map with kinematic error keeps its amplitudes and gets other phases, equal for
-    potential and error. A map without gets the orders of
+    A map with kinematic error keeps its amplitudes and gets other phases, shifted
+    equally for potential and error. A map without kinematic error gets the orders of
     :mod:`swgjoint.maps.fit.error_spectrum` and the random orders. Their peak-to-peak
-    value over one turn is the transmission accuracy that the catalogue states.
+    value over one output turn is the transmission accuracy that the catalogue states,
+    or else :data:`ACCURACY`. The friction is scaled at random.
 
     Args:
         base: Nominal drive.
@@ -61,7 +64,7 @@ def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
 
 
 def nominal(base: DriveMap) -> DriveMap:
-    """Known properties of every specimen of a drive: mean curve and friction."""
+    """Map that the controllers know for every specimen: mean curve and friction."""
     return base.with_harmonics(np.zeros(len(base.orders), dtype=bool))
 
 
