@@ -78,10 +78,10 @@ def test_stiffness_is_that_of_the_segments(computed, tmp_path):
     assert one["K2_Nm_rad"] == pytest.approx(5e4)
     assert one["half_play_rad"] == pytest.approx(0.25 * one["torsion_rad"][0])
     text = "\n".join(found.summary)
-    assert text.count("half the play 25 % of the torsion at T1") == len(rows)
+    assert text.count("half the play is 25 % of the torsion at T1") == len(rows)
     assert "bearing, relieved over rigid, relieved: 0.50/0.50/0.50 at ratio 50" in text
     assert f"failed: {FAILED}: no equilibrium" in text
-    assert "tooth forces at -0.20/-0.20/-0.20 b" in text
+    assert "tooth forces centred at -0.20/-0.20/-0.20 face widths" in text
     assert (tmp_path / "coning.png").read_bytes().startswith(b"\x89PNG")
     assert str(tmp_path / "coning.png") in found.files
 

@@ -80,8 +80,8 @@ def test_failed_cases_count_as_not_met(monkeypatch):
     """Three of four sizes without a value leave one of four, not one of one."""
     found = run(monkeypatch, [f"path {size} 100" for size in (17, 20, 32)])
     line = line_of(found, "K2, ratio 100")
-    assert "3 of 5 without a middle" in line
-    assert line.endswith("within 25 %: 1 of 4 (3 lack variants: not met)")
+    assert "3 of 5 cases have no middle" in line
+    assert line.endswith("1 of 4 (3 with missing variants count as not met)")
     line = line_of(found, "K1 < K2")
     assert line.endswith("of 15 cases and is unknown in 3")
 
@@ -91,7 +91,11 @@ def test_a_bracket_that_lost_a_variant_is_not_met(monkeypatch):
     case = "size 20, ratio 80"
     for broken, met, line in (
         ([], True, "within 25 %: 4 of 4"),
-        (["path 20 80 28"], False, "within 25 %: 3 of 4 (1 lack variants: not met)"),
+        (
+            ["path 20 80 28"],
+            False,
+            "within 25 %: 3 of 4 (1 with missing variants count as not met)",
+        ),
     ):
         found = run(monkeypatch, broken)
         (row,) = (r for r in found.rows if (r.case, r.quantity) == (case, "K2"))
@@ -125,7 +129,7 @@ def test_a_flank_without_a_limit_leaves_a_lower_bound():
     rows = [open_end, closed]
     lines = summary(file, rows)
     assert "ratio 50: model over catalogue 3.19 to 3.19" in lines[0]
-    assert lines[1].endswith("ratio 80: no middle, more than 1.36 to 1.36")
+    assert lines[1].endswith("ratio 80: no middle; lower bounds 1.36 to 1.36")
     picture = catalogue_picture([open_end])
     assert picture is not None and picture.startswith(b"\x89PNG")
     first, second = ratcheting_orders(file, found, 25)

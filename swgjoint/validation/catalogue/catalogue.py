@@ -2,17 +2,19 @@
 
 The parts are:
 
-- ``stiffness``: K1, K2, K3, hysteresis loss and lost motion by thin rings with the
-  bearing of the wave generator, and the share of each mechanism;
-- ``individuals``: individual gears with errors, by the same rings;
-- ``accuracy``: transmission error over an output turn, by the same rings;
-- ``ratcheting``: ratcheting torque by 2D finite elements;
+- ``stiffness``: K1, K2, K3, hysteresis loss and lost motion, from thin rings with the
+  bearing of the wave generator, and the share of each mechanism in the compliance;
+- ``individuals``: scatter of K1, K2, K3 between individual gears with errors, from the
+  same rings;
+- ``accuracy``: transmission accuracy over an output turn, from the same rings;
+- ``ratcheting``: ratcheting torque from 2D finite elements;
 - ``losses``: no-load running and starting torque from the friction of teeth and race;
-- ``coning``, only if requested: the wave generator in 3D, rigid and on its bearing, at
-  two ratios, which takes about 20 CPU minutes.
+- ``coning``, only if requested: K1, K2, K3 from 3D finite elements with a rigid wave
+  generator and with one on its bearing, at two ratios (about 20 CPU minutes).
 
 ``models/studies/catalogue.toml`` lists the designs. If the sources leave a choice open,
-several variants are run, and ``ours`` is the middle of their bracket.
+several variants are computed. ``ours`` is then the middle of their bracket, which
+extends from the smallest to the largest value.
 """
 
 from __future__ import annotations
@@ -53,13 +55,14 @@ PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
 EXTRA = ("coning",)
 """Parts that run only if requested."""
 REFERENCE = 25
-"""Size from which results are scaled to the other sizes."""
+"""Size at which shares and friction are listed, and from which ratcheting torque and
+accuracy are scaled to the other sizes."""
 CHECK = (14, 80)
-"""Size and ratio that are also computed, to check the scaling."""
+"""Size and ratio at which both are also computed, to check the scaling."""
 
 
 def run_catalogue(options: StudyOptions) -> StudyResult:
-    """Run the chosen parts, or :data:`PARTS`.
+    """Run the chosen parts, or those in :data:`PARTS` if none is chosen.
 
     Raises:
         InputError: If a part is unknown.

@@ -1,9 +1,9 @@
-"""Why the 2D model is too stiff at a low ratio: wave generator and teeth in 3D.
+"""Part ``coning``: why 2D models are too stiff at a low ratio.
 
-The cup cones, so that the contact forces of teeth and wave generator move to the open
-end. The cases are a rigid wave generator and one on its bearing, each with teeth and
-wave generator straight or relieved along the face width, and the thin rings, which do
-not cone.
+The deflected cup is conical, so that the contact forces of teeth and wave generator
+move towards its open end. Models of the section, such as the thin rings, lack this
+effect. The 3D cases are a rigid wave generator and one on its bearing, each with teeth
+and wave generator straight or relieved along the face width.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ CASES = (
     ("bearing, relieved", "coning free", False),
     ("bearing held axially, relieved", "coning held", False),
 )
-"""Name, kind of computation, and whether the face width is straight (no relief)."""
+"""Cases: name, kind of computation, and whether relief along the face width is
+omitted."""
 
 
 def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
@@ -51,7 +52,7 @@ def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
 
 
 def coning_summary(study: CatalogueFile, found: Mapping[str, Found]) -> dict[str, Any]:
-    """K1, K2, K3 of each case relative to the catalogue, and centres of the forces.
+    """Compare K1, K2, K3 of each case with the catalogue, and list the force centres.
 
     Args:
         study: Study file.
@@ -93,16 +94,17 @@ def _line(size: int, row: Mapping[str, Any]) -> str:
     line += f" catalogue {text}"
     if "half_play_rad" in row:
         part = round(100.0 * row["half_play_rad"] / row["torsion_rad"][0])
-        line += f"; half the play {part} % of the torsion at T1"
+        line += f"; half the play is {part} % of the torsion at T1"
     if "tooth_centre_over_face" in row:
         for what in ("tooth", "bore"):
             centre = row[f"{what}_centre_over_face"]
-            line += f"; {what} forces at {'/'.join(f'{c:+.2f}' for c in centre)} b"
+            line += f"; {what} forces centred at"
+            line += f" {'/'.join(f'{c:+.2f}' for c in centre)} face widths"
     return line
 
 
 def _drops(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Ratio of K between pairs of cases, at each ratio of the drive."""
+    """Lines on K1, K2, K3 of one case divided by those of another, by drive ratio."""
     K = {(row["ratio"], row["case"]): np.array(row["over_catalogue"]) for row in rows}
     ratios = sorted({ratio for ratio, _ in K})
     lines = []
@@ -125,7 +127,7 @@ def _drops(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def coning_picture(rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """PNG: K relative to the catalogue by case, and centre of the tooth forces."""
+    """Plot K relative to the catalogue, and the centre of the tooth forces, as PNG."""
     from matplotlib.figure import Figure
 
     ratios = sorted({row["ratio"] for row in rows})

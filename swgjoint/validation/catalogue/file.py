@@ -1,4 +1,4 @@
-"""Study file of the catalogue study, ``models/studies/catalogue.toml``."""
+"""File of the catalogue study, ``models/studies/catalogue.toml``, and its designs."""
 
 from __future__ import annotations
 
@@ -21,18 +21,27 @@ Text = Annotated[str, Field(min_length=1, max_length=300)]
 
 
 class Variant(Section):
-    """Changes of the family design for a choice that the sources leave open."""
+    """Changes of the family design, one of several choices that the sources leave open.
+
+    Keys of the mappings are dotted keys of the design.
+    """
 
     name: Text
     cup: Text
+    """Name of the cup in messages."""
     flank_deg: float
+    """Pressure angle of the flanks [deg], for the names of computations; it must be
+    that of the changed design."""
     per_pitch_diameter: Mapping[str, float] = {}
+    """Lengths divided by the pitch diameter [-]."""
     per_module: Mapping[str, float] = {}
+    """Lengths divided by the module [-]."""
     changes: Mapping[str, Any] = {}
+    """Values in the units of the design file."""
 
 
 class Goal(Section):
-    """Accepted deviation of the middle of the bracket from the catalogue [-]."""
+    """Accepted relative deviation from the catalogue of the bracket's middle [-]."""
 
     ratios: Numbers
     sizes: Numbers
@@ -52,35 +61,47 @@ class Individuals(Section):
 
     seeds: Numbers
     variant: Text
+    """Name of the variant."""
     size: Whole
     ratio: Whole
     clearance: Mapping[str, Any]
+    """Description of the random bearing clearance; :meth:`CatalogueFile.individual`
+    does not read it."""
     changes: Mapping[str, Any]
+    """Tolerances by dotted key of the design."""
     source: Text
+    """Source of the tolerances."""
 
 
 class ConingSection(Section):
-    """The wave generator in 3D, rigid and on its bearing, at one size."""
+    """Comparison of wave generators in 3D, rigid and on a bearing, at one size."""
 
     size: Whole
     ratios: Numbers
     variant: Text
+    """Name of the variant."""
     refinement: float
+    """Mesh refinement [-]."""
     straight: Mapping[str, Any]
+    """Changes of the design that omit relief along the face width."""
     assumptions: Annotated[tuple[Text, ...], Field(strict=False)]
 
 
 class CatalogueFile(Section):
-    """File of the study."""
+    """Content of the study file."""
 
     source: Text
     sizes: Numbers
+    """Sizes of the drives: the pitch diameter in tenths of an inch."""
     ratios: Numbers
     goals: Annotated[tuple[Goal, ...], Field(strict=False)]
     no_claim: Annotated[tuple[NoClaim, ...], Field(strict=False)] = ()
     middle: Literal["mean of smallest and largest"]
+    """Definition of the middle of a bracket."""
     stated: Mapping[str, Mapping[str, Any]]
+    """Assumed values with their sources; only ``tooth_friction`` is read."""
     variants: Annotated[tuple[Variant, ...], Field(strict=False, min_length=1)]
+    """Variants; the first one is used where only one is computed."""
     individuals: Individuals
     coning: ConingSection
 
@@ -89,7 +110,7 @@ class CatalogueFile(Section):
         """Read a study file, given as a path or as the name of a bundled one.
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file is missing or invalid, with one line per fault.
         """
         path = find(reference, "studies", ".toml", what="study")
         data = read_toml(path, what="study", error=InputError)
@@ -115,7 +136,7 @@ class CatalogueFile(Section):
         return None
 
     def coned_design(self, ratio: int, *, straight: bool) -> Design:
-        """Design for the 3D model.
+        """Design of part ``coning`` for the 3D model.
 
         Args:
             ratio: Ratio of the drive.
@@ -128,7 +149,11 @@ class CatalogueFile(Section):
         return design.with_changes({**changes, **(own.straight if straight else {})})
 
     def individual(self, seed: int) -> Design:
-        """Individual gear with random errors and a clearance drawn from its class."""
+        """Design of an individual gear.
+
+        The tooth errors and the bearing clearance are random; the clearance is
+        uniformly distributed over its class.
+        """
         own = self.individuals
         variant = next(v for v in self.variants if v.name == own.variant)
         design = variant_design(own.size, own.ratio, variant)

@@ -27,7 +27,7 @@ _MILLI = 1e-3
 
 
 def loss_tasks(study: CatalogueFile) -> list[CatalogueTask]:
-    """Computations for every drive with stated losses and every flank angle.
+    """Computations for every drive with catalogue losses and every flank angle.
 
     The cup has no losses, so variants that differ only in the cup share a computation.
     """
@@ -51,7 +51,7 @@ def _name(size: int, ratio: int, flank: float) -> str:
 
 
 def running_of(found: Found) -> RunningFriction:
-    """Convert a result of kind ``running`` to its original form."""
+    """Convert a result of kind ``running`` to :class:`RunningFriction`."""
     return RunningFriction(
         input_angle=np.array(found["input_angles_rad"]),
         elastic=np.array(found["elastic_Nm"]),
@@ -64,7 +64,9 @@ def running_of(found: Found) -> RunningFriction:
 def loss_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found]
 ) -> list[Row]:
-    """Rows of both torques, with brackets over flank angles and friction coefficients.
+    """Rows of no-load running torque and starting torque of a drive.
+
+    Their brackets cover all flank angles and friction coefficients.
 
     Args:
         study: Study file.
@@ -72,7 +74,7 @@ def loss_rows(
         found: Results by computation.
 
     Returns:
-        Two rows; none if the catalogue states no losses of the drive.
+        Two rows; none if the catalogue states no losses for the drive.
     """
     stated = stated_losses(row)
     if stated is None:
@@ -121,7 +123,7 @@ def loss_rows(
 
 
 def loss_lines(rows: Sequence[Row]) -> list[str]:
-    """One line per quantity: whether our torques are below the catalogue values."""
+    """Lines that state, by quantity, whether our torques are below the catalogue."""
     lines = []
     for quantity in (RUNNING, STARTING):
         over = {

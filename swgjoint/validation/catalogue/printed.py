@@ -1,4 +1,4 @@
-"""Catalogue values of a component set."""
+"""Values that the catalogue prints for a component set."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from swgjoint.typing import Array
 
 STIFFNESS = ("K1", "K2", "K3")
 RATIO_CLASS = 80
-"""Ratio class of the stiffness and accuracy tables for this ratio and above."""
+"""Highest ratio class of the stiffness and accuracy tables; it includes larger ratios.
+"""
 
 
 def catalogue_row(size: int, ratio: int) -> CatalogueRow:
     """Ratings of a component set.
 
     Args:
-        size: Size.
-        ratio: Ratio.
+        size: Size of the drive, its pitch diameter in tenths of an inch.
+        ratio: Ratio of the drive, positive.
 
     Raises:
         InputError: If the catalogue does not list the component set.
@@ -36,13 +37,17 @@ def edges(row: CatalogueRow) -> tuple[float, float, float, float]:
 
 
 def torques_of(row: CatalogueRow) -> tuple[float, ...]:
-    """Torques of a path: lost motion, rated torque, and segment ends [N·m]."""
+    """Torques of a loading path, increasing: lost motion, rated, segment ends [N·m]."""
     lost = LOST_MOTION_TORQUE * row.rated_torque
     return tuple(sorted({lost, row.rated_torque, *edges(row)[1:]}))
 
 
 def catalogue_stiffness(row: CatalogueRow) -> Array:
-    """Printed K1, K2, K3 [N·m/rad], shape (3,)."""
+    """Printed K1, K2, K3 [N·m/rad], shape (3,).
+
+    Raises:
+        ValueError: If the catalogue has no stiffness for this size and ratio.
+    """
     ratio_class = float(min(row.ratio, RATIO_CLASS))
     for line in table("stiffness"):
         if (line["size"], line["ratio_class"]) == (float(row.size), ratio_class):

@@ -27,7 +27,7 @@ from swgjoint.validation.rows import Row
 
 
 def friction_of_path(found: Found, design: Design) -> RubbedPath:
-    """Path of the thin rings in series with the cup of a design.
+    """Loading path of the thin rings in series with the cup of a design.
 
     Args:
         found: Result of kind ``path``.
@@ -56,12 +56,12 @@ def friction_of_path(found: Found, design: Design) -> RubbedPath:
 
 
 def stiffnesses(path: RubbedPath, row: CatalogueRow) -> Array:
-    """K1, K2, K3 of a path [N·m/rad], shape (3,).
+    """K1, K2, K3 of a loading path [N·m/rad], shape (3,).
 
-    Both signs of torque are mirror images, so that the torsion starts at zero.
+    The curve is symmetric in torque, so its segments start at zero torsion.
 
     Args:
-        path: Path of the drive.
+        path: Loading path of the drive.
         row: Ratings with the torques of the segments.
     """
     torques = edges(row)
@@ -113,7 +113,7 @@ def stiffness_rows(
                 whole=whole,
             )
         )
-    bound = "catalogue states an upper bound"
+    bound = "the catalogue states an upper bound"
     for key in ("hysteresis loss", "lost motion"):
         source = bounds[f"{key.replace(' ', '_')}_arcmin"]
         why = f"{bound}; {reason}" if reason else bound
@@ -141,7 +141,7 @@ def bracket_row(
         row: Ratings of the drive.
         quantity: Name of the quantity.
         unit: Unit of all values.
-        source: Value of the catalogue.
+        source: Value of the catalogue; None if it states none.
         values: Values of the variants.
         reason: Reason of the row, see :class:`Row`.
         goal: Accepted relative deviation of the middle; an incomplete bracket does not
@@ -189,9 +189,10 @@ def bracket_row(
 def ratcheting_rows(
     study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found], size: int
 ) -> list[Row]:
-    """Row of the ratcheting torque, scaled by the cube of the size.
+    """Row of the ratcheting torque, scaled from one size by the cube of the size.
 
-    The bracket covers all flank angles.
+    The bracket covers all flank angles. Results for a circular spline fixed outside and
+    flank angles without a limit are part of the reason.
 
     Args:
         study: Study file.
@@ -240,7 +241,8 @@ def accuracy_rows(
 ) -> list[Row]:
     """Row of the transmission accuracy, scaled from one size if not computed.
 
-    The errors are lengths, so that their angle is inversely proportional to the size.
+    Tooth errors are lengths, so the resulting angle is inversely proportional to the
+    size.
 
     Args:
         study: Study file.
@@ -252,9 +254,10 @@ def accuracy_rows(
     own = found.get(f"accuracy {row.size} {row.ratio}", {"fault": "not computed"})
     source = printed_accuracy(row)["transmission_accuracy_arcmin"]
     why = (
-        "catalogue states an upper bound; one gear with the stated errors; bracket from"
-        " the peaks of low orders or samples to 2 rms of the other orders beyond either"
-        " peak"
+        "the catalogue states an upper bound; one gear with the errors of the study"
+        " file; the bracket starts at the peak-to-peak value of the low orders or of"
+        " the samples and ends at that of the low orders plus twice the rms of the"
+        " other orders at both peaks"
     )
     values: list[float] = []
     if "fault" not in own:

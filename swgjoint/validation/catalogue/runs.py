@@ -24,17 +24,17 @@ Found = dict[str, Any]
 
 OUTSIDE = 1.37
 """Outer diameter of the circular spline divided by the pitch diameter [-], for
-ratcheting: mean of 1.34 to 1.41 for component sets of sizes 14 to 32 (50, 60, 70, 85,
-110 mm; dimensions quoted from memory, not verified)."""
+ratcheting: mean for component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm, not
+verified), which range from 1.34 to 1.41."""
 ANGLES = 96
-"""Number of input angles over one output turn for the accuracy."""
+"""Number of input angles over one output turn for the transmission error."""
 INDIVIDUAL_ANGLES = 8
 """Number of input angles over one output turn at which an individual gear is loaded."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueTask:
-    """One computation."""
+    """One computation of the study."""
 
     name: str
     kind: str
@@ -47,7 +47,10 @@ class CatalogueTask:
 
 
 def run_task(task: CatalogueTask) -> Found:
-    """Result of a task, from the cache or computed; ``fault`` if it failed."""
+    """Result of a task, read from the cache or computed.
+
+    Every result includes ``wall_s``; that of a failed task has only ``fault`` besides.
+    """
     parts = {
         "study": _own_version(),
         "kind": task.kind,
@@ -73,21 +76,24 @@ def _own_version() -> str:
 
 
 def _whole_path(task: CatalogueTask, angles: Array | None = None) -> RubbedPath:
-    """Path of the rings up to the last torque of a task."""
+    """Loading path of the thin rings up to the largest torque of a task."""
     from swgjoint.fe.rings.friction import friction_path
 
     path = friction_path(task.design, task.torques, angles=angles)
     if not path.outcome.ok:
         reached = path.torque[-1] if path.torque.size else 0.0
         raise ComputationError(
-            f"rings reach {reached:.4g} of {max(task.torques):.4g} N·m:"
+            f"the thin rings reach {reached:.4g} of {max(task.torques):.4g} N·m:"
             f" {path.outcome.value}"
         )
     return path
 
 
 def _path(task: CatalogueTask) -> Found:
-    """Torsion without cup [rad] and sliding work per mu [J] over the torque."""
+    """Torsion without cup [rad] by torque, and friction work between torques.
+
+    The friction work [J] is divided by the friction coefficient.
+    """
     path = _whole_path(task)
     work = path.teeth_work + path.race_work
     return {
@@ -106,14 +112,14 @@ def _path(task: CatalogueTask) -> Found:
 
 
 def _ratcheting(task: CatalogueTask) -> Found:
-    """Ratcheting torque of the 2D model, with the mounting of the circular spline."""
+    """Ratcheting torque of the 2D model, with the outer rim as in the design."""
     from swgjoint.fe.plane.figures.ratcheting import ratcheting_path
 
     return ratcheting_path(task.design).as_dict()
 
 
 def _individual(task: CatalogueTask) -> Found:
-    """Torsion without cup [rad] over the torque, at angles over an output turn."""
+    """Torsion without cup [rad] by torque, at several angles of an output turn."""
     from swgjoint.fe.rings.accuracy import output_turn_angles
 
     angles = output_turn_angles(task.design, INDIVIDUAL_ANGLES)
@@ -128,7 +134,7 @@ def _individual(task: CatalogueTask) -> Found:
 
 
 def _accuracy(task: CatalogueTask) -> Found:
-    """Kinematic error of the rings over one output turn at almost zero load."""
+    """Transmission error of the thin rings over one output turn at almost no load."""
     from swgjoint.fe.rings.accuracy import output_turn_angles, transmission_error
 
     angles = output_turn_angles(task.design, ANGLES)
@@ -137,7 +143,7 @@ def _accuracy(task: CatalogueTask) -> Found:
 
 
 def _running(task: CatalogueTask) -> Found:
-    """Input torque of slow rotation without load, and friction torques per mu."""
+    """Input torque in slow rotation without load, and friction torques per mu."""
     from swgjoint.fe.rings.running import running_friction
 
     found = running_friction(task.design)
@@ -151,7 +157,7 @@ def _running(task: CatalogueTask) -> Found:
 
 
 def _coning(task: CatalogueTask) -> Found:
-    """Torsion of the 3D model over the torque; the kind ends with the bearing type."""
+    """Torsion of the 3D model by torque; the last word of the kind is the bearing."""
     from swgjoint.fe.solid.figures.torsion import solid_torsion
 
     bearing = {"rigid": None, "free": "free", "held": "held"}[task.kind.split()[1]]
@@ -169,7 +175,7 @@ def _coning(task: CatalogueTask) -> Found:
 
 
 def _coning_ring(task: CatalogueTask) -> Found:
-    """Torsion of the thin rings over the torque, with the closed-form cup in series."""
+    """Torsion of the thin rings by torque, with the cup in series in closed form."""
     path = _whole_path(task, np.zeros(1))
     at = np.searchsorted(path.torque, task.torques)
     return {
@@ -195,7 +201,10 @@ KINDS: dict[str, Callable[[CatalogueTask], Found]] = {
 
 
 def oval(design: Design) -> Design:
-    """Design with a free circular spline as thick as in component sets."""
+    """Design whose circular spline can become oval.
+
+    Its outside is free, and its rim is as thick as in component sets.
+    """
     drive = design.drive
     own = design.circular_spline
     root = drive.module_mm * (

@@ -1,4 +1,4 @@
-"""Influences on the stiffness: size, mechanisms, scatter of individual gears."""
+"""Influences on the stiffness: size, mechanisms, friction, individual errors."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from swgjoint.validation.catalogue.runs import Found
 def cube_scaling(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Compare K of every size with the values scaled by the cube of the size.
+    """Compare K of every size with values scaled from one size by the cube of the size.
 
-    Segments end at the largest torque that both sizes reach. Between the computed
-    torques the curves are cubics with the computed tangents, because the scaled torques
-    of one size differ from the torques of another.
+    Segments end at the largest torque that both sizes reach. The scaled torques of one
+    size differ from the torques computed at another, so the curves are interpolated by
+    cubics with the computed tangents.
 
     Args:
         study: Study file.
@@ -68,14 +68,14 @@ def cube_scaling(
     percent = "/".join(f"{100 * value:.0f}" for value in worst)
     line = (
         f"K1/K2/K3 computed at each size are within {percent} % of those of size"
-        f" {size} scaled by the cube, up to the torque that both reach; clearances do"
-        " not scale"
+        f" {size} scaled by the cube of the size, up to the torque that both reach;"
+        " clearances do not scale"
     )
     return {"rows": rows, "lines": [line]}
 
 
 def _smooth(path: RubbedPath, torques: Array) -> Array:
-    """Torsion by cubics with the tangents of the path [rad]; zero at zero torque."""
+    """Torsion [rad] at torques [N·m] of which the first is zero, by Hermite cubics."""
     curve = CubicHermiteSpline(path.torque, path.torsion, path.compliance)
     return np.concatenate([[0.0], curve(torques[1:])])
 
@@ -83,10 +83,10 @@ def _smooth(path: RubbedPath, torques: Array) -> Array:
 def shares(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Shares of the mechanisms in the compliance, and K without bearing clearance.
+    """Compute the shares of mechanisms in the compliance, and K without clearance.
 
-    The shares refer to the tangent compliance. A clearance that is taken up has no
-    share in it, but it reduces K.
+    The shares refer to the tangent compliance. A bearing clearance that has been taken
+    up has no share in it, but it reduces K.
 
     Args:
         study: Study file.
@@ -133,8 +133,8 @@ def shares(
             less = "/".join(f"{value:.2f}" for value in free / K)
             rising = [f"{k[2] / k[0]:.2f}" for k in (K, free)]
             lines[-1] += (
-                f"; without bearing clearance K1/K2/K3 times {less}, K3/K1"
-                f" {rising[1]} instead of {rising[0]}"
+                f"; without bearing clearance, K1/K2/K3 are multiplied by {less}, and"
+                f" K3/K1 is {rising[1]} instead of {rising[0]}"
             )
             rows.append(
                 {
@@ -150,7 +150,10 @@ def shares(
 def individual_summary(
     study: CatalogueFile, found: Mapping[str, Found]
 ) -> dict[str, Any]:
-    """Mean of K over individual gears, and its scatter between and within gears.
+    """Compute the mean of K over individual gears and its scatter.
+
+    The scatter is split into that between gears and that within a gear, over the
+    wave-generator angle.
 
     Args:
         study: Study file.
@@ -188,12 +191,15 @@ def individual_summary(
 
 
 def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array:
-    """K1, K2, K3 at each wave-generator angle [N·m/rad], shape (n_angles, 3).
+    """K1, K2, K3 of an individual gear at each wave-generator angle.
 
     Args:
         found: Result of kind ``individual``.
         design: Individual gear, for the compliance of the cup.
         row: Ratings with the torques of the segments.
+
+    Returns:
+        Stiffnesses, shape (n_angles, 3) [N·m/rad].
     """
     torque = np.array(found["torque_Nm"])
     series = series_compliance(design, cup=True)
@@ -204,10 +210,10 @@ def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array
 
 
 def scatter(values: Array) -> tuple[Array, Array]:
-    """Standard deviations within and between gears, by analysis of variance (textbook).
+    """Standard deviations within and between gears, by one-way analysis of variance.
 
-    The mean of a gear over its angles also scatters because of the angles; this part is
-    subtracted.
+    The mean of a gear over a few angles scatters even if all gears are equal; this part
+    is subtracted from the variance between gears.
 
     Args:
         values: Values, shape (n_gears, n_angles, n).
@@ -224,7 +230,9 @@ def scatter(values: Array) -> tuple[Array, Array]:
 def friction(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Hysteresis loop by friction coefficient and torque amplitude, at one size.
+    """Compute the width and work of the hysteresis loop at one size.
+
+    The rows list them by friction coefficient and torque amplitude.
 
     Args:
         study: Study file.
@@ -261,10 +269,10 @@ def friction(
         grows = np.polyfit(np.log(torque[2:]), np.log(work[2:]), 1)[0]
         mus = "/".join(f"{row['mu']:g}" for row in some)
         lines.append(
-            f"friction, size {size}, ratio {ratio}: loop width {loss} arcmin at zero"
-            f" load for mu {mus} (including play); for mu {some[-1]['mu']:g} loop width"
-            f" {wide} arcmin at torque amplitudes"
-            f" {', '.join(f'{t:.3g}' for t in torque)} N·m; work per cycle proportional"
-            f" to torque to the power {grows:.1f}"
+            f"friction, size {size}, ratio {ratio}: the loop width at zero load is"
+            f" {loss} arcmin for mu {mus} (including play); for mu"
+            f" {some[-1]['mu']:g} it is {wide} arcmin at torque amplitudes of"
+            f" {', '.join(f'{t:.3g}' for t in torque)} N·m, and the work per cycle is"
+            f" proportional to torque to the power {grows:.1f}"
         )
     return {"rows": rows, "lines": lines}

@@ -1,4 +1,4 @@
-"""Summary of the rows of the catalogue study."""
+"""Lines of the terminal that summarise the rows of the catalogue study."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from swgjoint.validation.rows import Row
 
 
 def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
-    """Range of model over catalogue by quantity and ratio, and the goals met.
+    """Summarise model over catalogue and the goals met, by quantity and ratio.
 
     A case without a value, or with a failed variant, counts as a missed goal.
 
@@ -42,16 +42,18 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
                 continue
             text = f"{quantity}, ratio {ratio}: {_range(some)}"
             if 0 < len(some) < len(every):
-                text += f"; {len(every) - len(some)} of {len(every)} without a middle"
+                text += (
+                    f"; {len(every) - len(some)} of {len(every)} cases have no middle"
+                )
             if floor:
-                text += f", more than {min(floor):.2f} to {max(floor):.2f}"
+                text += f"; lower bounds {min(floor):.2f} to {max(floor):.2f}"
             if judged:
                 met = sum(bool(row.more["met"]) for row in judged)
                 goal = 100.0 * judged[0].more["goal"]
                 text += f"; within {goal:.0f} %: {met} of {len(judged)}"
                 lost = sum(not row.more["whole"] for row in judged)
                 if lost:
-                    text += f" ({lost} lack variants: not met)"
+                    text += f" ({lost} with missing variants count as not met)"
             lines.append(text)
     return lines + _rising(rows)
 
@@ -69,12 +71,12 @@ def _range(rows: Sequence[Row]) -> str:
 
 
 def _part(value: float) -> str:
-    """Format with two decimals, or with two digits below 0.05."""
+    """Value with two decimals, or with two significant digits if below 0.05."""
     return f"{value:.2f}" if value >= 0.05 else f"{value:.2g}"
 
 
 def _rising(rows: Sequence[Row]) -> list[str]:
-    """Number of cases in which K1 < K2 < K3 fails or is unknown."""
+    """Line on the number of cases in which K1 < K2 < K3 fails or is unknown."""
     cases: dict[str, list[float]] = {}
     for row in rows:
         if row.quantity in STIFFNESS:
@@ -92,9 +94,10 @@ def _rising(rows: Sequence[Row]) -> list[str]:
 def ratcheting_orders(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> list[str]:
-    """Order of the ratios by ratcheting torque, in the model and in the catalogue.
+    """Compare the order of the ratios by ratcheting torque with the catalogue.
 
-    There is one line per flank angle; it contains the ratios whose limit was found.
+    There is one line per flank angle, for the ratios whose ratcheting torque was found;
+    it is omitted if there are fewer than two.
 
     Args:
         study: Study file.
@@ -128,7 +131,7 @@ def compare_scaling(
     size: int,
     check: tuple[int, int],
 ) -> list[str]:
-    """Ratio of values scaled from one size to values computed at another.
+    """Compare values scaled from one size with values computed at another.
 
     Args:
         study: Study file.
