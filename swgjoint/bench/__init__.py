@@ -1,1 +1,1 @@
-"""Benchmarks: error against run time, scaling, stability."""
+"""Benchmarks: error and run time, scaling, stability."""

@@ -1,1 +1,1 @@
-"""Error against run time of the finite element models."""
+"""Error and run time of the finite element models."""

@@ -75,7 +75,9 @@ def run_fe_cost(
     jobs: int = 2,
     recompute: bool = False,
 ) -> dict[str, Any]:
-    """Solve every setting; the last one that is not left out is the reference.
+    """Solve every setting and compare the results.
+
+    The reference is the last setting that is not left out.
 
     Args:
         design: Design with a cup.
@@ -197,9 +199,9 @@ def _solved_apart(task: SettingTask) -> Found | str:
 def _one_thread() -> Iterator[None]:
     """Processes started in this context use one thread for linear algebra.
 
-    A second thread would falsify the CPU time. The limit must be in the environment of
-    a new process, because the process loads its algebra library before it runs any code
-    of this package.
+    Additional threads would increase the CPU time. The limit must be in the environment
+    of a new process, because the process loads its algebra library before it runs any
+    code of this package.
     """
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}

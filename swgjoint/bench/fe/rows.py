@@ -22,7 +22,7 @@ difference along the rim divided by the largest deflection."""
 NEXT_LEVEL = {"ring": "2d", "2d linear": "2d", "2d": "3d", "3d linear": "3d"}
 """For each kind of setting, the next more accurate kind."""
 SAME = 1e-6
-"""Relative difference below which two errors count as equal [-]."""
+"""Relative difference up to which two errors count as equal [-]."""
 BOUNDS = (1.0, 5.0, 15.0)
 """Error bounds for which the cheapest setting is listed [%]."""
 
@@ -34,7 +34,7 @@ def rows_of(
     best: FeSetting,
     stored: set[str],
 ) -> list[dict[str, Any]]:
-    """One row per setting and quantity; one row for a setting without solution.
+    """Rows of the settings: one per quantity, or one for a setting without solution.
 
     Args:
         settings: Settings, from coarse to fine within each kind.
@@ -194,7 +194,7 @@ def seconds(row: Mapping[str, Any]) -> float:
 
 
 def _on_front(row: dict[str, Any], beside: list[dict[str, Any]], key: str) -> bool:
-    """Whether a row is Pareto-optimal in cost and error."""
+    """Whether a row is Pareto-optimal in CPU time and in the error under ``key``."""
     if row["value"] is None or row[key] is None:
         return False
     cost, error = seconds(row), abs(row[key])
@@ -215,8 +215,8 @@ def cheapest(
 ) -> list[dict[str, Any]]:
     """Cheapest setting that meets each bound, by quantity.
 
-    Finer meshes of the same kind must meet the bound too; otherwise the setting meets
-    it by chance and does not count.
+    Finer meshes of the same kind must meet the bound too. A setting that meets it by
+    chance, although a finer mesh does not, does not count.
 
     Args:
         rows: Rows of all settings.

@@ -38,6 +38,7 @@ class FeSetting:
     """Mesh refinement [-]; for thin rings half the number of elements per tooth pitch,
     zero for closed forms."""
     nonlinear: bool = True
+    """Whether the sectors undergo large rotations; no effect on thin rings."""
     full: bool = False
     """Whether all teeth are modelled even if symmetry allows half of them."""
 
@@ -61,7 +62,11 @@ class FeSetting:
 
     @property
     def kind(self) -> str:
-        """Kind of the setting; settings of one kind differ only in their mesh."""
+        """Kind of the setting: model and linearity.
+
+        Settings of one kind differ only in their mesh and in the number of modelled
+        teeth.
+        """
         return self.model + ("" if self.nonlinear else " linear")
 
 
@@ -81,9 +86,9 @@ class Found:
     wall_s: float
     """Wall time [s]."""
     cpu_s: float | None = None
-    """CPU time of all threads [s]."""
+    """CPU time of all threads [s]; None if it was not measured."""
     peak_MB: float | None = None
-    """Largest resident memory of the process [MB]."""
+    """Largest resident memory of the process [MB]; None if it was not measured."""
     nodes: int | None = None
     """Number of nodes in one sector of the flexspline, or of a thin ring per tooth
     pitch; None for closed forms."""

@@ -41,7 +41,7 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True)
 class SettingTask:
-    """A setting of a design, solved in a process of its own."""
+    """A setting of a design, to be solved in a process of its own."""
 
     design: Design
     setting: FeSetting
@@ -118,7 +118,7 @@ def _measured(
     nodes: int,
     begin: float,
 ) -> Found:
-    """Solve the unloaded and loaded positions of a 2D or 3D model.
+    """Solve a 2D or 3D model at all positions, without torque and at rated torque.
 
     Args:
         design: Design to solve.

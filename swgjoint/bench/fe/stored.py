@@ -20,7 +20,7 @@ out if the file does not contain them; only ``recompute`` solves them."""
 WITNESS = "3d, refinement 0.5"
 """Key of a setting that is stored and also solved in every run, to detect changes."""
 DRIFT = 1e-3
-"""Relative change of the witness above which the file does not match the code [-]."""
+"""Relative change of the witness from which on the file does not match the code [-]."""
 FILE = "bench-fe-reference.json"
 
 
@@ -43,7 +43,8 @@ def load_stored(design: Design, path: Path | None = None) -> dict[str, Any]:
         path: Stored file; None for the bundled one.
 
     Returns:
-        Content of the file; empty if it does not exist or belongs to another design.
+        Content of the file; empty if it does not exist, or belongs to another design
+        or another number of positions.
     """
     path = path or models_path() / "studies" / FILE
     kept = read_kept(path, _read)

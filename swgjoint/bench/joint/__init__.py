@@ -1,1 +1,1 @@
-"""Error against run time of the joint levels, integrators and steps."""
+"""Error and run time of the joint levels, integrators and time steps."""

@@ -203,7 +203,7 @@ def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
         level: Level of the joint.
 
     Returns:
-        Run, name of the reference, and a row with estimates of its own error.
+        Run, name of the reference, and a row with estimates of its own errors.
 
     Raises:
         ComputationError: If the reference fails.
@@ -297,7 +297,7 @@ def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
 
 
 def _mark_pareto(rows: list[dict[str, Any]]) -> None:
-    """Mark the rows that are Pareto-optimal in cost and error, for every quantity."""
+    """Mark rows that are Pareto-optimal in cost and error among those of a quantity."""
     for row in rows:
         if row["quantity"] == DAMPING:
             row["pareto"] = None

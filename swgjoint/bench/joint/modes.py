@@ -34,10 +34,12 @@ EXACT_STEP = 1e-5
 LOWEST, HIGHEST = 5.0, 60.0
 """Frequency range of the modes [Hz]."""
 LIGHT = 0.3
-"""Damping ratio below which a mode belongs to the drives, not to a control loop [-]."""
+"""Damping ratio below which a mode counts as a vibration of the drives and not of a
+control loop [-]."""
 ALIKE = 0.7
-"""Scalar product of two mode shapes of unit length above which they match [-]."""
+"""Absolute scalar product of two unit mode shapes above which they match [-]."""
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+# increments of the differences: positions [rad], velocities [rad/s], other states
 _CHANGE = {"q": 1e-6, "v": 1e-4, "act": 1e-6, "plugin": 1e-1}
 """Increments of the central differences, in SI units."""
 
@@ -74,7 +76,10 @@ class Modes:
 
 
 def modes(whole: Assembly) -> Modes:
-    """All oscillating modes; none if a step gives values that are not finite."""
+    """All oscillating modes at the time step of an assembly.
+
+    There are none if a step results in values that are not finite.
+    """
     matrix, nq = step_matrix(whole), whole.model.nq
     if not np.isfinite(matrix).all():
         return Modes(s=np.zeros(0, complex), shape=np.zeros((nq, 0), complex))
@@ -117,7 +122,7 @@ def step_matrix(whole: Assembly) -> Array:
 
 
 def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
-    """Entries of the engine's state to vary, and the increment of each.
+    """Indices of the entries of the engine's state to vary, and their increments.
 
     Time is excluded. The states of hysteresis and bristles are also excluded, because
     they stick in a small vibration.

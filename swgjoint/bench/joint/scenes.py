@@ -45,7 +45,7 @@ TRAVEL = 8.0
 
 @dataclass(frozen=True, kw_only=True)
 class BenchScene:
-    """A scene with its drives."""
+    """A scene of the benchmark with its drives."""
 
     name: str
     scene: Scene
@@ -154,7 +154,10 @@ def exact(run: Run, whole: Assembly) -> Run:
         return inside * (STIFFNESS + cubic * inside**2) + top * (s - inside)
 
     def twisted(y: Array) -> tuple[float, float, float]:
-        """Torsion, torque on the link, and derivative of the torsion by theta."""
+        """Torsion, torque on the link, and derivative of the torsion by theta.
+
+        ``y`` contains theta, psi and their rates.
+        """
         theta, psi, theta_rate, psi_rate = y.tolist()
         error = ERROR * sum(cos(n * theta) for n in ORDERS)
         by = 1.0 / i - ERROR * sum(n * sin(n * theta) for n in ORDERS)

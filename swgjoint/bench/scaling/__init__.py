@@ -1,1 +1,1 @@
-"""How run time grows with the size of the problem."""
+"""Growth of the run time with the size of the problem."""

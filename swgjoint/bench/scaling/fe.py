@@ -47,13 +47,16 @@ def _measure(
 
 
 def teeth(count: float) -> dict[str, Any]:
-    """Vary the number of teeth at constant pitch diameter; rigid wave generator."""
+    """Run time with a number of teeth of the flexspline, at constant pitch diameter.
+
+    The wave generator is rigid.
+    """
     design = Design.load(f"size-25-{int(count) // 2}")
     return _measure(design.with_changes({"wave_generator.bearing": None}))
 
 
 def mesh(refinement: float) -> dict[str, Any]:
-    """Refine the mesh of one drive; the size is the number of nodes."""
+    """Run time with a mesh refinement; the row has the number of nodes as size."""
     design = Design.load(DESIGN).with_changes({"mesh.refinement": refinement})
     row = _measure(design)
     return row | ({"size": float(row["nodes"])} if "nodes" in row else {})

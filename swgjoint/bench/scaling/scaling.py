@@ -73,7 +73,7 @@ SWEEPS = (
     SizeSweep(
         name="map evaluation",
         label="harmonics of the map",
-        per="evaluation of 1,000",
+        per="torque (1000 at once)",
         sizes=(1, 4, 16, 64, 256),
         measure=scaling_joint.evaluation,
         from_size=16,
@@ -102,8 +102,8 @@ SWEEPS = (
     ),
     SizeSweep(
         name="angles",
-        label="positions in a turn",
-        per="turn",
+        label="positions of a run",
+        per="run",
         sizes=(2, 8, 32),
         measure=scaling_fe.angles,
     ),

@@ -1,1 +1,1 @@
-"""Stability of the joint on stiff and extreme cases."""
+"""Stability of the joint in stiff and extreme cases."""

@@ -46,7 +46,9 @@ class ArmTask:
     """One arm and its time steps."""
 
     scene: str
+    """Name of a bundled scene."""
     steps: tuple[float, ...] = STEPS
+    """Time steps [s]."""
 
 
 def run_arm(task: ArmTask) -> list[StabilityRow]:
@@ -109,7 +111,7 @@ def run_arm(task: ArmTask) -> list[StabilityRow]:
 def _fall(
     task: ArmTask, scene: Scene, drives: dict[str, DriveMap], step: float
 ) -> StabilityRow:
-    """Release the arm from the first pose of its scene."""
+    """Row of the arm that is released from the first pose of its scene."""
     arm = RigidArm(scene.arm)
     spec = arm.spec()
     spec.option.timestep = step
@@ -162,6 +164,18 @@ def _let_go(
     steps: int,
     parts: int,
 ) -> Course:
+    """Let an arm fall from a pose.
+
+    Args:
+        model: Compiled arm at the sub-step.
+        attached: Drives in the order of the joints.
+        pose: Initial output angles [rad].
+        steps: Number of time steps.
+        parts: Number of parts of a time step.
+
+    Returns:
+        Course whose energy includes gravity.
+    """
     h = float(model.opt.timestep)
     data, weighed = mujoco.MjData(model), mujoco.MjData(model)
     rotor = [int(model.joint(a.rotor).qposadr[0]) for a in attached]

@@ -1,4 +1,4 @@
-"""Chains of two links resting on a floor or against joint limits for seconds.
+"""Chains of two links that fall onto a floor or against joint limits and rest there.
 
 Gravity lets a chain with catalogue drives fall onto a floor or against the limits of
 its joints, where it comes to rest. The sum of kinetic, torsion and gravity energy may
@@ -72,7 +72,7 @@ _LIMIT = 'limited="true" range="-10 10"'
 
 @dataclass(frozen=True, kw_only=True)
 class ContactTask:
-    """One chain with its drive in both joints."""
+    """One chain, with the same drive in both joints."""
 
     drive: CatalogueDrive
     kind: str
@@ -100,7 +100,7 @@ def contact_tasks(*, full: bool) -> list[ContactTask]:
 
 
 def run_contact(task: ContactTask) -> list[StabilityRow]:
-    """Run one chain at all time steps and damping ratios."""
+    """Rows of one chain, at all time steps and damping ratios."""
     return [
         _row(task, step, damping)
         for step, damping in product(task.steps, task.damping_ratios)
@@ -233,7 +233,10 @@ def lie_down(
 
 
 def gain(energy: Array) -> float:
-    """Largest rise of a mean above the lowest earlier mean [-]."""
+    """Largest rise of a mean above the lowest earlier mean [-].
+
+    The rise is infinite if the energy is not finite.
+    """
     if not np.isfinite(energy).all():
         return float("inf")
     return float((energy - np.minimum.accumulate(energy)).max())

@@ -1,8 +1,8 @@
 r"""Numerical damping of the torsional vibration, measured on one step of the engine.
 
-For a small vibration of rotor against link, one step multiplies (torsion, rate) by a
-2 x 2 matrix, whose columns are measured with one step each. Its eigenvalue
-:math:`\lambda = |\lambda| e^{j\varphi}` gives the damping ratio
+For a small vibration of rotor against link, one step multiplies torsion and its rate by
+a 2 x 2 matrix, each column of which is measured with one step. From its eigenvalue of
+largest magnitude, :math:`\lambda = |\lambda| e^{j\varphi}`, follows the damping ratio
 
 .. math:: \zeta = -\ln|\lambda| / \sqrt{\varphi^2 + \ln^2|\lambda|},
 
@@ -25,7 +25,7 @@ SMALL = 1e-5
 
 
 def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
-    """Damping ratio that the integrator gives to an undamped joint.
+    """Damping ratio that the integrator adds to an undamped joint.
 
     Args:
         joint: Joint without kinematic error and damping.
@@ -46,7 +46,7 @@ def numerical_damping(joint: Joint, sub_steps: int) -> float | None:
     data = mujoco.MjData(model)
 
     def after(torsion: float, speed: float) -> Array:
-        """Torsion, and rate divided by the frequency, one step later."""
+        """Torsion and its rate divided by the frequency [rad], one step later."""
         mujoco.mj_resetData(model, data)
         rate = np.array([ratio * speed * frequency, 0.0])
         data.qpos[joint.q] = np.array([ratio * torsion, 0.0]) + behind * rate

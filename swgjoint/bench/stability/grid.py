@@ -104,7 +104,7 @@ def grid(*, full: bool) -> list[GridJoint]:
 
 
 def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
-    """Starts of the joints of the grid, with the rotor speed for the region check.
+    """Initial conditions by group, with the rotor speed for the region check [rad/s].
 
     ``free``: rotation at rated speed without torque. ``loaded``: slow rotation under
     full torque. ``released``: release from full torque at rest. ``step``: slow
@@ -120,7 +120,7 @@ def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
 
 
 def run_joint(task: GridJoint) -> list[StabilityRow]:
-    """Run one joint at all time steps."""
+    """Rows of one joint, at all time steps."""
     drive = hardening_drive(task.stiffness)
     references = {
         group: reference(

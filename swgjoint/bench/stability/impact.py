@@ -1,4 +1,4 @@
-"""Contact impacts: a link with drive and rotor is dropped on a floor.
+"""Impacts: a link with drive and rotor falls onto a floor.
 
 The rotor initially turns with the link, without torsion. The sum of kinetic, torsion
 and gravity energy must not exceed its initial value, because the floor only dissipates
@@ -97,6 +97,10 @@ def drop(
         duration: Duration of the run [s].
         sub_steps: Number of equal parts of a time step.
         speed: Initial speed of the ball relative to :data:`TIP_SPEED` [-].
+
+    Returns:
+        Course whose energy includes gravity, and whose scale is the initial kinetic
+        and torsion energy.
     """
     model, law = joint.model, joint.law
     whole = float(model.opt.timestep)

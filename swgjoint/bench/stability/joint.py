@@ -1,14 +1,15 @@
 r"""One joint of the stability study: rotor, drive and link, and their energy.
 
-Without damping, if the load applies a constant torque T and the motor a torque T/i, the
+The load applies a constant torque T and the motor a torque T/i. Without damping, the
 energy
 
 .. math::
     E = \tfrac12 J\dot\theta^2 + \tfrac12 J_l\dot\psi^2 + V(\Delta)
         - \frac{T}{i}\theta + T\psi
 
-is constant; the last two terms subtract the work of both torques. The discrete scheme
-is a midpoint rule for positions half a step earlier, where E is evaluated.
+is then constant; the last two terms subtract the work of both torques. The discrete
+scheme is a midpoint rule for the positions half a step before those of the engine, so E
+is evaluated at these earlier positions.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ CSG-25-100 has 204 N·m and 5e4 N·m/rad, which also gives about 4 mrad."""
 HARDENING = 2.0
 """Relative increase of the stiffness from zero to full torque [-]."""
 SAMPLES = 400
-"""Number of energy samples along a run."""
+"""Default number of energy samples along a run."""
 GAIN = 0.05
 """Relative rise of the energy above which a run counts as an energy gain [-]."""
 
@@ -81,7 +82,7 @@ def with_kinematic_error(drive: DriveMap) -> DriveMap:
 
 
 def hardening_drive(stiffness: float) -> DriveMap:
-    """Map of a hardening spring with kinematic error.
+    """Map of a spring with hardening stiffness and kinematic error.
 
     Args:
         stiffness: Stiffness at zero torque [N·m/rad].
@@ -128,7 +129,7 @@ def hardening_drive(stiffness: float) -> DriveMap:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Initial conditions of a run."""
+    """Initial conditions and load of a run."""
 
     torque: float = 0.0
     """Initial torque of the drive on the link [N·m]."""
@@ -146,14 +147,16 @@ class Course:
     time: Array
     """Sample times [s], shape (n,)."""
     position: Array
-    """Angles of rotor and link at the instants of the scheme [rad], shape (n, 2)."""
+    """Angles of rotor and link at which the scheme evaluates forces [rad], shape
+    (n, 2); for arms, all positions, shape (n, nq)."""
     velocity: Array
-    """Speeds of rotor and link [rad/s], shape (n, 2)."""
+    """Speeds of rotor and link [rad/s], shape (n, 2); for arms (n, nv)."""
     energy: Array
     """Energy minus the work of the applied torques [J], shape (n,)."""
     scale: float
-    """Initial kinetic and torsion energy plus the energy that the load stores in the
-    drive [J]."""
+    """Energy by which gains are divided [J]: the initial kinetic and torsion energy
+    plus the energy that the load stores in the drive; for falling arms, the largest
+    kinetic and torsion energy."""
     diverged: bool
     """Whether the engine warned, or a state is not finite or too fast."""
     sub_steps: int
@@ -161,7 +164,10 @@ class Course:
 
     @property
     def balance(self) -> float:
-        """Mean change of energy in the last tenth, divided by the scale [-]."""
+        """Mean change of energy in the last tenth, divided by the scale [-].
+
+        The change is relative to the initial energy, and infinite if the run diverged.
+        """
         return self._tenths()[-1]
 
     @property
@@ -182,6 +188,7 @@ class Joint:
 
     model: mujoco.MjModel
     attached: JointDrive
+    """Elements of the drive in the model."""
     law: DriveMap
     """Map that acts between rotor and link."""
     q: NDArray[np.intp]
@@ -189,7 +196,7 @@ class Joint:
     v: NDArray[np.intp]
     """Indices of rotor and link in the velocity vector."""
     midpoint: bool
-    """Whether the scheme refers to positions half a step earlier."""
+    """Whether the scheme evaluates forces at positions half a step earlier."""
 
     def region(
         self, speed: float, *, torque: float = 0.0, contacts: bool = False
@@ -237,6 +244,9 @@ class Joint:
             duration: Duration [s].
             sub_steps: Number of equal parts of a time step.
             samples: Largest number of samples after the initial one.
+
+        Returns:
+            Sampled states and energy.
         """
         model = self.model
         whole = float(model.opt.timestep)

@@ -33,7 +33,7 @@ class StabilityRow:
     outcome: str
     """One of :data:`OUTCOMES`."""
     sub_steps: int | None = None
-    """Number of parts of the step; None if the run was refused."""
+    """Number of parts of the step; None if the run was refused or raised an error."""
     largest_gain: float | None = None
     """Largest mean gain of energy minus work over a tenth of the run [-], relative to
     an energy that depends on the group, see :mod:`swgjoint.bench.stability.stability`.
@@ -45,7 +45,8 @@ class StabilityRow:
     """Mean change of energy in the last tenth of the run, relative to the same energy
     [-]; negative if energy was lost."""
     error: float | None = None
-    """Largest error of the link angle relative to the reference [arcmin]."""
+    """Largest deviation of a link angle from the reference [arcmin]; None without a
+    reference."""
     numerical_damping_ratio: float | None = None
     """Damping ratio of the torsional vibration that the integrator causes [-]."""
     physical_damping_ratio: float | None = None

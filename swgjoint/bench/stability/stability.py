@@ -79,7 +79,8 @@ def run_stability(
     """Run the stability study.
 
     Args:
-        full: Whether the whole grid is run instead of a subset at four time steps.
+        full: Whether the whole grid and all chains are run, instead of a subset of the
+            grid at four time steps and a subset of the chains.
         jobs: Number of processes.
         folder: Folder for table and picture; None writes nothing.
         progress: Called after every joint, drive, arm or chain.
