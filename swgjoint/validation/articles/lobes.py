@@ -94,8 +94,8 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
             "play taken up per micrometre of lobe deflection",
             "arcmin",
             slope,
-            "not printed; approximately 2 tan(alpha)/r with the pressure angle alpha of"
-            " the flanks",
+            "not printed; approximately 2 tan(alpha)/r with pressure angle alpha and"
+            " pitch radius r",
         ),
     ]
     for springs in own.springs:

@@ -90,8 +90,8 @@ def coning_summary(study: CatalogueFile, found: Mapping[str, Found]) -> dict[str
 
 def _line(size: int, row: Mapping[str, Any]) -> str:
     text = "/".join(f"{value:.2f}" for value in row["over_catalogue"])
-    line = f"coning, size {size}, ratio {row['ratio']}, {row['case']}: K over"
-    line += f" catalogue {text}"
+    line = f"coning, size {size}, ratio {row['ratio']}, {row['case']}: K1/K2/K3"
+    line += f" over catalogue {text}"
     if "half_play_rad" in row:
         part = round(100.0 * row["half_play_rad"] / row["torsion_rad"][0])
         line += f"; half the play is {part} % of the torsion at T1"
