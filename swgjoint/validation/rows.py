@@ -60,8 +60,10 @@ class Row:
     """One quantity of one case: the source's value and ours."""
 
     case: str
+    """Drive, design or part of the source to which the quantity belongs."""
     quantity: str
     unit: str
+    """Unit of all values of the row."""
     source_value: float | None
     """Printed value; None if the source withholds it or prints none."""
     ours: float | None

@@ -80,7 +80,9 @@ class ContactTask:
     mass: float
     """Mass of each link [kg]."""
     steps: tuple[float, ...] = STEPS
+    """Time steps [s]."""
     damping_ratios: tuple[float, ...] = DAMPING_RATIOS
+    """Damping ratios of the drives [-]."""
 
     @property
     def name(self) -> str:

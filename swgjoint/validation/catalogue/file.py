@@ -41,7 +41,10 @@ class Variant(Section):
 
 
 class Goal(Section):
-    """Accepted relative deviation from the catalogue of the bracket's middle [-]."""
+    """Accuracy goals: accepted relative deviations from the catalogue [-].
+
+    The deviation is that of the middle of the bracket.
+    """
 
     ratios: Numbers
     sizes: Numbers
@@ -51,7 +54,7 @@ class Goal(Section):
 
 
 class NoClaim(Section):
-    """Sizes that are reported without an accuracy goal."""
+    """Sizes that are reported without an accuracy goal, listed for the reader."""
 
     sizes: Numbers
 
