@@ -1,1 +1,1 @@
-"""The 2D model of a drive: plane sectors, contact, equilibrium, stresses."""
+"""The 2D model of a drive: tooth sectors, contact, equilibria and stresses."""

@@ -33,8 +33,8 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
-"""Wave generators whose contact with the bore is narrower than the node spacing."""
-
+"""Kinds of wave generators whose contact with the bore is narrower than the node
+spacing."""
 
 Half = bool | Literal["auto"]
 """Whether to model half of the drive; ``auto`` does so if its symmetry allows it."""
@@ -43,13 +43,14 @@ Half = bool | Literal["auto"]
 def can_halve(design: Design, *, bearing: bool = True) -> bool:
     """Whether a rotation by 180 deg maps the drive onto itself.
 
-    This takes a wave generator with that symmetry, even numbers of teeth and no
-    manufacturing errors.
+    The wave generator must have this symmetry, both tooth counts must be even, and the
+    design must have no manufacturing errors.
 
     Args:
         design: The drive.
-        bearing: Whether the model is 2D and includes the bearing of the wave generator
-            if :func:`carries_bearing`; the number of balls must then be even.
+        bearing: Whether the model includes the bearing of the wave generator in designs
+            for which :func:`carries_bearing` is true; these need an even number of
+            balls.
     """
     drive, fitted = design.drive, design.wave_generator.bearing
     carried = bearing and carries_bearing(design)
@@ -66,8 +67,9 @@ def can_halve(design: Design, *, bearing: bool = True) -> bool:
 def carries_bearing(design: Design) -> bool:
     """Whether the 2D model includes the ball bearing of the wave generator.
 
-    This requires a two-lobe outline without corners or straight segments that turns
-    relative to a fixed circular spline: the balls then roll with the flexspline.
+    The outline of the wave generator must have two lobes and neither corners nor
+    straight segments, and the circular spline must be fixed: the rolling motion of the
+    balls is derived for an outer race that turns with the flexspline as the output.
     """
     generator = design.wave_generator
     return (
@@ -79,14 +81,15 @@ def carries_bearing(design: Design) -> bool:
 
 
 def check_modelled(design: Design, model: str) -> None:
-    """Reject unknown models and design features that the 2D model does not contain.
+    """Reject unknown models and designs that the 2D model cannot represent.
 
     Args:
         design: The drive.
         model: Name of the model; only ``2d`` is accepted.
 
     Raises:
-        DesignError: If there are any; the message has one line per fault.
+        DesignError: If the model is not ``2d`` or the axes are misaligned; the message
+            has one line per fault.
     """
     drive, tolerances = design.drive, design.tolerances
     faults = []
@@ -95,7 +98,7 @@ def check_modelled(design: Design, model: str) -> None:
     if tolerances.misalignment_arcmin:
         faults.append(
             f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: "
-            "expected 0, because the 2d model has no axis to tilt"
+            "expected 0, because a 2D model cannot tilt its axes"
         )
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
@@ -104,15 +107,15 @@ def check_modelled(design: Design, model: str) -> None:
 def unmodelled_parts(
     design: Design, model: str = "2d", *, bearing: bool = True
 ) -> str | None:
-    """Parts of the design that the model does not represent, for the validity label.
+    """Parts and effects that the model does not represent, for the validity label.
 
     Args:
         design: The drive.
         model: Fidelity of the model: ``ring``, ``2d`` or ``3d``.
-        bearing: Whether the 2D model was built with the bearing.
+        bearing: Whether a 2D model was built with ``bearing=True``.
 
     Returns:
-        Their names, joined by "and"; None if the model represents all parts.
+        Their names, joined by "and"; None if the model represents all of them.
     """
     carried = bearing and carries_bearing(design)
     shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
@@ -120,9 +123,9 @@ def unmodelled_parts(
         "wave_generator.bearing": design.wave_generator.bearing is not None
         and (model == "3d" or (model == "2d" and not carried)),
         "micro_geometry": model != "3d" and any(shapes.values()),
-        "passage of teeth": model == "ring",
+        "tooth passage": model == "ring",
         "rim of the circular spline": model == "ring",
-        "strips of tooth contact narrower than a patch": model != "2d",
+        "tooth contact narrower than a contact patch": model != "2d",
     }
     return " and ".join(name for name, there in parts.items() if there) or None
 
@@ -145,18 +148,20 @@ def sector_model(
         half: Whether to model half of the drive, closed by its symmetry; ``auto`` does
             so if the symmetry allows it.
         nonlinear: Whether sectors undergo large rotations.
-        elastic_circular_spline: Whether the circular spline deforms; the design sets
-            whether its outer diameter is fixed or free.
+        elastic_circular_spline: Whether the circular spline deforms;
+            ``circular_spline.outer_rim`` of the design fixes or frees its outer
+            diameter.
         friction: Whether the flanks have the friction coefficient of the design; False
-            gives the conservative model.
+            gives the model without friction, which is conservative.
         bearing: Whether to support the rim on the ball bearing of the wave generator,
             if the design has one that the 2D model can represent; False uses a rigid
             surface.
-        cage_held: Whether the balls are held on the cam instead of rolling.
-        profiles: Flanks that replace those of the design, by member.
+        cage_held: Whether the cage is fixed to the cam, so that the balls do not roll.
+        profiles: Tooth profiles that replace those of the design, by member.
 
     Raises:
-        DesignError: If the design cannot be built or the half model does not apply.
+        DesignError: If the design cannot be built, if a half model does not apply, or
+            if a rigid circular spline is combined with friction or tolerances.
     """
     if half == "auto":
         half = can_halve(design, bearing=bearing)
@@ -169,8 +174,8 @@ def sector_model(
         raise DesignError(
             f"{drive.name}: a half model needs even tooth counts, no tolerances and a "
             "wave generator that is symmetric under a rotation by 180 deg; the design "
-            f"has {drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and the "
-            f"wave generator {design.wave_generator.kind}{balls}"
+            f"has {drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and a "
+            f"wave generator of kind {design.wave_generator.kind!r}{balls}"
         )
     flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
@@ -190,8 +195,8 @@ def sector_model(
     if coefficient > 0.0:
         if circular_spline.compliance is None:
             raise DesignError(
-                f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g} "
-                "needs an elastic circular spline; expected 0 with a rigid one"
+                f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g}: "
+                "expected 0 with a rigid circular spline"
             )
         modulus = design.material_of("flexspline").youngs_modulus
         width = design.drive.face_width_mm * mm
@@ -202,7 +207,8 @@ def sector_model(
     if has_errors(design):
         if circular_spline.compliance is None:
             raise DesignError(
-                f"{design.drive.name}: tolerances need an elastic circular spline"
+                f"{design.drive.name}: tolerances: expected none with a rigid circular"
+                " spline"
             )
         shifts = {
             "tooth_shift": tooth_errors(design, "flexspline").shift,
@@ -251,7 +257,7 @@ def indentation(
     softness, patch = [], []
     for name, tooth in members:
         material = design.material_of(name)
-        # in-plane modulus E', see in_plane_constants
+        # in-plane modulus E' of in_plane_constants, with axial_stress = c nu
         modulus = material.youngs_modulus / (
             1.0 - tooth.axial_stress * material.poisson_ratio
         )
@@ -267,7 +273,7 @@ def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superel
 
     Args:
         design: The drive.
-        member: Flexspline or circular spline.
+        member: Member to condense: flexspline or circular spline.
         profile: Tooth profile of that member.
     """
     material = design.material_of(member)

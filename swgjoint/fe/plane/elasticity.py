@@ -1,6 +1,6 @@
 """2D linear elasticity on quadrilaterals: stiffness and stress recovery.
 
-The section is in plane stress, in plane strain or in a given state between the two.
+The section is in plane stress, in plane strain or in a state between the two.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from swgjoint.typing import Array
 
 
 def plane_basis(mesh: MeshQuad) -> Basis:
-    """Vector basis of incompatible-mode quadrilaterals, 2 x 2 Gauss points."""
+    """Vector basis of incompatible-mode quadrilaterals with 2 x 2 Gauss points."""
     return Basis(mesh, ElementVector(ElementQuadIncompatible()), intorder=3)
 
 
 def in_plane_constants(
     youngs_modulus: float, poisson_ratio: float, confinement: float
 ) -> tuple[float, float]:
-    r"""Elastic constants that make the plane-stress equations valid for confinement.
+    r"""Constants with which the plane-stress equations describe a confined section.
 
     The axial stress is the fraction c of its value in plane strain,
     :math:`\sigma_{zz} = c\nu(\sigma_{xx} + \sigma_{yy})`. Hooke's law in the plane
@@ -67,7 +67,7 @@ def stiffness_matrix(
         youngs_modulus: Young's modulus of the material [Pa].
         poisson_ratio: Poisson's ratio of the material [-].
         width: Width w of the disc [m].
-        confinement: Confinement of :func:`in_plane_constants` [-].
+        confinement: Confinement c, see :func:`in_plane_constants` [-].
 
     Returns:
         Sparse matrix (n_dofs, n_dofs) [N/m].
@@ -103,7 +103,7 @@ def nodal_stress_operator(
         basis: Basis from :func:`plane_basis`.
         youngs_modulus: Young's modulus of the material [Pa].
         poisson_ratio: Poisson's ratio of the material [-].
-        confinement: Confinement of :func:`in_plane_constants` [-].
+        confinement: Confinement c, see :func:`in_plane_constants` [-].
 
     Returns:
         Matrix (3 n_nodes, n_dofs) [Pa/m]; rows 3 i to 3 i + 2 are xx, yy and xy of
@@ -150,16 +150,18 @@ def nodal_stress_operator(
 
 
 def stress_maxima(stress: Array) -> tuple[Array, Array, Array]:
-    """Tensile, compressive (as a magnitude) and von Mises stress.
+    """Largest tensile, largest compressive and von Mises stress at each point.
 
-    The tensile and compressive maxima are those of the in-plane principal stresses: the
-    axial stress of a confined section exceeds neither them nor zero.
+    The in-plane principal stresses determine the first two: the axial stress of a
+    confined section is between the lowest and the highest of these stresses and zero.
 
     Args:
-        stress: Components xx, yy, xy and, unless it is zero, zz in the last axis [Pa].
+        stress: Components xx, yy, xy and, unless it is zero, zz in the last axis
+            (..., 3 or 4) [Pa].
 
     Returns:
-        Tensile, compressive and von Mises stress (...) [Pa].
+        Tensile stress, compressive stress as a magnitude, and von Mises stress, each of
+        shape (...) [Pa]; the first two are zero if there is no tension or compression.
     """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)

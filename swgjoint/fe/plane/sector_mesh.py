@@ -11,9 +11,9 @@ from skfem import MeshQuad
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
-# elements of the thesis mesh per half tooth: along the flank, in depth below it, along
-# the inner (outer) diameter and through the lower rim; a tooth has 181 nodes and 146
-# elements
+# numbers of elements of the thesis mesh per half tooth: along the flank, in depth below
+# it, along the inner (outer) diameter and through the lower rim; a whole tooth has 181
+# nodes and 146 elements
 FLANK, LAYERS, BORE, LOWER_RIM = 21, 3, 5, 2
 # depth of the centre point of the tooth mesh in half rim thicknesses (thesis table 4.4)
 POSITIONING_FACTOR = 1.1
@@ -24,13 +24,15 @@ LAYER_GROWTH = 1.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SectorMesh:
-    """Mesh of the sector of one tooth, the tooth centred on the +y axis.
+    """Mesh of the sector of one tooth, centred on the +y axis.
 
-    The faces are half a pitch to either side; "first" is the clockwise one (x > 0).
-    Node sets hold indices into the columns of ``mesh.p``.
+    Its two faces are half a pitch from the axis on either side; the first face is the
+    clockwise one (x > 0). Node sets hold indices into the columns of ``mesh.p``.
+    Where the member is a circular spline, the "bore" is its outer diameter.
     """
 
     mesh: MeshQuad
+    """Quadrilaterals, with node positions in metres."""
     half_pitch: float
     """Half of the tooth pitch [rad]."""
     face_first: Index
@@ -38,14 +40,15 @@ class SectorMesh:
     face_last: Index
     """Nodes of the counter-clockwise face, in the same order."""
     bore: Index
-    """Nodes of the inner (outer) diameter from the clockwise to the counter-clockwise
-    corner, both included."""
+    """Nodes of the inner diameter (of the outer one of a circular spline) from the
+    clockwise to the counter-clockwise corner, both included."""
     flank_right: Index
     """Nodes of the right flank from the end of the top land to the root land."""
     flank_left: Index
-    """Nodes of the left flank, mirror images in the same order."""
+    """Nodes of the left flank, the mirror images of the right ones in the same order.
+    """
     flank_stations: Array
-    """Arc length of the flank nodes on the profile [m]."""
+    """Arc lengths of the nodes of one flank on the profile (n_flank,) [m]."""
 
 
 def refine_count(elements: int, refinement: float) -> int:
@@ -68,20 +71,20 @@ def sector_mesh(
     """Mesh a tooth sector with the topology of the thesis mesh.
 
     Each half tooth is one block of 21 elements along the flank (from the end of the top
-    land to the middle of the root land) and 3 elements below it. Its inner edge follows
-    the tooth axis to the middle of the rim and then turns into the rim. The lower rim
-    is a second block below it.
+    land to the middle of the root land) and 3 elements deep. Its inner edge follows the
+    tooth axis down to a point near the middle of the rim and then the circle through
+    this point. The lower rim, between this circle and the bore, is a second block.
 
     Args:
         profile: Tooth profile of the member.
-        rim: Thickness between root circle and inner (outer) diameter [m].
+        rim: Thickness between root circle and bore [m].
         refinement: Factor on the number of elements per direction [-], see
             :func:`refine_count`.
         lower_rim: Thickness of the lower rim, to which a cup connects [m]; by default
             that of the 2D mesh of the thesis.
 
     Returns:
-        The sector; its halves are mirror images.
+        The sector; its two halves are mirror images of each other.
     """
     n, layers = refine_count(FLANK, refinement), refine_count(LAYERS, refinement)
     bore, lower = refine_count(BORE, refinement), refine_count(LOWER_RIM, refinement)
@@ -97,7 +100,7 @@ def sector_mesh(
     flank, _, _ = profile.evaluate(s)
     half = profile.half_pitch
 
-    # inner edge of the block: tooth axis down to the middle of the rim, then the rim
+    # inner edge of the block: down the tooth axis to the middle of the rim and along it
     down = n - bore
     axis = np.linspace(profile.addendum_radius, middle, down + 1)
     turn = np.linspace(0.0, half, bore + 1)
@@ -111,7 +114,7 @@ def sector_mesh(
     share = np.concatenate([[0.0], np.cumsum(thickness)]) / thickness.sum()
     depth = share[:, None, None]
     block = (1.0 - depth) * flank + depth * edge  # (layers + 1, n + 1, 2)
-    # the first row follows the top land, the last one the face of the sector
+    # the first column of nodes is on the top land, the last one on the sector face
     top = np.arctan2(flank[0, 0], flank[0, 1]) * (1.0 - share)
     block[:, 0] = profile.addendum_radius * np.stack([np.sin(top), np.cos(top)], -1)
     radius = profile.dedendum_radius + share * (middle - profile.dedendum_radius)

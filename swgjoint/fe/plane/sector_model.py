@@ -1,6 +1,8 @@
-"""Geometry of the ring of sectors between wave generator and circular spline.
+"""The flexspline as a ring of sectors between wave generator and circular spline.
 
-All positions are in the frame of the outside of the circular spline, which is fixed.
+All positions are in a global frame that does not turn. Its origin is the axis of the
+circular spline, whose rotation in this frame is part of the state; it is zero if the
+circular spline is fixed.
 """
 
 from __future__ import annotations
@@ -39,12 +41,15 @@ class SectorModel:
     """Flexspline ring, wave generator and circular spline of a drive."""
 
     element: Superelement
+    """Condensed sector of the flexspline."""
     wave_generator: WaveGenerator
+    """Outline of the wave generator."""
     circular_spline: CircularSpline
+    """Teeth of the circular spline, elastic or rigid."""
     lobe_height: float
     """Radial deflection at the lobes [m]."""
     half: bool = False
-    """Whether the model is half of the ring, closed by a rotation of 180 deg."""
+    """Whether the model is half of the ring, which a rotation by 180 deg completes."""
     nonlinear: bool = True
     """Whether sectors undergo large rotations."""
     friction: CoulombFriction | None = None
@@ -52,18 +57,20 @@ class SectorModel:
     indentation: Indentation | None = None
     """Indentation of the flanks; None uses the compliance of the contact patch only."""
     tooth_shift: Array | None = None
-    """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    """Shifts of the flexspline's teeth by manufacturing errors, in the frames of the
+    teeth (N, 2) [m]; None without errors."""
     circular_spline_tooth_shift: Array | None = None
-    """Manufacturing errors of the circular spline's teeth in their frames (N_c, 2) [m];
-    they need an elastic circular spline."""
+    """Shifts of the circular spline's teeth by manufacturing errors, in the frames of
+    the teeth (N_c, 2) [m]; only for an elastic circular spline."""
     wave_generator_offset: Array | None = None
-    """Centre of the outline in the frame of the wave generator (2,) [m]."""
+    """Centre of the outline in the wave generator's frame (2,) [m]; None for zero."""
     layer: float = 0.0
-    """Product E b for the contact layer between bore and rigid wave generator [N/m]."""
+    """Young's modulus times width of the contact layer between the bore and a rigid
+    wave generator [N/m]."""
     points: int = POINTS
-    """Stations of the bore between neighbouring nodes."""
+    """Number of bore stations between neighbouring nodes."""
     race: PlaneRace | None = None
-    """Outer race on balls that replaces the rigid wave generator; None without."""
+    """Outer race on balls below the bore; None for a rigid wave generator."""
 
     @property
     def sectors(self) -> int:
@@ -82,7 +89,7 @@ class SectorModel:
 
     @property
     def closure(self) -> float:
-        """Sign that closes the ring: a half model continues with the opposite sign."""
+        """Factor on vectors where the ring closes: -1 for a half model, otherwise 1."""
         return -1.0 if self.half else 1.0
 
     @cached_property
@@ -102,13 +109,13 @@ class SectorModel:
 
     @cached_property
     def bore_nodes(self) -> NDArray[np.int64]:
-        """Skeleton nodes of a sector at the bore, with its first corner only."""
+        """Skeleton nodes of a sector on the bore, without its last corner."""
         size = self.element.face_size
         return np.arange(size - 1, size + self.element.bore_size)
 
     @cached_property
     def stations(self) -> BoreStations:
-        """Contact stations of the bore: between its nodes, or at them on a race."""
+        """Contact stations of the bore: between its nodes or, with a race, at them."""
         if self.race is not None:
             return BoreStations.from_nodes(self.race.press)
         skeleton = self.element.skeleton
@@ -125,12 +132,13 @@ class SectorModel:
         nodes = self.bore_nodes
         if self.race is not None:
             return np.concatenate([self.dofs[_pairs(nodes)], self.race_dofs])
-        # one node of each neighbour; the last corner is the last skeleton node
+        # the first and the last node belong to the neighbours; the node before the
+        # last one is the last corner, which ends the skeleton
         last = len(self.element.skeleton)
         return _pairs(np.concatenate([[0], nodes + 1, [last, last + 1]]))
 
     def station_nodes(self, skeleton: Array) -> Array:
-        """Nodes that move the stations (N, m, 2) [m], from skeletons (N, n_a, 2)."""
+        """Nodes that stations follow (N, m, 2) [m], from skeletons (N, n_a, 2) [m]."""
         nodes = skeleton[:, self.bore_nodes]
         if self.race is not None:
             return nodes
@@ -148,8 +156,8 @@ class SectorModel:
     def face_dofs(self) -> int:
         """Number of degrees of freedom that neighbouring sectors share.
 
-        They belong to a face and to the two bore nodes next to its corner or, with a
-        race, to a face and the race node there.
+        They belong to the nodes of a face and to the two bore nodes next to its corner
+        or, with a race, to the race node at the face.
         """
         if self.race is None:
             return 2 * (self.element.face_size + 2)
@@ -173,15 +181,15 @@ class SectorModel:
     def sector_dofs(self) -> int:
         """Number of degrees of freedom n of a sector.
 
-        They belong to its skeleton and to the race below it or, without a race, to one
-        bore node of each neighbour.
+        They belong to its skeleton and to one bore node of each neighbour or, with a
+        race, to the race below it.
         """
         beside = 2 * 2 if self.race is None else self.race.size
         return 2 * len(self.element.skeleton) + beside
 
     @cached_property
     def signs(self) -> Array:
-        """Signs (N, n): -1 at the end of a half ring, which joins its start, else 1."""
+        """Signs (N, n): -1 at the end of a half ring, which joins its start; else 1."""
         signs = np.ones((self.sectors, self.sector_dofs))
         signs[-1, -self.face_dofs :] = self.closure
         return signs
@@ -200,7 +208,7 @@ class SectorModel:
         return np.concatenate([state.faces, state.bores, last], axis=1)
 
     def frames(self, state: State) -> Frames:
-        """Sector frames; in the linear model they turn with the flexspline only."""
+        """Sector frames; in a linear model all turn by the flexspline's rotation."""
         fixed = None
         if not self.nonlinear:
             fixed = np.full(self.sectors, state.rotation)
@@ -211,8 +219,9 @@ class SectorModel:
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
         """Start of a search: the inextensional two-lobe shape of a thin ring.
 
-        The radial displacement is w0 cos 2 phi, the tangential one -w0/2 sin 2 phi, and
-        cross-sections turn by 3 w0 sin 2 phi/(2 r), with phi from the major axis.
+        With the angle phi from the major axis, the radial displacement is w0 cos 2 phi,
+        the tangential one is -w0/2 sin 2 phi, and cross-sections rotate by
+        3 w0 sin 2 phi/(2 r).
 
         Args:
             alpha: Wave-generator angle [rad].
@@ -242,7 +251,7 @@ class SectorModel:
             touching = gap < 0.01 * w0
         else:
             race = self.race.initial_guess(alpha, rotation)
-            # the rim alone keeps the race on its balls
+            # only the rim presses the race on its balls: start in contact at the lobes
             touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
         return State(
             race=race,
@@ -261,14 +270,15 @@ class SectorModel:
     def wave_generator_gap(
         self, nodes: Array, alpha: float
     ) -> tuple[Array, Array, Array]:
-        """Gap, outward normal and curvature of parallel curves at points of the bore.
+        """Gap between points and wave generator, with its normal and curvature.
 
         Args:
             nodes: Positions (..., 2) [m].
             alpha: Wave-generator angle [rad].
 
         Returns:
-            Gap (...) [m], normal (..., 2) and curvature (...) [1/m].
+            Gap (...) [m], outward normal of the outline (..., 2), and curvature of the
+            parallel curve of the outline through each point (...) [1/m].
         """
         flat = rotate(nodes.reshape(-1, 2), -alpha)
         if self.wave_generator_offset is not None:
@@ -281,7 +291,7 @@ class SectorModel:
         )
 
     def wave_generator_normal(self, state: State) -> Array:
-        """Outward normal of the surface below the bore, at its stations (N, q, 2)."""
+        """Outward normal of wave generator or race at the bore stations (N, q, 2)."""
         points, alpha = self.bore_points(state), state.wave_generator_angle
         if self.race is None or state.race is None:
             return self.wave_generator_gap(points, alpha)[1]
@@ -291,8 +301,8 @@ class SectorModel:
         """Force of a rigid wave generator on the bore nodes (N, n_bore + 1, 2) [N]."""
         vectors = state.pressure[..., None] * self.wave_generator_normal(state)
         nodal = self.stations.forces_of(vectors)
-        # add the forces that stations exert on nodes of the neighbours: their last
-        # inner node, the shared corner and the first inner node
+        # stations also exert forces on neighbouring sectors: on the last inner node of
+        # the previous one, the shared corner and the first inner node of the next one
         force = nodal[:, 1:-2].copy()
         before, after = np.roll(nodal[:, 0], -1, axis=0), np.roll(nodal[:, -2:], 1, 0)
         before[-1] *= self.closure
@@ -316,10 +326,10 @@ class SectorModel:
         rotation: float,
         circular_spline_rotation: float,
     ) -> State:
-        """Predictor that turns the fields with the wave generator and the members.
+        """Predicted state after rotations of the wave generator and the members.
 
-        Displacements in the tooth frames travel with the wave generator from tooth to
-        tooth, interpolated between sectors; the flexspline turns rigidly.
+        The flexspline turns rigidly, while the displacements in the tooth frames travel
+        with the wave generator from tooth to tooth, interpolated between sectors.
 
         Args:
             state: State to start from.
@@ -336,7 +346,7 @@ class SectorModel:
             np.concatenate([state.faces, state.bores], axis=1),
             -(self.place + state.rotation)[:, None],
         )
-        # displacements in sector frames repeat after half a turn
+        # displacements in the sector frames repeat after half a turn, without a sign
         still = self.element.skeleton[: size + inside]
         x = rotate(
             still + shift_rows(local - still, shift),
@@ -365,18 +375,18 @@ class SectorModel:
         )
 
     def shift_flank(self, flank: Array, shift: Array | None) -> Array:
-        """Add the errors of the teeth to the displacements of their flank nodes.
+        """Flank displacements including the shifts of the teeth by errors (N, 2 n) [m].
 
         Args:
             flank: Displacements of the flank nodes (N, 2 n) [m].
-            shift: Shift of each tooth in its frame (N, 2) [m]; None for no errors.
+            shift: Shift of each tooth in its frame (N, 2) [m]; None without errors.
         """
         if shift is None:
             return flank
         return flank + np.tile(shift, flank.shape[1] // 2)
 
     def circular_spline_displacement(self, state: State) -> Array:
-        """Flank displacement of the circular spline (N_c, 2 n_c) [m]."""
+        """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
         compliance = self.circular_spline.compliance
         if compliance is None:
             return state.circular_spline_force
@@ -384,5 +394,5 @@ class SectorModel:
 
 
 def _pairs(nodes: Index) -> Index:
-    """Degrees of freedom x, y of every node, one after the other."""
+    """Degrees of freedom of nodes: x and y of the first node, then of the next."""
     return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())

@@ -1,1 +1,1 @@
-"""Figures of a drive from its 2D model: friction, ratcheting, motion of teeth."""
+"""Results of the 2D model: friction loops, ratcheting torque and tooth motion."""
