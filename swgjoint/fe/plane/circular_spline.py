@@ -1,9 +1,9 @@
 r"""The circular spline: rigid, or elastic with its outer diameter fixed or free.
 
-Its strains are small, so the model is linear: the flank displacement of tooth k under
-forces on the flanks of tooth j is the block :math:`G_{k-j}` of a block-circulant
-compliance, in the frames of the teeth. If the outer diameter is fixed, the blocks decay
-within a few teeth; if it is free, the ring can become oval.
+Its strains are small, so the model is linear. In the frames of the teeth, the block
+:math:`G_{k-j}` of a block-circulant compliance gives the flank displacement of tooth k
+per force on the flanks of tooth j. If the outer diameter is fixed, the blocks decay
+within a few teeth; if it is free, the circular spline can become oval.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 NEGLIGIBLE = 1e-9
-"""Blocks smaller than this fraction of the largest one are dropped [-]."""
+"""Size, divided by that of the largest block, below which blocks are dropped [-]."""
 CORNER = 0.05
 """Largest distance from a corner at which it is a contact candidate, as a fraction of
 the flank length [-]."""
@@ -50,7 +50,7 @@ class Compliance:
         return respond(self.offsets, self.flank, force)
 
     def skeleton_displacement(self, force: Array) -> Array:
-        """Skeleton displacement in the frames of the teeth (N, 2 n_a) [m]."""
+        """Skeleton displacement (N, 2 n_a) [m] under flank forces (N, 2 n_b) [N]."""
         return respond(self.offsets, self.skeleton, force)
 
     def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
@@ -58,11 +58,12 @@ class Compliance:
 
         Args:
             tooth: Tooth of each point (n,).
-            weight: Derivative of its gap by the flank displacement (n, 2 n_b).
+            weight: Derivative of each point's gap with respect to the flank
+                displacements of its tooth (n, 2 n_b) [-].
             teeth: Number of teeth in the model.
 
         Returns:
-            Matrix (n, n) [m/N].
+            Change of each gap per force at each point (n, n) [m/N].
         """
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
@@ -74,14 +75,14 @@ def circular_spline_compliance(
 
     Args:
         element: Condensed sector of the circular spline.
-        free_rim: Whether the outer diameter can deform. If so, only its mean motion is
-            held and its nodes share the reaction equally; otherwise it is fixed.
+        free_rim: Whether the outer diameter can deform. If so, only its mean
+            translation and rotation are held, and equal shares of the reaction act on
+            its nodes; otherwise the nodes are fixed.
     """
     n_teeth, size = element.sectors, element.face_size
     n_a = len(element.skeleton)
     pitch = 2.0 * np.pi / n_teeth
-    # the last face has the degrees of freedom of the next tooth's first face, expressed
-    # in the next tooth's frame
+    # express the last face in the next tooth's frame, where it is the first face
     turn = np.eye(2 * n_a)
     corner = rotate(np.eye(2), np.array(pitch)).T
     for node in range(n_a - size, n_a):
@@ -147,6 +148,7 @@ class CircularSpline:
     """Tooth surface of the circular spline that the flexspline's teeth touch."""
 
     profile: ToothProfile
+    """Undeformed tooth profile."""
     compliance: Compliance | None = None
     """Compliance of the teeth; None for a rigid circular spline and for one plane of a
     3D model."""
@@ -162,7 +164,7 @@ class CircularSpline:
 
     @property
     def spline(self) -> CubicSpline:
-        """Weights of the flank nodes as functions of the arc length (elastic only)."""
+        """Weights of one flank's nodes over the arc length [m]; elastic teeth only."""
         if self.weights is not None:
             return self.weights
         assert self.compliance is not None
@@ -178,22 +180,24 @@ class CircularSpline:
         start: Array | None = None,
         steps: int = 3,
     ) -> Feet:
-        """Closest points of a right flank, exact for the deformed curve.
+        """Feet of points on right flanks, found on the deformed curves.
 
-        A point whose foot would lie beyond an end of the flank faces the corner there:
-        its gap is the distance to the corner along the normal of the flexspline at the
-        point. The gap is infinite without that normal and for a rigid flank.
+        If the foot of a point is beyond an end of its flank, the point faces the corner
+        there: its gap is the distance to the corner along the normal of the flexspline
+        at the point. The gap is infinite if the corner is farther away than
+        :data:`CORNER`, if ``facing`` is None, or if the flanks are rigid.
 
         Args:
-            points: Points in the frame of a ring tooth, mirrored to its right flank
-                (n, 2) [m].
+            points: Points in the frame of a circular-spline tooth, mirrored where
+                necessary so that they face its right flank (n, 2) [m].
             flanks: Flank displacements in that frame; None for rigid flanks.
-            index: Flank that each point faces (n,).
+            index: Number, in ``flanks``, of the flank that each point faces (n,).
             facing: Normals of the flexspline at the points, in that frame (n, 2).
             start: Arc lengths near the feet (n,) [m]; by default the feet on the rigid
                 flank.
-            steps: Newton steps to the foot. Each step multiplies the error of the foot
-                by gap times curvature; the error of the gap is of second order in it.
+            steps: Number of Newton steps. Each multiplies the error of the foot by gap
+                times curvature; the error of the gap is of second order in that of the
+                foot.
         """
         outside = np.zeros(len(points), dtype=bool)
         if flanks is None or start is None:
@@ -268,20 +272,20 @@ class CircularSpline:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlankSplines:
-    """Displacements of many flanks as cubic splines along the profile."""
+    """Displacements of flanks as cubic splines along the profile."""
 
     breaks: Array
     """Arc lengths at the ends of the intervals (n_intervals + 1,) [m]."""
     coefficients: Array
-    """Coefficients of ascending powers of (s - break), (n_flanks, n_intervals, 4, 2).
-    """
+    """Coefficients (n_flanks, n_intervals, 4, 2) of ascending powers of the distance
+    [m] from the start of the interval; displacements in metres."""
 
     @classmethod
     def fit(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
-        """Splines through the node displacements of many flanks.
+        """Splines of the averaged displacements of flanks.
 
         Args:
-            spline: Weights of the flank nodes as functions of the arc length.
+            spline: Weights of the flank nodes as functions of the arc length [m].
             nodes: Node displacements (n_flanks, n_nodes, 2) [m].
         """
         cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
@@ -293,7 +297,7 @@ class FlankSplines:
         )
 
     def evaluate_at(self, flank: Index, s: Array) -> tuple[Array, Array]:
-        """Displacement and its derivative by the arc length.
+        """Displacement and its derivative with respect to the arc length.
 
         Args:
             flank: Number of the flank of each point (n,).
@@ -314,11 +318,13 @@ class Feet:
     """Feet of points on a flank of the circular spline."""
 
     gap: Array
-    """Signed distance of each point from the flank (n,) [m]."""
+    """Signed distance of each point from the flank (n,) [m]; infinite without a foot.
+    """
     normal: Array
-    """Normal of the flank at the foot (n, 2)."""
+    """Outward normal of the flank at the foot; at a corner, the opposite of the
+    flexspline's normal (n, 2)."""
     curvature: Array
-    """Curvature of the flank at the foot (n,) [1/m]."""
+    """Curvature of the undeformed profile at the foot (n,) [1/m]."""
     corner: NDArray[np.bool_]
     """Whether the foot is an end of the flank instead of a perpendicular foot (n,)."""
     rest: Array

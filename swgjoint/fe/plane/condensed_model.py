@@ -18,22 +18,23 @@ from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Index, Mask
 
 REACH = 0.03
-"""Largest gap of a contact that may close, in lobe heights [-]."""
+"""Largest gap of a contact candidate, in lobe heights [-]."""
 ALIKE = 1e-5
-"""Distance below which two points of a flank count as one [m]: a tenth of the half
-length of a patch."""
+"""Distance below which two points of a flank count as one [m]. It is a tenth of the
+half length of a contact patch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CondensedModel:
     """A ring linearised at an equilibrium and solved for unit forces at its contacts.
 
-    The system of the teeth has n + 3 unknowns: n contact forces, the force of the
-    anchor, the multiplier of the flexspline's rotation and the rotation of the circular
-    spline.
+    The condensed system of the teeth has n + 3 unknowns: n contact forces, the force of
+    the anchor, the multiplier of the flexspline's rotation and the rotation of the
+    circular spline. N sectors have n_dofs degrees of freedom each.
     """
 
     model: SectorModel
+    """The 2D model."""
     state: State
     """The equilibrium."""
     linear: Linearised
@@ -52,7 +53,7 @@ class CondensedModel:
 
     @cached_property
     def _rows(self) -> Array:
-        """Derivatives of the gaps of the teeth (n, n_dofs)."""
+        """Derivatives of the tooth gaps with respect to nodes (n, n_dofs) [-]."""
         return self.linear.gap_gradient(self.contacts)
 
     @cached_property
@@ -66,13 +67,19 @@ class CondensedModel:
 
     @cached_property
     def _response(self) -> Array:
-        """Displacements under these loads and the gradient (N, n_dofs, n + 3)."""
+        """Displacements under these loads, then under minus the gradient.
+
+        Shape (N, n_dofs, n + 3).
+        """
         return self._solved(
             np.concatenate([self._loads, -self.linear.gradient[:, :, None]], axis=2)
         )
 
     def _solved(self, right: Array) -> Array:
-        """Displacements (N, n_dofs, k) under right-hand sides of that shape."""
+        """Displacements (N, n_dofs, k) under right-hand sides of that shape.
+
+        Rows of fixed degrees of freedom are set to zero in ``right`` itself.
+        """
         right[self.linear.fixed] = 0.0
         return self._factor.solve(right)
 
@@ -93,10 +100,11 @@ class CondensedModel:
 
     @cached_property
     def _teeth(self) -> tuple[Array, Array]:
-        """Linear system of the tooth gaps and three more equations.
+        """Linear system: tooth gaps and three more rows from the unknowns.
 
-        After the teeth come the anchor that keeps the rotation regular, the rotation of
-        the flexspline and that of the circular spline.
+        The rows after the tooth gaps are the displacement of the anchor, which keeps
+        the tangent regular, the rotation of the flexspline, and the moment on the
+        circular spline.
 
         Returns:
             Matrix (n + 3, n + 3) and offset (n + 3,).
@@ -117,7 +125,7 @@ class CondensedModel:
                 model.circular_spline_teeth,
             )
         system[n, n] -= 1.0 / linear.anchor_stiffness
-        # rotation of the circular spline towards the teeth closes gaps by a lever arm
+        # turning the circular spline towards the teeth closes each gap by its lever arm
         arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
         system[:n, n + 2] = system[n + 2, :n] = -arm
         # gaps without the tooth forces of the state
@@ -140,7 +148,11 @@ class CondensedModel:
         return system, offset
 
     def _answers(self, response: Array) -> Array:
-        """Tooth gaps, anchor and rotation under displacements (n + 2, n_columns)."""
+        """Changes of tooth gaps, anchor and rotation (n + 2, n_columns).
+
+        Args:
+            response: Displacements (N, n_dofs, n_columns).
+        """
         n = len(self.contacts)
         return np.concatenate(
             [
@@ -150,7 +162,7 @@ class CondensedModel:
         )
 
     def _system(self, supports: Supports) -> tuple[Array, Array]:
-        """System :attr:`_teeth` with k supports inserted after the teeth.
+        """System :attr:`_teeth` with k supports of the bore inserted after the teeth.
 
         Returns:
             Matrix (n + k + 3, n + k + 3) and offset (n + k + 3,).
@@ -173,7 +185,7 @@ class CondensedModel:
         return system, offset
 
     def influence(self, supports: Supports) -> Influence:
-        """Complementarity problem of the teeth and of supports that may switch."""
+        """Complementarity problem of the tooth contacts and of bore supports."""
         model, state, contacts = self.model, self.state, self.contacts
         system, offset = self._system(supports)
         n, m = len(contacts), len(contacts) + len(supports.intervals.sector)
@@ -204,15 +216,15 @@ class CondensedModel:
 
 
 def _by_shift(weight: Array) -> Array:
-    """Derivatives of the gaps by a common shift of all flank nodes (n, 2)."""
+    """Derivatives of the gaps with respect to a shift of the whole tooth (n, 2) [-]."""
     return np.asarray(weight.reshape(len(weight), -1, 2).sum(axis=1))
 
 
 def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
-    """Drop contacts that almost coincide, and report which of the others carry force.
+    """Contacts without those that almost coincide, and which of them carry force.
 
-    Of two points of a flank closer than :data:`ALIKE` the one with the larger force is
-    kept: two nearly dependent contacts would make the system ill-conditioned.
+    If two points of a flank are closer than :data:`ALIKE`, only the one with the larger
+    force is kept: two nearly dependent contacts would make the system ill-conditioned.
 
     Args:
         contacts: Candidates.
@@ -239,10 +251,7 @@ def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Intervals:
-    """Intervals of the bore between nodes, k of them, with weights of their stations.
-
-    Each interval has p stations.
-    """
+    """Selection of k intervals between bore nodes, with p stations each."""
 
     sector: Index
     """Sector of each interval (k,)."""
@@ -252,7 +261,7 @@ class _Intervals:
     """Weights of the stations in the mean over their interval (k, p)."""
 
     def mean(self, values: Array) -> Array:
-        """Means (k, ...) of values at the stations (N, q, ...)."""
+        """Means over the intervals (k, ...) of values at all stations (N, q, ...)."""
         p = self.share.shape[1]
         shaped = values.reshape(len(values), -1, p, *values.shape[2:])
         there = shaped[self.sector, self.number]
@@ -261,19 +270,21 @@ class _Intervals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Supports:
-    """Intervals of the bore that touch the wave generator or may do so; k of them.
+    """The k intervals of the bore that touch the wave generator or may do so.
 
-    The stations of an interval share one force F and one mean gap g; K is their
-    stiffness. The slack s = g + F/K of the layer below them satisfies F s = 0. An open
-    support has the unknown F and the response s; a closed one has the unknown s and the
-    response F = K (s - g).
+    The stations of an interval share one force F and one mean gap g; K is the sum of
+    their stiffnesses. The slack s = g + F/K of the layer below them satisfies F s = 0.
+    An open support has the unknown F and the response s; a closed one has the unknown s
+    and the response F = K (s - g).
     """
 
     intervals: _Intervals
+    """Where the supports are."""
     closed: Mask
     """Whether each support touches the wave generator (k,)."""
     rows: Array
-    """Derivative of g by the degrees of freedom of the sector (k, n)."""
+    """Derivative of g with respect to the degrees of freedom of the sector (k, n) [-].
+    """
     stiffness: Array
     """Stiffness K (k,) [N/m]."""
     start: Array
@@ -309,7 +320,7 @@ class Supports:
 
     @property
     def loads(self) -> Array:
-        """Nodal forces per unit of the unknown of each support (k, n)."""
+        """Nodal forces per unit of each support's unknown F or s (k, n)."""
         return np.where(self.closed, self.stiffness, 1.0)[:, None] * self.rows
 
     @property
@@ -318,6 +329,12 @@ class Supports:
         return np.where(self.closed, self.stiffness, 1.0 / self.stiffness)
 
     def answers(self, response: Array) -> Array:
-        """Responses to displacements (N, n, n_columns), without the layer's own."""
+        """Responses of the supports to displacements (k, n_columns).
+
+        The response :attr:`own` of the layer is not included.
+
+        Args:
+            response: Displacements of the sectors (N, n, n_columns) [m].
+        """
         moved = np.einsum("kn,knl->kl", self.rows, response[self.intervals.sector])
         return np.asarray(np.where(self.closed, -self.stiffness, 1.0)[:, None] * moved)

@@ -2,16 +2,16 @@ r"""Corotational sectors: large rotations, small strains within a sector.
 
 Each sector s has one frame, rotated by :math:`\varphi_s` from its place in the
 undeformed ring; :math:`\varphi_s` is the best-fit rotation of its two faces. With the
-node positions y in that frame, the energy is
+node positions y in that frame and the undeformed positions X, the energy is
 
 .. math:: E = \tfrac12 \tilde d^T \hat K \tilde d - F^T A d - \tfrac12 F^T C F
     + \dots, \quad d = y - X, \quad \tilde d = d + \tfrac12 (d^T Q d)\, p .
 
-The last term accounts for rotations of the rim within a sector: slopes :math:`\omega`
-relative to the frame lengthen the rim by :math:`\tfrac12 \int \omega^2 ds = \tfrac12
-d^T Q d`, which a hoop tension resists; p is a uniform elongation by one unit of length.
-(Without this term the reference ring on its ellipse, under a hoop tension of 180 N, has
-an error of 0.2 micrometre.)
+The term with p accounts for rotations of the rim within a sector. Slopes
+:math:`\omega` relative to the frame lengthen the rim by :math:`\tfrac12 \int \omega^2 ds
+= \tfrac12 d^T Q d`, which a hoop tension resists; the displacements p elongate the
+sector uniformly by one unit of length. (Without this term the reference ring on its
+ellipse, under a hoop tension of 180 N, has an error of 0.2 micrometre.)
 
 The gradient and the tangent below are exact for dead forces F in the sector frame.
 """
@@ -45,25 +45,27 @@ def rotate_right_angle(vectors: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frames:
-    """Kinematics of all sectors at one state; n = 2 n_a."""
+    """Kinematics of the N sectors at one state; n = 2 n_a coordinates per sector."""
 
     angle: Array
-    """Rotation from the tooth frame to the global frame (N,) [rad]."""
+    """Rotation from the sector frame to the global frame (N,) [rad]."""
     position: Array
     """Skeleton positions y in the sector frames (N, n) [m]."""
     displacement: Array
     """Displacement d = y - X (N, n) [m]."""
     deformation: Array
-    """Displacement d plus its second-order elongation, minus its mean (N, n) [m].
+    """Displacement d minus its mean, plus the second-order elongation (N, n) [m].
 
-    Sectors travel a thousand times farther than they deform; the round-off of the
-    travel would swamp the energy."""
+    The mean is subtracted because sectors move a thousand times farther than they
+    deform: round-off in the rigid motion would exceed the strain energy."""
     elongating: Array
-    """Derivative Q d of that elongation (N, n) [m]; zero if linear."""
+    """Derivative Q d of that elongation (N, n) [-]; zero in a linear model."""
     spin: Array
-    """Derivative Gamma of the frame angle by y (N, n) [rad/m]; zero if linear."""
+    """Derivative Gamma of the frame angle with respect to y (N, n) [rad/m]; zero in a
+    linear model."""
     gyration: Array
-    """Sum C of X_c . y_c over the face nodes (N,) [m^2]."""
+    """Sum C of X_c . y over the face nodes, where X_c is the undeformed position
+    relative to their centre (N,) [m^2]."""
 
 
 def sector_frames(
@@ -79,7 +81,8 @@ def sector_frames(
         element: The condensed sector.
         positions: Skeleton nodes in the global frame (N, n_a, 2) [m].
         place: Angle of each sector in the undeformed ring (N,) [rad].
-        fixed: Frame rotations to use instead of fitted ones (linear model) (N,) [rad].
+        fixed: Frame rotations of a linear model (N,) [rad]; None to fit them to the
+            faces.
     """
     reference = element.skeleton
     size = element.face_size
@@ -119,10 +122,10 @@ def sector_frames(
 
 
 def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) -> Array:
-    """Strain energy of each sector, flank forces included.
+    """Strain energy of each sector under its flank forces.
 
-    1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the
-    energy of the uncondensed sector into these two parts.
+    The energy is 1/2 d_a K d_a + 1/2 F C F: with the flank displacement
+    d_b = A d_a + C F, the energy of the uncondensed sector splits into these two parts.
 
     Args:
         element: The condensed sector.
@@ -141,11 +144,11 @@ def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) ->
 
 
 def elastic_force(element: Superelement, frames: Frames) -> Array:
-    r"""Derivative by d of the first part of the energy.
+    r"""Derivative of the energy of the skeleton displacements with respect to d.
 
     .. math:: f = \hat K \tilde d + N\, Q d, \quad N = p^T \hat K \tilde d
 
-    with the hoop force N of the sector.
+    N is the hoop force in the sector.
 
     Args:
         element: The condensed sector.
@@ -160,7 +163,9 @@ def elastic_force(element: Superelement, frames: Frames) -> Array:
 
 
 def project_to_frames(frames: Frames, force: Array) -> Array:
-    r"""Gradient by the node positions, from forces in the sector frame: P^T f.
+    r"""Gradient P^T f of the energy with respect to the node positions.
+
+    The projector P accounts for the rotation of the frame with its nodes:
 
     .. math:: P = I - (J y)\,\Gamma^T
 
@@ -169,7 +174,7 @@ def project_to_frames(frames: Frames, force: Array) -> Array:
         force: Nodal forces f in the sector frames (N, n) [N].
 
     Returns:
-        Gradient, still in the axes of the sector frames (N, n) [N].
+        Gradient, with components along the axes of the sector frames (N, n) [N].
     """
     j_y = rotate_right_angle(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(
         force.shape
@@ -178,7 +183,7 @@ def project_to_frames(frames: Frames, force: Array) -> Array:
 
 
 def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
-    r"""Second derivative of the energy by the positions, in the sector frames.
+    r"""Second derivative of the energy with respect to the node positions.
 
     .. math::
         H = P^T K P + \Gamma (Jf)^T + (Jf)\Gamma^T
@@ -193,7 +198,7 @@ def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
         force: Nodal forces f in the sector frames (N, n) [N].
 
     Returns:
-        Symmetric matrices (N, n, n) [N/m].
+        Symmetric matrices along the axes of the sector frames (N, n, n) [N/m].
     """
     n_sectors, n = force.shape
     gamma = frames.spin

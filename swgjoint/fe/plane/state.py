@@ -1,4 +1,4 @@
-"""State of the drive at one equilibrium."""
+"""States of the 2D model: equilibria and starts of their search."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StateFigures:
-    """Results that equilibria of 2D and 3D models share."""
+    """Scalar results that equilibria of 2D and 3D models share."""
 
     wave_generator_angle: float = 0.0
-    """Wave-generator angle in the frame of the solver [rad]."""
+    """Rotation of the wave generator in the global frame [rad]."""
     rotation: float = 0.0
     """Best-fit rotation of the flexspline's bore [rad]; of the bore of the diaphragm in
     a 3D model."""
     circular_spline_rotation: float = 0.0
-    """Rotation of the circular spline [rad]."""
+    """Rotation of the circular spline in the global frame [rad]."""
     torque: float = 0.0
     """Torque T of the output on its load, whole drive [N·m]."""
     holding_torque: float = 0.0
@@ -50,12 +50,12 @@ class State(StateFigures):
     faces: Array
     """Positions of the first face of each sector (N, n_face, 2) [m]."""
     bores: Array
-    """Positions of the bore nodes inside the sectors (N, n_bore, 2) [m]."""
+    """Positions of the bore nodes between the faces (N, n_bore, 2) [m]."""
     pressure: Array
-    """Normal force of the wave generator at the stations of the bore (N, q) [N], see
-    :mod:`swgjoint.fe.plane.bore_contact`."""
+    """Normal force (not pressure) on the bore at each of its contact stations (N, q)
+    [N], see :mod:`swgjoint.fe.plane.bore_contact`."""
     touching: Mask
-    """Whether each of these stations touches (N, q)."""
+    """Whether each of these stations is in contact (N, q)."""
     flank_force: Array
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
     circular_spline_force: Array
@@ -67,15 +67,17 @@ class State(StateFigures):
     ball_force: Array | None = None
     """Forces of the balls of the whole drive (balls,) [N]; None without balls."""
     contacts: Contacts | None = None
-    """Contact points that carry force."""
+    """Tooth contacts that carry force; None before the first solve."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Normal force at each contact (n_contacts,) [N]."""
     friction_force: Array = field(default_factory=lambda: np.zeros(0))
-    """Friction on the flexspline at each contact, from tip to root (n_contacts,) [N].
-    """
+    """Friction force on the flexspline at each contact, positive from tip to root
+    (n_contacts,) [N]."""
     slip: SlipHistory | None = None
-    """Candidates and friction forces at the end of the step; None without friction."""
+    """Contact candidates and their forces at the end of the last load step; None
+    without friction."""
     candidates: SlipHistory | None = None
-    """Candidates and friction forces of the current iteration; None after the last."""
+    """Contact candidates and their forces in the current iteration; None once the
+    search has ended."""
     friction_work: float = 0.0
-    """Work dissipated by friction since the deflection, whole drive [J]."""
+    """Work dissipated by friction since the rim was deflected, whole drive [J]."""

@@ -1,4 +1,4 @@
-"""Static condensation of one tooth sector to the nodes that the drive model uses."""
+"""Static condensation of a tooth sector to its faces, its bore and its flanks."""
 
 from __future__ import annotations
 
@@ -24,15 +24,17 @@ from swgjoint.typing import Array, Index
 class Superelement:
     r"""Condensed sector, in the frame of its tooth (tooth centred on +y).
 
-    Skeleton nodes (a) are those of the first face, the inner bore and the last face.
-    Flank nodes (b) are those of the right and then the left flank, without those on the
-    faces. With forces F on the flanks,
+    The n_a skeleton nodes (a) are those of the first face, then those of the bore
+    between the faces, then those of the last face. The n_b flank nodes (b) are those of
+    the right and then those of the left flank, without the nodes on the faces. Under
+    forces F on the flank nodes, the flank displacements, the forces on the skeleton and
+    the stresses are
 
     .. math:: d_b = A d_a + C F, \quad
         f_a = \hat K d_a - A^T F, \quad
         \sigma = M_a d_a + M_F F .
 
-    Vectors contain x and y of one node after the other.
+    Vectors list x and y of the first node, then of the next one, and so on.
     """
 
     sectors: int
@@ -59,9 +61,11 @@ class Superelement:
     """Axial stress divided by the sum of the in-plane normal stresses, c nu [-]; see
     :func:`swgjoint.fe.plane.elasticity.in_plane_constants`."""
     mesh: SectorMesh
+    """Mesh of the sector."""
     profile: ToothProfile
+    """Tooth profile."""
     spline: CubicSpline
-    """Weights of the flank nodes in the mean displacement of a contact patch, as
+    """Weights of one flank's nodes in the mean displacement of a contact patch, as
     functions of the arc length [m] of its centre."""
 
     @property
@@ -76,10 +80,10 @@ class Superelement:
 
     @cached_property
     def rim_slopes(self) -> Array:
-        r"""Rows B that give the rotations of the bore relative to the frame.
+        r"""Matrix B that gives the rotations of the bore relative to the sector frame.
 
-        There is one row per interval between bore nodes, scaled by the square root of
-        its length: :math:`\int \omega^2 ds = d^T B^T B d`.
+        It has one row per interval between bore nodes, multiplied by the square root of
+        the interval's length, so that :math:`\int \omega^2 ds = d^T B^T B d`.
         Shape (n_bore + 1, 2 n_a) [m^(-1/2)].
         """
         size, count = self.face_size, len(self.skeleton)
@@ -95,7 +99,10 @@ class Superelement:
 
     @cached_property
     def elongation(self) -> Array:
-        """Uniform elongation of the sector by one unit of its bore length (2 n_a,)."""
+        """Displacements p that elongate the bore by one unit of length (2 n_a,) [-].
+
+        The elongation is uniform over the sector.
+        """
         size = self.face_size
         x = self.skeleton[:, 0]
         moved = np.zeros_like(self.skeleton)
@@ -104,7 +111,7 @@ class Superelement:
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Arc lengths [m] between which a flank can touch: the ends of the lands."""
+        """Arc lengths [m] between which a flank can touch: from land to land."""
         low, high = self.profile.contact_range
         return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
 
@@ -121,8 +128,8 @@ def condense(
     """Condense the mesh of a tooth sector.
 
     Args:
-        mesh: Sector of one tooth.
-        profile: Its tooth profile.
+        mesh: Mesh of the sector.
+        profile: Tooth profile from which the mesh was made.
         youngs_modulus: Young's modulus of the material [Pa].
         poisson_ratio: Poisson's ratio of the material [-].
         width: Face width [m].
@@ -166,8 +173,8 @@ def condense(
     operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio, confinement)
     from_a, from_flank = operator @ all_from_a, operator @ all_from_flank
     at_nodes = basis.nodal_dofs.T.ravel()
-    # sectors travel a thousand times farther than they strain: make rigid translations
-    # free of force and stress to machine precision, beyond that of the solver
+    # sectors move a thousand times farther than they deform, so the error of the sparse
+    # solver is too large: make translations free of force and stress to round-off
     move = np.tile(np.eye(2), (len(skeleton), 1)) / np.sqrt(len(skeleton))
     strain = np.eye(n) - move @ move.T
     stiffness = strain @ stiffness @ strain
