@@ -15,7 +15,7 @@ A station follows the cubic B-spline through the surrounding nodes, corrected to
 the circle of the undeformed bore, so that a force between two nodes sees the same
 compliance as a force at a node. (With rigid contact at the nodes only, the input torque
 of a drive with four rollers was a sawtooth with one period per node, five times as high
-as the true ripple.)
+as the rest of the ripple.)
 """
 
 from __future__ import annotations
@@ -29,31 +29,33 @@ from numpy.typing import NDArray
 from swgjoint.typing import Array
 
 POINTS = 24
-"""Stations between neighbouring nodes."""
+"""Number of stations between neighbouring nodes."""
 NARROW_POINTS = 48
-"""Stations between neighbouring nodes for rollers and parabolas.
+"""Number of stations between neighbouring nodes for rollers and parabolas.
 
 There the contact is narrower than the node spacing, and its steps from one station to
-the next show up as a ripple of the input torque. For parabolas at 1 N·m they amount to
-10 % of the total ripple with 24 stations (4.7 % rms) and to 5.6 % (2.2 % rms) with 48,
-most of which has other causes."""
+the next cause an error of the input torque. For parabolas at 1 N·m the largest error is
+10 % of the ripple (4.7 % rms) with 24 stations. With 48 stations it is 5.6 % (2.2 %
+rms), and most of it has other causes."""
 DEPTH = 0.5
 """Depth of the layer divided by the node spacing [-].
 
-With 0.5 the kinematic error of ``reference-2d`` differs by 0.1 % from that of a mesh
-twice as fine; with 2 it differs by 4 %. Shallower layers need more stations."""
+At a depth of 0.5 the kinematic error of ``reference-2d`` differs by 0.1 % from that of
+a mesh twice as fine; at a depth of 2 it differs by 4 %. Shallower layers need more
+stations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoreStations:
     """Contact stations of a sector: p in each of i equal intervals, q = i p in total.
 
-    The stations of an interval follow s neighbouring nodes out of m.
+    The stations of an interval follow s neighbouring nodes out of the m nodes of the
+    sector. Methods work on all N sectors at once.
     """
 
     weights: Array
-    """Weights of an interval's nodes in the positions of its stations (p, 2, 2 s) [-].
-    """
+    """Derivatives of station positions with respect to the node positions of the
+    interval (p, 2, 2 s) [-]."""
     stiffness: Array
     """Stiffness k of each station (q,) [N/m]."""
 
@@ -63,12 +65,12 @@ class BoreStations:
         return len(self.weights)
 
     def positions(self, nodes: Array) -> Array:
-        """Station positions of all sectors (N, q, 2) [m] from their nodes (N, m, 2)."""
+        """Positions of the stations (N, q, 2) [m], from nodes (N, m, 2) [m]."""
         by_node = self.weights.reshape(-1, self.weights.shape[2])
         return np.asarray((self._windows(nodes) @ by_node.T).reshape(len(nodes), -1, 2))
 
     def project(self, direction: Array) -> Array:
-        """Rows that give displacements along directions from those of the nodes.
+        """Displacements of the stations along given directions, as rows over the nodes.
 
         Args:
             direction: Direction at each station (N, q, 2).
@@ -123,7 +125,7 @@ class BoreStations:
         return np.asarray(x * self.weights[:, 0] + y * self.weights[:, 1])
 
     def _assembled(self, local: Array) -> Array:
-        """Sum the values of every interval (N, i, 2 s) at the nodes (N, 2 m)."""
+        """Sums at the nodes (N, 2 m) of the values of all intervals (N, i, 2 s)."""
         count, intervals, width = local.shape
         total = np.zeros((count, width + 2 * (intervals - 1)))
         for k in range(intervals):
@@ -131,25 +133,26 @@ class BoreStations:
         return total
 
     def nodes_touching(self, touching: NDArray[np.bool_]) -> int:
-        """Touching stations (N, q) counted in node intervals, rounded up."""
+        """Number of touching stations (N, q), in node intervals and rounded up."""
         return -(-int(touching.sum()) // self.per_interval)
 
     @classmethod
     def from_nodes(cls, stiffness: Array) -> Self:
-        """Use the nodes themselves as stations, with stiffnesses (m,) [N/m]."""
+        """Stations at the nodes themselves, with given stiffnesses (m,) [N/m]."""
         return cls(weights=np.eye(2)[None], stiffness=stiffness)
 
     @classmethod
     def subdivide(cls, nodes: Array, *, layer: float, points: int = POINTS) -> Self:
-        """Space stations equally in all intervals except the first and the last.
+        """Equally spaced stations in all intervals except the first and the last.
 
         Args:
             nodes: Undeformed nodes, equally spaced on a circle around the origin, from
                 one before the intervals to one after them (m, 2) [m].
             layer: Product E b of Young's modulus and width of the bore [N/m].
-            points: Stations per interval.
+            points: Number of stations per interval.
         """
-        # equal shares: Gauss weights do not add up over a part of an interval
+        # stations of equal length: the weights of Gauss points would not add up to the
+        # length of the part of an interval that is in contact
         t = (np.arange(points) + 0.5) / points
         splines = np.stack(
             [

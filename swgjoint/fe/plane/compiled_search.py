@@ -1,4 +1,4 @@
-"""The search for tooth contact in compiled code, with its numpy interface."""
+"""Interface to the compiled search for tooth contacts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Flanks(Protocol):
 
     @property
     def spline(self) -> CubicSpline:
-        """Weights of the flank nodes in the displacement at an arc length."""
+        """Weights of one flank's nodes in the displacement at an arc length [m]."""
 
     @property
     def flank_size(self) -> int:
@@ -39,22 +39,28 @@ class Flanks(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeenFeet:
-    """Feet of points, with vectors transformed back to the mirrored sector frames."""
+    """Feet of points of the flexspline on the circular spline.
+
+    The feet are in the mirrored frames of the circular spline's teeth, the vectors
+    below in the mirrored sector frames.
+    """
 
     feet: Feet
+    """Feet on the flanks of the circular spline."""
     normal: Array
-    """Normals of the circular spline (n, 2)."""
+    """Normal at each foot (n, 2)."""
     rest: Array
-    """Vectors from a corner to the point (n, 2) [m]."""
+    """Vector from a corner to each point; zero for a perpendicular foot (n, 2) [m]."""
     tooth: Index
-    """Teeth of the circular spline (n,)."""
+    """Tooth of the circular spline on which each foot is (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CompiledSearch:
-    """Feet and minima of :class:`swgjoint.fe.plane.tooth_contact.ToothContact`."""
+    """Compiled loops of :class:`swgjoint.fe.plane.tooth_contact.ToothContact`."""
 
     search: Search
+    """The loops with the flanks of one state."""
     rigid: bool
     """Whether the circular spline is rigid."""
 
@@ -70,25 +76,31 @@ class CompiledSearch:
         teeth_in_model: int,
         limits: dict[str, float],
     ) -> CompiledSearch | None:
-        """The compiled search; None without compiled loops.
-
-        None also for profiles with other pieces than circular arcs and lines.
+        """Compiled search between two sets of flanks.
 
         Args:
             element: Flanks of the flexspline.
             circular_spline: Flanks of the circular spline.
-            displaced: Displacements of these; None if rigid.
-            angle: As in ``ToothContact`` (N,) [rad].
-            bearing: As in ``ToothContact`` (N,) [rad].
+            displaced: Displacements of the circular spline's flanks; None for rigid
+                flanks.
+            angle: Angles of the sector frames relative to the circular spline (N,)
+                [rad].
+            bearing: Polar angles of the teeth relative to the circular spline (N,)
+                [rad].
             teeth_in_model: Number of teeth of the circular spline in the model.
-            limits: Limits of the search by name.
+            limits: Constants of the search, by the arguments of
+                ``swgjoint.kernels.compiled.Limits``.
+
+        Returns:
+            The search; None if there are no compiled loops, or if a profile contains
+            pieces other than circular arcs and straight lines.
         """
         native = kernels()
         profile, facing = element.profile, circular_spline.profile
         if native is None or profile.pieces is None or facing.pieces is None:
             return None
         spline = element.spline
-        # any two points: rigid flanks need no arc lengths
+        # rigid flanks need no arc lengths by radius: any two points will do
         stations, radii = np.arange(2.0), np.arange(2.0)
         breaks, coefficients = np.zeros(1), np.zeros((0, 0, 4, 2))
         if displaced is not None:
@@ -123,7 +135,18 @@ class CompiledSearch:
         start: Array | None,
         steps: int,
     ) -> SeenFeet:
-        """Feet of points, see ``ToothContact._feet`` for the arguments."""
+        """Feet, on the circular spline, of points in the mirrored sector frames.
+
+        Args:
+            points: Points on the displaced flanks (n, 2) [m].
+            outward: Outward normals of the flexspline there (n, 2).
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            rigid: Whether to neglect the displacement of the circular spline.
+            start: Arc lengths near the feet (n,) [m]; None starts from the feet on the
+                rigid flanks.
+            steps: Number of Newton steps.
+        """
         n, rigid = len(points), rigid or self.rigid
         real, corner = np.empty((n, 11)), np.empty(n, dtype=np.bool_)
         tooth = np.empty(n, dtype=np.int64)
@@ -157,7 +180,15 @@ class CompiledSearch:
         side: Index,
         spacing: float,
     ) -> Array:
-        """Arc lengths of the minima, see ``ToothContact._refine`` for the arguments."""
+        """Arc lengths of the minima of the gap (n,) [m].
+
+        Args:
+            station: Arc lengths near the minima (n,) [m].
+            mirrored: Displacements of the flanks in mirrored frames (n, size, 2) [m].
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            spacing: Distance between the samples, half the width of the brackets [m].
+        """
         refined = np.array(station)
         self.search.refine(
             refined,

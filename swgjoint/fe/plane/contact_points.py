@@ -12,7 +12,10 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contacts:
-    """Candidate contact points; n of them."""
+    """Candidates for contact between flanks, n points.
+
+    Derivatives with respect to flank displacements are dimensionless.
+    """
 
     sector: Index
     """Sector (tooth) of the flexspline (n,)."""
@@ -21,29 +24,30 @@ class Contacts:
     station: Array
     """Arc length on the flexspline profile (n,) [m]."""
     gap: Array
-    """Distance to the circular spline, positive when apart (n,) [m]."""
+    """Distance from the circular spline, negative for an overlap (n,) [m]."""
     normal: Array
-    """Normal out of the circular spline's material, in the sector frame (n, 2)."""
+    """Outward unit normal of the circular spline, in the sector frame (n, 2)."""
     point: Array
     """Position in the sector frame (n, 2) [m]."""
     weight: Array
-    """Derivative of the gap by the flank displacements (n, 2 n_b)."""
+    """Derivative of the gap with respect to the tooth's flank displacements
+    (n, 2 n_b)."""
     tooth: Index
     """Tooth of the circular spline (n,)."""
     circular_spline_weight: Array
-    """Derivative of the gap by the flank displacements of that tooth (n, 2 n_c); no
-    columns if the circular spline is rigid."""
+    """Derivative of the gap with respect to the flank displacements of that tooth
+    (n, 2 n_c); no columns if the circular spline is rigid."""
     tangent: Array
-    """Tangent of the flank from tip to root, in the sector frame (n, 2)."""
+    """Unit tangent of the flank from tip to root, in the sector frame (n, 2)."""
     sliding: Array
-    """Derivative of the motion along the tangent by the flank displacements (n, 2 n_b);
-    no columns without friction."""
+    """Derivative of the sliding motion along the tangent with respect to the flank
+    displacements of the flexspline tooth (n, 2 n_b); no columns without friction."""
     circular_spline_sliding: Array
-    """Derivative of the motion along the tangent by the flank displacements of the
-    circular spline (n, 2 n_c)."""
+    """Derivative of the same motion with respect to the flank displacements of the
+    circular-spline tooth (n, 2 n_c); no columns without friction."""
     slip: Array
-    """Sum of the arc lengths of the two material points, each counted from tip to root
-    (n,) [m]; NaN on a rigid circular spline."""
+    """Sum of the arc lengths of the contact point on both flanks, each measured from
+    tip to root (n,) [m]; NaN if the circular spline is rigid."""
 
     def __len__(self) -> int:
         return len(self.sector)
@@ -53,9 +57,9 @@ class Contacts:
         """An empty set of contacts.
 
         Args:
-            flank_dofs: Columns of ``weight``, 2 n_b.
-            circular_spline_dofs: Columns of ``circular_spline_weight``, 2 n_c; zero if
-                the circular spline is rigid.
+            flank_dofs: Number of columns of ``weight``, 2 n_b.
+            circular_spline_dofs: Number of columns of ``circular_spline_weight``,
+                2 n_c; zero if the circular spline is rigid.
         """
         empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
         return cls(
@@ -76,7 +80,7 @@ class Contacts:
 
     @classmethod
     def join(cls, first: Contacts, second: Contacts) -> Contacts:
-        """Concatenate two sets of contacts.
+        """Two sets of contacts as one.
 
         Args:
             first: Contacts that come first.
@@ -100,7 +104,7 @@ class Contacts:
         )
 
     def nearest_in(self, others: Contacts) -> Index:
-        """Index of the nearest of ``others`` on the same flank pair, else -1 (n,)."""
+        """Index of the nearest of ``others`` on the same flank pair, or -1 (n,)."""
         result = np.full(len(self), -1, dtype=np.int64)
         if len(others) and len(self):
             same = (
@@ -116,7 +120,7 @@ class Contacts:
         return result
 
     def share_flank_with(self, others: Contacts) -> NDArray[np.bool_]:
-        """Whether each point is on a flank that also carries one of ``others`` (n,)."""
+        """Whether the flexspline flank of each point has one of ``others`` (n,)."""
         key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
         return np.isin(key, other)
 

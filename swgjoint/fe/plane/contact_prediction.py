@@ -1,4 +1,4 @@
-"""Changes of contact that an equilibrium of the 2D drive predicts."""
+"""Prediction of contact changes from one equilibrium of the 2D model."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from swgjoint.typing import Mask
 MOST_SUPPORTS = 80
 """Largest number of bore intervals that may open or close in a prediction."""
 FAR = 5.0
-"""Torque range for the first selection of these intervals, in ranges of the prediction
-[-]. It is wider because other contact changes shift the torque at which they switch."""
+"""Torque range in which these intervals are selected, divided by the range of the
+prediction [-]. It is wider because the selection ignores other contact changes, which
+shift the torques at which the intervals open or close."""
 
 
 def predicted_changes(
@@ -26,20 +27,21 @@ def predicted_changes(
     low: float,
     high: float,
 ) -> ContactChanges | None:
-    """Contact changes that the drive condensed at an equilibrium predicts.
+    """Contact changes over a torque range, predicted from one equilibrium.
 
-    Supports that seem to open or close far outside the range keep their state.
+    The prediction solves the drive linearised there and condensed to its contacts. Bore
+    intervals that would open or close far outside the torque range keep their state.
 
     Args:
         model: The 2D model, without friction.
         state: The equilibrium.
         circular_spline_is_output: Whether the circular spline is the output.
         low: Smallest torque of interest [N·m].
-        high: Largest one [N·m].
+        high: Largest torque of interest [N·m].
 
     Returns:
-        The changes; None if no tooth carries force or if a single contact holds the
-        output.
+        The changes; None if no tooth carries force or if the output is held by a single
+        contact.
     """
     if state.contacts is None or not len(state.contacts):
         return None
@@ -76,10 +78,10 @@ def predicted_changes(
 
 
 def _supports_within(drive: CondensedModel, torque: float) -> Mask:
-    """Intervals of the bore that open or close within a change of torque [N·m].
+    """Whether each bore interval opens or closes within a torque change [N·m].
 
-    The prediction ignores all other contact changes; at most the :data:`MOST_SUPPORTS`
-    intervals that switch first are marked.
+    All other contact changes are ignored. If more than :data:`MOST_SUPPORTS` intervals
+    do, only those that switch first are marked.
 
     Returns:
         Mask (N, intervals).

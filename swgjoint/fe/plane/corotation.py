@@ -8,10 +8,11 @@ node positions y in that frame and the undeformed positions X, the energy is
     + \dots, \quad d = y - X, \quad \tilde d = d + \tfrac12 (d^T Q d)\, p .
 
 The term with p accounts for rotations of the rim within a sector. Slopes
-:math:`\omega` relative to the frame lengthen the rim by :math:`\tfrac12 \int \omega^2 ds
-= \tfrac12 d^T Q d`, which a hoop tension resists; the displacements p elongate the
-sector uniformly by one unit of length. (Without this term the reference ring on its
-ellipse, under a hoop tension of 180 N, has an error of 0.2 micrometre.)
+:math:`\omega` relative to the frame lengthen the rim by
+:math:`\tfrac12 \int \omega^2 ds = \tfrac12 d^T Q d`, which a hoop tension resists; the
+displacements p elongate the sector uniformly by one unit of length. (Without this term
+the reference ring on its ellipse, under a hoop tension of 180 N, has an error of 0.2
+micrometre.)
 
 The gradient and the tangent below are exact for dead forces F in the sector frame.
 """

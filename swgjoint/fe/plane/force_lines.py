@@ -1,4 +1,4 @@
-"""Lines along which the teeth push, with the compliance of what they push against."""
+"""Lines of action of the tooth forces, with the compliance of the loaded parts."""
 
 from __future__ import annotations
 
@@ -17,25 +17,32 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ForceLines:
-    """The n lines of force of the m candidates, whatever the bore touches."""
+    """The n lines of force of m contact candidates.
+
+    They do not depend on the contact state of the bore. N sectors have n_dofs degrees
+    of freedom each.
+    """
 
     contacts: Contacts
     """Candidates for tooth contact (m)."""
     force: Contacts
-    """Lines of force: normals, then, with friction, tangents (n)."""
+    """Lines of force (n): the normals of the candidates and, with friction, their
+    tangents."""
     sliding: Sliding | None
-    """Friction on the lines; None without."""
+    """Friction on the lines; None without friction."""
     strips: Strips | None
     """Indentation strips of the candidates; None without indentation."""
     rows: Array
-    """Derivatives of the gaps of the lines (n, n_dofs)."""
+    """Derivatives of the gaps of the lines with respect to the degrees of freedom of
+    their sectors (n, n_dofs) [-]."""
     loads: Array
-    """Right-hand sides (N, n_dofs, n + 3): a column that each solution fills with the
-    gradient, then unit forces on the lines, the anchor and the rotation."""
+    """Right-hand sides (N, n_dofs, n + 3): a column for minus the gradient, which each
+    solution overwrites, then unit loads on the lines, the anchor and the rotation."""
     compliance: Array
-    """Compliance of loaded teeth, circular spline and indentation (n, n) [m/N]."""
+    """Compliance of flexspline teeth, circular spline and indentation (n, n) [m/N]."""
     gap: Array
-    """Gaps without tooth forces, the rest of the drive held in place (n,) [m]."""
+    """Gaps of the lines without tooth forces, with all sectors held in place (n,) [m].
+    """
 
     @classmethod
     def from_candidates(
@@ -66,7 +73,8 @@ class ForceLines:
             compliance += of_spline.contact_compliance(
                 lines.tooth, lines.circular_spline_weight, model.circular_spline_teeth
             )
-        # gaps without the old tooth forces; the new forces bring their own share
+        # remove the elastic displacements under the old tooth forces from the gaps; the
+        # compliance adds those under the new forces
         old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
         old += np.einsum(
             "kb,kb->k",

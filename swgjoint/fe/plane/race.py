@@ -1,15 +1,17 @@
-r"""The bearing of the wave generator in the 2D model: its outer race on its balls.
+r"""The bearing of the wave generator in the 2D model: an outer race on balls.
 
-Instead of a rigid surface, the outer race supports the bore of the rim. The race is the
-nonlinear ring of :mod:`swgjoint.fe.rings`; it rests on Hertzian balls with clearance on
-the cam. Every node of the bore makes unilateral contact with the race through the half
-of the race outside its mean line, t/2 thick. With the distance d from that line
+The outer race supports the bore of the rim in place of a rigid surface. It is the
+nonlinear ring of :mod:`swgjoint.fe.rings` and rests on balls with Hertz contact and
+clearance, which sit on the cam. Every node of the bore makes unilateral contact with
+the race through its outer half, which is t/2 thick for a race thickness t. With the
+distance d of the node from the mean line of the race,
 
 .. math:: g = d - \tfrac12 t, \quad U = \tfrac12 k\langle -g\rangle^2, \quad
     k = \frac{2 E b}{t}\,\ell
 
-for a race of width b and a node that represents a length :math:`\ell` of the bore. The
-race turns with the flexspline, and contact is frictionless.
+for a race of width b and Young's modulus E and for a node that represents a length
+:math:`\ell` of the bore. The race turns with the flexspline, and the contact has no
+friction.
 """
 
 from __future__ import annotations
@@ -28,11 +30,12 @@ from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array, Index, Mask
 
 ELEMENTS = 190
-"""Smallest number of elements of the race: eight between neighbouring balls of 23. The
+"""Smallest number of elements of the race, eight per ball if there are 23 balls. The
 position of a ball within its element then changes the torque by about 4e-5 of its
 value, and by 1e-5 with twice as many elements."""
 NODE = 4
-"""Coordinates per node: position and its derivative by the element parameter."""
+"""Number of coordinates per race node: x and y of its position and of the derivative of
+the position with respect to the element parameter."""
 PRESSED = 1.01
 """Lobe height of the race at the start of a search divided by that on unloaded balls
 [-]."""
@@ -40,16 +43,16 @@ PRESSED = 1.01
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RaceForces:
-    """Forces of race and balls at one state, by sectors of m coordinates."""
+    """Forces of race and balls at one state, for N sectors of m coordinates."""
 
     gradient: Array
     """Gradient of their energy (N, m) [N]."""
     hessian: Array
     """Second derivative of their energy (N, m, m) [N/m]."""
     fixed: Mask
-    """Coordinates that are held (N, m)."""
+    """Whether each coordinate is held (N, m)."""
     balls: PressedBalls
-    """Balls of the whole drive."""
+    """Contact of the balls of the whole drive."""
     energy: float
     """Energy of race and balls of the whole drive [J]."""
 
@@ -59,13 +62,13 @@ class PlaneRaceForces(RaceForces):
     """Forces of race, balls and bore contact.
 
     A sector has m = b + r coordinates: b of its bore nodes without the last corner,
-    then r of the race nodes from its first face to its last face.
+    then r of its race nodes from the first to the last face, both included.
     """
 
     gap: Array
     """Gap of the bore nodes (N, b/2) [m]."""
     rows: Array
-    """Derivative of the gap (N, b/2, b + r) [-]."""
+    """Derivative of the gap with respect to the coordinates (N, b/2, b + r) [-]."""
     normal: Array
     """Outward normal of the race at the bore nodes (N, b/2, 2)."""
 
@@ -74,20 +77,21 @@ class PlaneRaceForces(RaceForces):
 class PlaneRace:
     """Outer race, balls and cam below the sectors of a 2D model.
 
-    Coordinates have the shape (sectors, m, 2, 2): nodes from the first face of every
-    sector on, position or derivative, x and y [m].
+    Coordinates have the shape (sectors, m, 2, 2) [m]. The axes are the sector, the race
+    node counted from its first face, position or derivative, and x or y.
     """
 
     on_balls: RaceOnBalls
+    """Race, balls and cam."""
     sectors: int
-    """Sectors in the model."""
+    """Number of sectors in the model."""
     per_sector: int
-    """Race elements per sector, m."""
+    """Number m of race elements per sector."""
     half: bool
     """Whether the model is half of the drive."""
     places: Array
-    """Positions of the bore nodes of a sector on its undeformed elements, 0 to m
-    (b/2,) [-]."""
+    """Positions of the bore nodes of a sector on its undeformed race elements, from 0
+    to m (b/2,) [-]."""
     press: Array
     """Contact stiffness k of these nodes (b/2,) [N/m]."""
     phase: float = 0.0
@@ -110,7 +114,8 @@ class PlaneRace:
             design: The drive.
             element: Condensed sector of its flexspline.
             half: Whether to model half of the drive.
-            cage_held: Whether the balls are held on the cam, see :class:`RaceOnBalls`.
+            cage_held: Whether the cage is fixed to the cam, see
+                :class:`swgjoint.fe.rings.race_on_balls.RaceOnBalls`.
             phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
             elements: Smallest number of elements of the race.
         """
@@ -119,7 +124,8 @@ class PlaneRace:
         on_balls = RaceOnBalls.from_design(design, teeth * per_sector)
         x = element.skeleton[np.r_[size - 1 : size + element.bore_size, -1]]
         apart = np.hypot(*np.diff(x, axis=0).T)
-        # half of the intervals on both sides; a corner is shared by two sectors
+        # each node represents half of the interval on either side; a corner also
+        # represents half of the last interval of the neighbouring sector
         length = 0.5 * (apart + np.roll(apart, 1))
         bearing = on_balls.bearing
         yielding = 0.5 * bearing.race_thickness / bearing.material.youngs_modulus
@@ -136,7 +142,7 @@ class PlaneRace:
 
     @property
     def size(self) -> int:
-        """Coordinates of the race nodes of a sector including both faces: r."""
+        """Number r of coordinates of a sector's race nodes, with both faces."""
         return NODE * (self.per_sector + 1)
 
     @property
@@ -150,7 +156,7 @@ class PlaneRace:
         return self._pitch * np.arange(self.sectors, dtype=np.float64)
 
     def initial_guess(self, alpha: float, rotation: float) -> Array:
-        """Start of a search: a two-lobe shape that presses on the balls at the lobes.
+        """Start of a search: a two-lobe race that presses on the balls at its lobes.
 
         Args:
             alpha: Wave-generator angle [rad].
@@ -160,7 +166,7 @@ class PlaneRace:
             Coordinates (sectors, m, 2, 2) [m].
         """
         balls, shape = self.on_balls, (self.sectors, self.per_sector, 2, 2)
-        # the lobes of the rim and the clearance that it takes up
+        # deflection of the rim at a lobe plus the clearance between rim and race
         w0 = PRESSED * (balls.lobe_height + 0.5 * balls.bearing.fit_clearance)
         step = self._pitch / self.per_sector
         phi = step * np.arange(shape[0] * shape[1]) - 0.5 * self._pitch + rotation
@@ -168,12 +174,12 @@ class PlaneRace:
 
     @cached_property
     def _still(self) -> Array:
-        """Undeformed coordinates in the frame of a tooth (m, 2, 2)."""
+        """Undeformed coordinates of a sector in its tooth frame (m, 2, 2) [m]."""
         still = self.on_balls.race.reference[: self.per_sector]
         return rotate(still, -0.5 * self._pitch)
 
     def displacements(self, race: Array, rotation: float) -> Array:
-        """Displacements of the race in the frames of the turned, undeformed teeth.
+        """Displacements of the race in the tooth frames of the rigidly turned rim.
 
         Args:
             race: Coordinates (sectors, m, 2, 2) [m].
@@ -188,7 +194,7 @@ class PlaneRace:
         Inverse of :meth:`displacements`.
 
         Args:
-            displaced: Displacements in the frames of the teeth (sectors, m, 2, 2) [m].
+            displaced: Displacements in these tooth frames (sectors, m, 2, 2) [m].
             rotation: Rotation of the flexspline [rad].
         """
         angle = (self._turns + rotation)[:, None, None]
@@ -203,8 +209,8 @@ class PlaneRace:
             race: Coordinates (N, m, 2, 2) [m].
             alpha: Wave-generator angle [rad].
             points: Bore nodes (N, b/2, 2) [m].
-            touching: Whether each node is in contact (N, b/2). A node that is marked
-                but has lifted off pulls, until the active set releases it.
+            touching: Whether each node is assumed in contact (N, b/2). Such a node
+                pulls if it has lifted off, until the active set releases it.
         """
         on_balls, n, m = self.on_balls, self.sectors, self.per_sector
         ring, bore = on_balls.race, 2 * points.shape[1]
@@ -219,7 +225,7 @@ class PlaneRace:
                 _add(gradient, row, slope)
             _add(hessian, gradient.shape[1] * row[:, :, None] + dofs[:, None, :], bend)
 
-        # the race: its elements, and the balls below this part of it
+        # forces of the elements of the race and of the balls below this part of it
         element = np.arange(n * m)
         local = bore + NODE * (element % m)[:, None] + np.arange(2 * NODE)
         nodal, blocks = ring.forces(q)
@@ -239,7 +245,7 @@ class PlaneRace:
             np.swapaxes(rows, 1, 2) @ form @ rows,
         )
 
-        # the bore: every node on the element below it
+        # contact of every bore node with the race element below it
         first = np.minimum(self.places.astype(np.int64), m - 1)
         below = (m * np.arange(n)[:, None] + first).ravel()
         start = (m * np.arange(n)[:, None] + self.places).ravel()
@@ -282,7 +288,7 @@ class PlaneRace:
         return np.asarray(np.mod(angle - begin, 2.0 * pi) * share)
 
     def _fixed(self, race: Array, bore: int) -> Mask:
-        """Coordinates to hold: node 0 along the race, which could otherwise rotate."""
+        """Coordinates to hold: node 0 along the race, which prevents its rotation."""
         fixed = np.zeros((self.sectors, bore + self.size), dtype=bool)
         x, y = race[0, 0, 0]
         held = 0 if abs(y) > abs(x) else 1
@@ -292,6 +298,6 @@ class PlaneRace:
 
 
 def _add(total: Array, place: Index, values: Array) -> None:
-    """Add values at flat indices that may repeat; ten times as fast as np.add.at."""
+    """Add values at flat indices that may repeat; ten times faster than np.add.at."""
     summed = np.bincount(place.ravel(), values.ravel(), total.size)
     total += summed.reshape(total.shape)

@@ -1,8 +1,11 @@
-"""Closest points between the deformed flexspline flanks and the circular spline.
+"""Closest points between the deformed flanks of flexspline and circular spline.
 
-Both flanks are smooth: analytic profiles displaced by cubic splines that are averaged
-over the contact patch. Facets would add their chord error, about a micrometre, to a
-kinematic error of a few micrometres.
+Both flanks are smooth curves: the analytic profile plus a cubic spline of displacements
+that are averaged over the contact patch. Straight facets between the nodes would add
+their chord error, about a micrometre, to a kinematic error of a few micrometres.
+
+The search uses mirrored frames: the left flank of a tooth is reflected about the tooth
+axis, so that every flank is treated as a right one.
 """
 
 from __future__ import annotations
@@ -25,18 +28,19 @@ from swgjoint.fe.plane.corotation import rotate
 from swgjoint.typing import Array, Index
 
 SAMPLES_PER_NODE = 2
-"""Gap samples per flank node of a fast search."""
+"""Number of gap samples per flank node in a fast search."""
 DENSE_SAMPLES = 8
-"""Gap samples per flank node of a thorough search."""
+"""Number of gap samples per flank node in a thorough search."""
 REFINEMENTS = 6
-"""Most Newton iterations of the refinement of a contact point."""
+"""Largest number of Newton iterations that refine a contact point."""
 REFINED = 1e-12
-"""Change of the arc lengths at which a refinement ends [m]."""
+"""Change of the arc lengths below which the refinement ends [m]."""
 MERGE = 1e-6
-"""Distance below which two points are one contact, as a fraction of the flank [-]."""
+"""Distance below which two points count as one contact, as a fraction of the flank
+length [-]."""
 
 
-_MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's frame
+_MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side: into mirrored frames
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,23 +48,26 @@ class ToothContact:
     """Search for contact candidates at one state."""
 
     element: Flanks
+    """Flanks of the flexspline."""
     circular_spline: CircularSpline
+    """Flanks of the circular spline."""
     circular_spline_flank: Array
-    """Displacement of the circular spline's flank nodes in the frames of its teeth,
-    including manufacturing errors (N_c, 2 n_c) [m]; no columns if rigid."""
+    """Displacements of the circular spline's flank nodes in the frames of its teeth,
+    including manufacturing errors (N_c, 2 n_c) [m]; no columns if it is rigid."""
     angle: Array
     """Angles of the sector frames relative to the circular spline (N,) [rad]."""
     bearing: Array
-    """Polar angles of the teeth relative to the circular spline (N,) [rad]; they decide
-    which tooth space each tooth enters."""
+    """Polar angles of the teeth relative to the circular spline (N,) [rad]; each tooth
+    enters the nearest tooth space."""
     rubs: bool = False
-    """Whether the candidates need derivatives along the flanks, for friction."""
+    """Whether to determine the derivatives along the flanks that friction needs."""
 
     @cached_property
     def _circular_spline_flanks(self) -> FlankSplines | None:
-        """Displacements of the circular spline's flanks in their mirrored frames.
+        """Displacements of the circular spline's flanks; None for rigid flanks.
 
-        Flank 2 tooth + side; None for rigid flanks.
+        They are in the mirrored frames; flank ``side`` of tooth ``tooth`` has the index
+        2 tooth + side.
         """
         circular_spline = self.circular_spline
         if not circular_spline.flank_dofs:
@@ -75,7 +82,7 @@ class ToothContact:
 
     @cached_property
     def _compiled(self) -> CompiledSearch | None:
-        """The same search in compiled code; None without it or for other flanks."""
+        """The same search in compiled code; None if it is not available."""
         limits = dict(corner=CORNER, beyond=BEYOND, refined=REFINED)
         return CompiledSearch.for_flanks(
             self.element,
@@ -95,19 +102,21 @@ class ToothContact:
         *,
         thorough: bool = True,
     ) -> Contacts:
-        """Local minima of the gap along every flank, plus the points that carry force.
+        """Contact candidates: local minima of the gap, plus points that carry force.
 
-        The gap must not be negative anywhere on a flank, a condition on a continuum. On
-        conforming flanks (straight on straight) its minimum jumps from end to end of
-        the contact, so points that carry force stay in the working set next to the new
-        minima (exchange method of semi-infinite programming).
+        The gap must not be negative at any point of a flank, which is a continuum of
+        conditions. On conforming flanks (straight on straight) the minimum of the gap
+        jumps from one end of the contact to the other. Points that carry force
+        therefore stay in the working set, next to the new minima (exchange method of
+        semi-infinite programming).
 
         Args:
-            flank: Displacement of the flank nodes in the sector frames (N, 2 n_b) [m].
+            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
             reach: Largest gap of a candidate [m].
             held: Points of the last iteration that carry force; None if there are none.
-            thorough: Whether to search between the nodes, with the displaced circular
-                spline; conforming flanks have minima less than a node apart.
+            thorough: Whether to sample the gap densely, including the displacement of
+                the circular spline: minima on conforming flanks can be closer together
+                than the nodes.
 
         Returns:
             The candidates.
@@ -152,10 +161,10 @@ class ToothContact:
     def _sampled(
         self, per_node: int, sides: Array, sector: Index, side: Index, *, rigid: bool
     ) -> tuple[Array, Array, Index, Index]:
-        """Gaps at equal steps along the flanks that reach into the circular spline.
+        """Gaps at equally spaced points of flanks that reach into the circular spline.
 
         Args:
-            per_node: Samples per flank node.
+            per_node: Number of samples per flank node.
             sides: Displacements of the flanks in their mirrored frames (n, size, 2)
                 [m].
             sector: Sector of each flank (n,).
@@ -195,7 +204,7 @@ class ToothContact:
         start: Array | None = None,
         steps: int = 3,
     ) -> SeenFeet:
-        """Feet on the circular spline of points in the mirrored sector frames.
+        """Feet, on the circular spline, of points in the mirrored sector frames.
 
         Args:
             points: Points on the displaced flanks (n, 2) [m].
@@ -203,8 +212,9 @@ class ToothContact:
             sector: Sector of each point (n,).
             side: Side of each point (n,).
             rigid: Whether to neglect the displacement of the circular spline.
-            start: Arc lengths near the feet (n,) [m].
-            steps: Newton steps to the foot.
+            start: Arc lengths near the feet (n,) [m]; by default the feet on the rigid
+                flanks.
+            steps: Number of Newton steps.
         """
         if self._compiled is not None:
             return self._compiled.see(
@@ -214,9 +224,9 @@ class ToothContact:
         teeth = circular_spline.profile.teeth
         pitch = 2.0 * pi / teeth
         sign = np.where(side == 0, 1.0, -1.0)
-        # mirrored global frame: the tooth is at sign * angle; a right flank faces the
-        # left flank of the circular spline's next tooth clockwise, half a pitch from
-        # the space
+        # in the mirrored global frame the tooth is at sign * angle, and its right flank
+        # faces the left flank of the circular-spline tooth half a pitch clockwise from
+        # the middle of the space
         space = np.round(sign * self.bearing[sector] / pitch)
         turn = sign * self.angle[sector] - (space - 0.5) * pitch
         seen = rotate(points, turn) * _MIRROR[1]
@@ -241,11 +251,16 @@ class ToothContact:
         )
 
     def _displaced(self, s: Array, mirrored: Array) -> tuple[Array, Array, Array]:
-        """Points of displaced flanks, tangents from tip to root, profile curvatures."""
+        """Points of displaced flanks, tangents from tip to root, profile curvatures.
+
+        Args:
+            s: Arc lengths (n,) [m].
+            mirrored: Displacements of the flanks in mirrored frames (n, size, 2) [m].
+        """
         element = self.element
         base, outward, curvature = element.profile.evaluate(s)
         point = base + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
-        # tangent of the profile from tip to root: the outward normal turned back
+        # tangent of the profile from tip to root: the outward normal turned clockwise
         tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
         slope = np.einsum("ks,ksi->ki", element.spline(s, 1), mirrored)
         return point, tangent + slope, curvature
@@ -258,14 +273,14 @@ class ToothContact:
         side: Index,
         spacing: float,
     ) -> Array:
-        """Refine minima by Newton's method on the slope of the gap along the flank.
+        """Minima of the gap, by Newton's method on its slope along the flank.
 
         Args:
             station: Arc lengths near the minima (n,) [m].
             mirrored: Displacements of the flanks in mirrored frames (n, size, 2) [m].
             sector: Sector of each point (n,).
             side: Side of each point (n,).
-            spacing: Distance of the samples, half the width of the brackets [m].
+            spacing: Distance between the samples, half the width of the brackets [m].
 
         Returns:
             Arc lengths of the minima (n,) [m].
@@ -291,7 +306,7 @@ class ToothContact:
             slope = np.einsum("ki,ki->k", seen.normal, tangent)
             relative = curvature + seen.feet.curvature
             if corner.any():
-                # the point of the flank that is closest to the corner
+                # at a corner, find the point of the flank that is closest to it
                 beside = np.einsum("ki,ki->k", seen.rest, tangent)
                 slope = np.where(corner, beside, slope)
                 depth = np.einsum("ki,ki->k", seen.rest, seen.normal)
@@ -314,7 +329,15 @@ class ToothContact:
         flank: Array,
         reach: float,
     ) -> Contacts:
-        """Candidates with all their derivatives at given points of the flanks."""
+        """Candidates with all their derivatives at given points of the flanks.
+
+        Args:
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            station: Arc length of each point (n,) [m].
+            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            reach: Largest gap of a candidate [m].
+        """
         element = self.element
         size = element.flank_size
         n = len(sector)
@@ -327,7 +350,8 @@ class ToothContact:
         normal = seen.normal * mirror
         # in the mirrored frame the flexspline's normal is -n: its tangent is J n
         tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
-        # the mirror between a flank and the one that it faces reverses tangents
+        # a flank and the flank that it faces are on opposite sides of their teeth, so
+        # that mirroring reverses tangents
         facing, out = _MIRROR[1 - side], seen.feet.normal
         circular_spline_normal = out * facing
         circular_spline_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
@@ -361,13 +385,13 @@ class ToothContact:
 
 
 def _outward(tangent: Array) -> Array:
-    """Unit normals out of the flexspline from tangents from tip to root (n, 2)."""
+    """Outward unit normals of the flexspline (n, 2), from its tangents (n, 2)."""
     size = np.hypot(tangent[:, 0], tangent[:, 1])
     return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
 
 
 def _on_flank(side: Index, spline: Array, direction: Array) -> Array:
-    """Rows over both flanks of a tooth (n, 4 n_nodes), nonzero on one of them."""
+    """Rows over the nodes of both flanks (n, 4 n_nodes), zero on the other flank."""
     n, nodes = spline.shape
     rows = np.zeros((n, 2, nodes, 2))
     rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]
