@@ -1,4 +1,4 @@
-"""Continuation of equilibria of the 2D model, in any layout."""
+"""Continuation of equilibria of the 2D model in all three layouts."""
 
 from __future__ import annotations
 
@@ -19,22 +19,26 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Continuation(Follower[State]):
-    """Follows equilibria of the 2D model.
+    """Continuation of equilibria of the 2D model.
 
-    With the circular spline fixed, the flexspline is the output and turns freely. In
+    If the circular spline is fixed, the flexspline is the output and turns freely. In
     the other layouts the circular spline is the output and the rotation of the
-    flexspline is prescribed: it is zero or, with the wave generator fixed, the input.
+    flexspline is prescribed: it is zero if the flexspline is fixed, and the input angle
+    if the wave generator is fixed.
     """
 
     model: SectorModel
+    """The 2D model."""
     ratio: float
     """Signed gear ratio i [-]."""
     layout: Layout = "circular_spline_fixed"
+    """Which member is fixed."""
     solver: NewtonSolver = field(default_factory=NewtonSolver)
+    """Solver of the equilibria."""
 
     @property
     def circular_spline_is_output(self) -> bool:
-        """Whether the circular spline turns."""
+        """Whether the circular spline is the output."""
         return self.layout != "circular_spline_fixed"
 
     @property
@@ -63,7 +67,11 @@ class Continuation(Follower[State]):
         )
 
     def deflect(self, angle: float = 0.0) -> State:
-        """Deflect the rim at the ideal member angles, without tooth contact."""
+        """Rim deflected at the ideal member angles, without tooth contact.
+
+        Args:
+            angle: Input angle [rad].
+        """
         alpha, rotation, circular_spline_rotation = self._ideal(angle)
         start = self.model.initial_guess(alpha, rotation)
         load = Load(rotation=rotation, teeth=False)
@@ -74,7 +82,7 @@ class Continuation(Follower[State]):
         """Equilibrium under an output torque.
 
         Args:
-            start: Start of the search, with its input at ``angle``.
+            start: State from which the search starts, with its input at ``angle``.
             torque: Output torque T [N·m].
             angle: Input angle [rad].
         """
@@ -91,7 +99,7 @@ class Continuation(Follower[State]):
         return held
 
     def rotate_output(self, state: State, output: float) -> State:
-        """Predictor that turns the output at a fixed input.
+        """Predicted state after the output has turned at a fixed input.
 
         Args:
             state: State to start from.
@@ -105,7 +113,7 @@ class Continuation(Follower[State]):
         )
 
     def predict(self, state: State, angle: float) -> State:
-        """Predictor that turns input and output by the ideal ratio.
+        """Predicted state after input and output have turned by the ideal ratio.
 
         Args:
             state: State to start from.
@@ -125,7 +133,10 @@ class Continuation(Follower[State]):
     def predicted_changes(
         self, state: State, low: float, high: float
     ) -> ContactChanges | None:
-        """Contact changes over a torque range, as an equilibrium predicts them.
+        """Contact changes over a torque range, predicted from one equilibrium.
+
+        The result is None where no prediction is possible, see
+        :func:`swgjoint.fe.plane.contact_prediction.predicted_changes`.
 
         Args:
             state: The equilibrium.
@@ -141,7 +152,11 @@ class Continuation(Follower[State]):
         )
 
     def influence(self, state: State) -> Influence:
-        """Influence of every tooth gap on the output, linearised at an equilibrium."""
+        """Influence of every tooth gap on the output, linearised at an equilibrium.
+
+        The model must be that of the whole drive with a rigid wave generator, without
+        friction and without tooth errors.
+        """
         return influence(
             self.model, state, circular_spline_is_output=self.circular_spline_is_output
         )
@@ -149,7 +164,7 @@ class Continuation(Follower[State]):
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
     ) -> Continuation:
-        """The same drive with manufacturing errors of its teeth.
+        """The same continuation for a drive with manufacturing errors of its teeth.
 
         Args:
             flexspline: Shifts of its teeth in their frames (N, 2) [m].

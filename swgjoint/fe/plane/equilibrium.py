@@ -1,8 +1,8 @@
 """Equilibrium of the flexspline between wave generator and circular spline.
 
-The solver applies Newton's method to the corotational ring. Contact with the wave
-generator is a primal-dual active set of bore stations; tooth contact is a small
-complementarity problem in the contact forces, solved at the current tangent.
+The solver applies Newton's method to the ring of corotational sectors. A primal-dual
+active set of bore stations describes the contact with the wave generator. The tooth
+forces solve a small complementarity problem at the current tangent.
 """
 
 from __future__ import annotations
@@ -41,29 +41,29 @@ class NewtonSolver:
     """Newton solver for equilibria, with its settings."""
 
     max_iterations: int = 120
-    """Most Newton iterations."""
+    """Largest number of Newton iterations."""
     step_tolerance: float = 2e-12
-    """Displacement increment at which the iteration ends [m]; about 1e-5 of the
-    smallest effect of interest, a tenth of a micrometre."""
+    """Increment of the nodes below which the iteration ends [m]. It is about 1e-5 of
+    the smallest effect of interest, a tenth of a micrometre."""
     thorough_below: float = 1e-7
-    """Increment below which the contact search also covers the flanks between nodes
-    [m]."""
+    """Increment below which the contact search is thorough, see
+    :meth:`swgjoint.fe.plane.tooth_contact.ToothContact.search` [m]."""
     exchanges: int = 6
-    """Most updates of the bore contact at one linearisation. Without them most
-    iterations would change nothing but the bore contact, yet repeat the contact search
-    of the teeth."""
+    """Largest number of updates of the bore contact per linearisation. Without these
+    updates most iterations would repeat the search for tooth contacts although only the
+    bore contact changes."""
     exchange_below: float = 1e-5
     """Increment below which a linearisation is accurate enough for such updates [m]."""
     stride: float = 0.1
-    """Largest increment of one iteration, in lobe heights [-]; contact changes along a
-    longer one."""
+    """Largest increment that is applied in one iteration, in lobe heights [-]; the
+    contacts would change within a larger one."""
     largest_step: float = 0.1
-    """Increment beyond which the search is abandoned as diverged [m]."""
+    """Computed increment above which the search ends as diverged [m]."""
     circular_spline_range: float = CIRCULAR_SPLINE_RANGE
     """Largest accepted displacement of the circular spline, in lobe heights [-]."""
 
     def __call__(self, model: SectorModel, start: State, load: Load) -> State:
-        """Find the equilibrium at the wave-generator angle of ``start``.
+        """Equilibrium at the wave-generator angle of ``start``.
 
         Args:
             model: The 2D model.
@@ -71,7 +71,9 @@ class NewtonSolver:
             load: Prescribed torque or rotation.
 
         Returns:
-            The last state with its outcome, whether or not it converged.
+            The equilibrium, or a state whose ``outcome`` tells why the search failed.
+            That state is the last one or, if a linear system was singular or no active
+            set of the teeth was found, ``start``.
         """
         state, history = start, list[float]()
         settled = False
@@ -80,7 +82,7 @@ class NewtonSolver:
             for iteration in range(self.max_iterations):
                 linear = linearise(model, state, load.on_flexspline)
                 thorough = bool(history) and history[-1] < self.thorough_below
-                # after three steps, or a short one, only close candidates matter
+                # after three iterations or a small step only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
                 contacts = linear.no_contacts
@@ -105,7 +107,8 @@ class NewtonSolver:
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
                 damping = min(1.0, self.stride * model.lobe_height / step.largest)
-                # a contact state that repeats would repeat forever
+                # a contact state that returns would return forever: then
+                # switch only one station at a time
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
                 state, settled = _advance(
@@ -118,7 +121,7 @@ class NewtonSolver:
                 )
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and thorough:
-                    # without tooth contact the output angle is arbitrary
+                    # without tooth contact nothing determines the output angle
                     free = load.torque is not None and load.teeth
                     free &= len(state.tooth_force) == 0
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
@@ -136,10 +139,11 @@ class NewtonSolver:
 def _stations_to_exchange(
     problem: NewtonProblem, step: NewtonStep, below: float
 ) -> Mask | None:
-    """Stations of the bore that a step closes or opens (N, q).
+    """Stations of the bore that a step closes or opens.
 
     Returns:
-        None if no station switches, after too large a step, or on a race, whose
+        Whether to switch each station (N, q). None if none switches, if all contact
+        would be lost, if the step is too large, or if the bore is on a race, whose
         tangent depends on more than the stations.
     """
     linear, state = problem.linear, problem.state
@@ -160,15 +164,15 @@ def _advance(
     *,
     one_at_a_time: bool,
 ) -> tuple[State, bool]:
-    """Apply a step: move the nodes, set the tooth forces, update the bore contact.
+    """State after a step: moved nodes, new tooth forces, updated bore contact.
 
     Returns:
-        The new state, and whether the bore contact stayed the same.
+        The new state, and whether the bore contact remained the same.
     """
     after = linear.gap_after(damping * step.increment)
     wrong = _wrong_stations(state, after)
     bad = wrong > TOUCH
-    # without any contact the rim would spring back: release the worst station only
+    # if all stations opened, the rim would spring back: release the worst one only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
@@ -177,7 +181,8 @@ def _advance(
     circular_spline_force = np.zeros_like(state.circular_spline_force)
     np.add.at(circular_spline_force, lines.tooth, force * lines.circular_spline_weight)
     friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
-    # first face and bore nodes of each sector; a shared face appears once
+    # a sector stores its first face and its bore nodes; its last face is stored as the
+    # first face of the next one
     size, inside = model.element.face_size, model.element.bore_size
     moved = model.skeleton(state) + damping * step.shift
     new = replace(
@@ -213,8 +218,8 @@ def _wrong_stations(state: State, gap: Array) -> Array:
         gap: Gap at each station (N, q) [m].
 
     Returns:
-        Gap of stations assumed in contact, overlap of the others (N, q) [m]; positive
-        values are violations.
+        Gap of the stations assumed in contact, overlap of the others (N, q) [m].
+        Positive values are violations.
     """
     return np.asarray(np.where(state.touching, gap, -gap))
 
@@ -226,7 +231,7 @@ def _finished(
     history: list[float],
     circular_spline_range: float,
 ) -> State:
-    """Complete a state with the moments and the energy of the whole drive."""
+    """State completed with the moments and the energy of the whole drive."""
     frames = model.frames(state)
     nodes = model.skeleton(state)[:, model.bore_nodes]
     rotation, _ = model.best_fit_rotation(nodes)
@@ -244,7 +249,7 @@ def _finished(
     energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
     if model.indentation is not None:
         energy += strain_energy(model.indentation, state.contacts, state.tooth_force)
-    # the model of the circular spline is linear: its displacement must stay small
+    # the displacement must stay small, because the circular spline is linear
     if (
         outcome.ok
         and np.abs(moved).max(initial=0.0) > circular_spline_range * model.lobe_height

@@ -1,4 +1,4 @@
-"""Gradient and tangent of the ring at one state, by the positions of its nodes."""
+"""Gradient and tangent of the ring of sectors at one state."""
 
 from __future__ import annotations
 
@@ -24,21 +24,23 @@ from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
 """Gap above which all stations of a bore interval share the values of its middle, in
-lobe heights [-]. The gaps of an interval are within 0.006 of the middle one for
-parabolas and within 0.011 for arcs."""
+lobe heights [-]. Within an interval the gaps differ from the middle one by at most
+0.006 lobe heights for parabolas and 0.011 for arcs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linearised:
     """The ring linearised at one state, with n degrees of freedom per sector.
 
-    :attr:`SectorModel.sector_dofs` counts them. Vectors are in the global frame; at the
-    end of a half ring they have the opposite sign, so that the shared unknowns agree
-    with those of the first sector.
+    :attr:`SectorModel.sector_dofs` defines n. Vectors are in the global frame. At the
+    end of a half ring their sign is reversed, so that the shared unknowns agree with
+    those of the first sector.
     """
 
     element: Superelement
+    """Condensed sector of the flexspline."""
     frames: Frames
+    """Kinematics of the sectors."""
     dofs: Index
     """Degrees of freedom of the skeleton within a sector (2 n_a,)."""
     face_dofs: int
@@ -52,29 +54,30 @@ class Linearised:
     gap: Array
     """Gap at the stations of the bore (N, q) [m]."""
     gap_dofs: Index
-    """Degrees of freedom of a sector that move its stations (k,)."""
+    """Degrees of freedom of a sector that change the gaps of its stations (k,)."""
     stations: BoreStations
     """Stations of the bore."""
     normal: Array
-    """Outward normal of the surface below the bore, at the stations (N, q, 2)."""
+    """Outward normal of wave generator or race at the stations (N, q, 2)."""
     race_rows: Array | None
-    """Derivative of the gaps to a race by ``gap_dofs`` (N, q, k); None without a race.
-    """
+    """Derivatives of the gaps with respect to ``gap_dofs`` (N, q, k) [-]; None without
+    a race."""
     fixed: Mask
-    """Fixed coordinates of a race (N, n)."""
+    """Whether each degree of freedom is fixed, which occurs on a race only (N, n)."""
     rotation: float
     """Best-fit rotation of the bore [rad]."""
     rotation_gradient: Array
     """Gradient of that rotation (N, n) [rad/m]."""
     anchor: Array
-    """Direction of the anchor: tangential at one node (N, n)."""
+    """Direction of the anchor spring, tangential at the first node of sector 0 (N, n).
+    """
     anchor_stiffness: float
     """Stiffness of the anchor spring [N/m]."""
     flank: Array
-    """Displacement of the flank nodes in the sector frames, including manufacturing
+    """Displacements of the flank nodes in the sector frames, including manufacturing
     errors (N, 2 n_b) [m]."""
     circular_spline_elastic: Array
-    """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
+    """Elastic displacements of the circular spline's flanks (N_c, 2 n_c) [m]."""
     search: ToothContact
     """Search for tooth contacts at the state."""
 
@@ -85,7 +88,10 @@ class Linearised:
         return Contacts.none(self.flank.shape[1], circular_spline.flank_dofs)
 
     def anchor_tangent(self) -> Array:
-        """Tangent with the anchor spring; fixed components get a diagonal stiffness."""
+        """Tangent with the anchor spring (N, n, n) [N/m].
+
+        Rows and columns of fixed degrees of freedom are zero except for their diagonal.
+        """
         matrix = self.hessian.copy()
         matrix[0] += self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
         matrix[self.fixed] = 0.0
@@ -94,7 +100,10 @@ class Linearised:
         return matrix
 
     def gap_gradient(self, contacts: Contacts) -> Array:
-        """Derivatives of tooth gaps by the degrees of freedom (n_contacts, n)."""
+        """Derivatives of tooth gaps with respect to their sectors' degrees of freedom.
+
+        Shape (n_contacts, n) [-].
+        """
         s, frames = contacts.sector, self.frames
         count, n = len(s), frames.spin.shape[1]
         carried = contacts.weight @ self.element.flank_from_skeleton
@@ -109,12 +118,12 @@ class Linearised:
         return np.asarray(rows * self.sign[s])
 
     def rotate_to_global(self, increment: Array) -> Array:
-        """Shifts of the skeleton nodes (N, n_a, 2) [m] from an increment (N, n)."""
+        """Shifts of the skeleton nodes (N, n_a, 2) [m] by an increment (N, n) [m]."""
         skeleton = (increment * self.sign)[:, self.dofs]
         return np.asarray(skeleton.reshape(len(skeleton), -1, 2))
 
     def gap_after(self, increment: Array) -> Array:
-        """Gaps of the stations (N, q) [m] after an increment (N, n)."""
+        """Gaps of the stations (N, q) [m] after an increment (N, n) [m]."""
         moved = (increment * self.sign)[:, self.gap_dofs]
         if self.race_rows is not None:
             return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
@@ -124,12 +133,12 @@ class Linearised:
     def exchange(self, stations: Mask, touching: Mask) -> Linearised:
         """The linearisation with the contact state of some stations inverted.
 
-        Applies to a rigid wave generator. Its curvature is neglected, because the gap
-        of a station that opens or closes is almost zero.
+        It is valid for a rigid wave generator only. The curvature of the outline is
+        neglected, because the gap of a station that opens or closes is almost zero.
 
         Args:
-            stations: Stations to switch (N, q).
-            touching: Stations that touched before (N, q).
+            stations: Whether to switch each station (N, q).
+            touching: Whether each station is in contact before the change (N, q).
         """
         sectors = np.flatnonzero(stations.any(axis=1))
         change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness
@@ -146,7 +155,7 @@ class Linearised:
         return replace(self, gradient=gradient, hessian=hessian)
 
     def gap_gradients(self) -> Array:
-        """Derivatives of the station gaps by ``gap_dofs`` (N, q, k)."""
+        """Derivatives of station gaps with respect to ``gap_dofs`` (N, q, k) [-]."""
         rows = self.race_rows
         if rows is None:
             rows = self.stations.project(self.normal)
@@ -155,7 +164,7 @@ class Linearised:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bore:
-    """Contact of the bore, by the k degrees of freedom ``contact_dofs``."""
+    """Contact of the bore, with derivatives for the k dofs ``contact_dofs``."""
 
     gap: Array
     normal: Array
@@ -170,15 +179,16 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
 
     Args:
         model: The 2D model.
-        state: Positions, active set and tooth forces.
-        torque: Torque T on the load of the whole drive [N·m]; None if the rotation of
-            the flexspline is prescribed.
+        state: Positions, contact state of the bore, and tooth forces.
+        torque: Torque of the flexspline on its load, whole drive [N·m]; None if the
+            rotation of the flexspline is prescribed.
     """
     element, sign, dofs = model.element, model.signs, model.dofs
     frames, x = model.frames(state), model.skeleton(state)
     n_a = len(element.skeleton)
 
-    # elastic forces and tangent in the sector frames, then in the global one
+    # elastic forces and tangent: computed in the sector frames, rotated to the global
+    # frame; tooth forces enter only the tangent, because they are unknowns of the step
     elastic = elastic_force(element, frames)
     total = elastic - state.flank_force @ element.flank_from_skeleton
     seen = project_to_frames(frames, elastic).reshape(model.sectors, n_a, 2)
@@ -258,10 +268,10 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
 
 
 def _on_surface(model: SectorModel, state: State) -> _Bore:
-    """Compress the layer between the bore and a rigid wave generator."""
+    """Contact of the bore with a rigid wave generator, through the compliant layer."""
     stations = model.stations
     gap, normal, curvature = _gaps(model, state)
-    # only sectors that touch exert a force
+    # only sectors in contact exert a force
     on = np.flatnonzero(state.touching.any(axis=1))
     k = np.where(state.touching[on], stations.stiffness, 0.0)
     # sliding over a curved outline turns the contact force
@@ -279,8 +289,8 @@ def _on_surface(model: SectorModel, state: State) -> _Bore:
 def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     """Gap, normal and curvature at the stations, see ``wave_generator_gap``.
 
-    If no station of an interval touches and the gap in its middle exceeds :data:`FAR`,
-    all its stations get the values of the middle: they stay apart in any case.
+    If no station of an interval is in contact and the gap in its middle exceeds
+    :data:`FAR`, all its stations get the values of the middle: none can close.
     """
     stations, alpha = model.stations, state.wave_generator_angle
     points = model.bore_points(state)
@@ -299,7 +309,7 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
 
 
 def _in_global_frame(matrices: Array, angle: Array) -> Array:
-    """Transform sector matrices (N, n, n) from frames turned by angles (N,) [rad]."""
+    """Sector matrices (N, n, n) rotated by the angles of their frames (N,) [rad]."""
     count, n, _ = matrices.shape
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)

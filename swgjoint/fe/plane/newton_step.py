@@ -1,4 +1,4 @@
-"""One Newton step of the 2D drive: the linearised problem with its contacts."""
+"""One Newton step of the 2D model: the linearised problem with its contacts."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from swgjoint.typing import Array, Index, Mask
 class Load:
     """Prescribed output torque, rotation of the flexspline, or both.
 
-    With a torque alone the flexspline is the output; with a rotation alone the
-    flexspline is held; with both it is held and the circular spline is the output.
+    If only the torque is given, the flexspline is the output. If only the rotation is
+    given, the flexspline is held. If both are given, the flexspline is held and the
+    circular spline is the output.
     """
 
     torque: float | None = None
@@ -36,16 +37,18 @@ class Load:
 
     def __post_init__(self) -> None:
         if self.torque is None and self.rotation is None:
-            raise ValueError("torque = None, rotation = None: expected at least one")
+            raise ValueError(
+                "torque = None, rotation = None: expected a number for at least one"
+            )
 
     @property
     def on_flexspline(self) -> float | None:
-        """Torque of the flexspline on a load [N·m]; None if its rotation is given."""
+        """Torque of the flexspline on its load [N·m]; None if its rotation is given."""
         return self.torque if self.rotation is None else None
 
     @property
     def on_circular_spline(self) -> float | None:
-        """Torque of the circular spline on a load [N·m]; None if it has no load."""
+        """Torque of the circular spline on its load [N·m]; None if it cannot turn."""
         return self.torque if self.rotation is not None else None
 
 
@@ -54,14 +57,14 @@ class NewtonStep:
     """Solution of one linearised problem."""
 
     lines: Contacts
-    """Lines of force: normals of the candidates, then, with friction, their tangents.
-    """
+    """Lines of force (n): the normals of the candidates and, with friction, their
+    tangents."""
     line_force: Array
-    """Force along each line [N]."""
+    """Force along each line (n,) [N]."""
     contacts: Contacts
-    """Contact candidates."""
+    """Contact candidates (m)."""
     active: Index
-    """Indices of the candidates that carry force."""
+    """Indices of the candidates that carry force (n_active,)."""
     torque: float
     """Torque T of the output on its load, whole drive [N·m]."""
     holding_torque: float
@@ -71,19 +74,19 @@ class NewtonStep:
     circular_spline_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
-    """Increment of the degrees of freedom of every sector (N, n) [m]."""
+    """Increment of the degrees of freedom of every sector (N, n_dofs) [m]."""
     shift: Array
     """Shift of the skeleton nodes in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
     """Shift of the race nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
-    """Force of the wave generator at each station of the bore (N, q) [N]."""
+    """Normal force on the bore at each of its stations (N, q) [N]."""
     strip_error: float
-    """Error of the linearised indentation law [m]."""
+    """Largest error of the linearised indentation law [m]; zero without indentation."""
 
     @property
     def largest(self) -> float:
-        """Largest displacement increment [m]."""
+        """Largest increment of a node, or the error of the indentation law [m]."""
         of_race = float(np.abs(self.race_shift).max(initial=0.0))
         return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
 
@@ -101,9 +104,9 @@ class _Solution:
     circular_spline_turn: float
     """Rotation increment of the circular spline [rad]."""
     multiplier: float
-    """Multiplier of the flexspline's rotation [N·m]."""
+    """Multiplier of the flexspline's rotation: the torque that holds it [N·m]."""
     compliance: float
-    """Tangent compliance of the output, per torque of the model [rad/(N·m)]."""
+    """Compliance of the output, per torque of the model [rad/(N·m)]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,15 +127,16 @@ class NewtonProblem:
                [N·m]
     ========== ========================================= ===========================
 
-    The anchor is a soft spring that keeps the rotation of the whole ring regular; its
-    force removes it again. With friction the line forces are reduced to k unknowns: the
-    m normal forces and one friction force per sticking pair, so that the last three
-    entries are k to k + 2. Without friction k = n = m. The last two unknowns are used
-    only if the circular spline has a torque and if the rotation of the flexspline is
-    prescribed, respectively.
+    The anchor is a spring that makes the tangent regular although the ring may rotate
+    as a whole; the force of the anchor cancels that of the spring. With friction the
+    line forces are reduced to k unknowns: the m normal forces and one friction force
+    per sticking flank pair, so that the last three entries are k to k + 2. Without
+    friction k = n = m. The rotation of the circular spline is used only if a torque
+    acts on it, and the multiplier only if the rotation of the flexspline is prescribed.
     """
 
     model: SectorModel
+    """The 2D model."""
     load: Load
     """Prescribed torque or rotation."""
     state: State
@@ -140,8 +144,9 @@ class NewtonProblem:
     linear: Linearised
     """The linearised ring."""
     lines: ForceLines
+    """Lines of force of the candidates."""
     factor: CyclicFactor
-    """Factors of the tangent."""
+    """Factorised tangent with the anchor spring."""
 
     @classmethod
     def from_candidates(
@@ -152,7 +157,7 @@ class NewtonProblem:
         load: Load,
         contacts: Contacts,
     ) -> NewtonProblem:
-        """Condense a linearised ring.
+        """Newton problem of a linearised ring.
 
         Args:
             model: The 2D model.
@@ -174,12 +179,13 @@ class NewtonProblem:
         )
 
     def exchange(self, stations: Mask) -> NewtonProblem:
-        """Invert the contact state of some bore stations of a rigid wave generator.
+        """The problem with the contact state of some bore stations inverted.
 
-        The factors are updated in place: this problem cannot be solved afterwards.
+        It is valid for a rigid wave generator only. The factorised tangent is updated
+        in place, so that the original problem cannot be solved afterwards.
 
         Args:
-            stations: Stations to switch (N, q).
+            stations: Whether to switch each station (N, q).
 
         Raises:
             SingularCyclicError: If the tangent becomes singular.
@@ -192,11 +198,12 @@ class NewtonProblem:
         return replace(self, state=state, linear=linear)
 
     def solve(self, pressing: Index | None = None) -> NewtonStep:
-        """Solve for the contact forces and find the increment.
+        """Solution for the contact forces and the increment of the nodes.
 
         Args:
-            pressing: Candidates that carry force in the first guess; by default those
-                on flanks that carry force in the state, or else those that overlap.
+            pressing: Indices of the candidates that carry force in the first guess. By
+                default these are the candidates on flanks that carry force in the state
+                or, if there are none, those that overlap.
 
         Raises:
             ActiveSetError: If no set of active contacts is found.
@@ -246,7 +253,12 @@ class NewtonProblem:
         return offset
 
     def _step(self, solution: _Solution, increment: Array) -> NewtonStep:
-        """Displacements, torques and bore forces that follow from the unknowns."""
+        """Step with the displacements, torques and bore forces of a solution.
+
+        Args:
+            solution: Unknowns of the condensed system.
+            increment: Increment of the degrees of freedom (N, n_dofs) [m].
+        """
         model, linear, load, lines = self.model, self.linear, self.load, self.lines
         force, strips = solution.force, lines.strips
         race_shift = increment[:, model.race_dofs[:-NODE]]
@@ -275,7 +287,7 @@ class NewtonProblem:
 def _first_guess(
     state: State, contacts: Contacts, offset: Array, pressing: Index | None
 ) -> Mask:
-    """Candidates that carry force in the first guess (m,)."""
+    """Whether each candidate carries force in the first guess (m,)."""
     m = len(contacts)
     if pressing is not None:
         return np.isin(np.arange(m), pressing)
@@ -287,7 +299,7 @@ def _first_guess(
 def _solve_condensed(
     matrix: Array, offset: Array, sliding: Sliding | None, guess: Mask, load: Load
 ) -> _Solution:
-    """Solve the condensed system for its unknowns, friction reduced to k - m forces."""
+    """Solution of the condensed system, with friction reduced to k - m forces."""
     m = len(guess)
     k = m if sliding is None else m + len(sliding.stick)
     used = np.arange(k + 1)
@@ -309,7 +321,7 @@ def _solve_condensed(
             matrix, offset = sliding.reduce(*full)
             values, active = solved_for(matrix, offset)
         except ActiveSetError:
-            # friction from the last normal forces makes the system symmetric
+            # friction limits from the last normal forces make the system symmetric
             sliding = sliding.lag()
             matrix, offset = sliding.reduce(*full)
             values, active = solved_for(matrix, offset)
@@ -331,8 +343,9 @@ def output_compliance(matrix: Array, held: Index, k: int, load: Load) -> float:
     """Tangent compliance of the output, per torque of the model.
 
     Args:
-        matrix: Matrix of k force unknowns, anchor, ring rotation and multiplier.
-        held: Unknowns that are not zero.
+        matrix: Matrix M (k + 3, k + 3) of the k forces, the anchor, the rotation of the
+            circular spline and the multiplier.
+        held: Indices of the unknowns that may differ from zero, increasing.
         k: Number of force unknowns.
         load: Prescribed torque or rotation.
 
