@@ -1,7 +1,7 @@
-"""Fields of equilibria of the whole drive as plain arrays, for tables and pictures.
+"""Fields of equilibria of the whole drive as plain arrays, for tables and plots.
 
-All positions are in the frame of the outside of the circular spline, which does not
-turn. A half model is completed by a copy rotated by 180 deg.
+All positions are in the global frame of :mod:`swgjoint.fe.plane.sector_model`, which
+does not turn. A half model is completed by a copy rotated by 180 deg.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.typing import Array, Index
 
 Arc = tuple[float, float]
+"""First and last angle of a contact arc [rad]."""
 
 ARC_GAP = 1.5
-"""Largest distance between nodes of one contact arc, in tooth pitches [-]. The teeth
-stiffen the rim, so that it touches the wave generator only once per tooth, below the
-tooth or between two teeth."""
+"""Largest distance between neighbouring loaded stations of one contact arc, in tooth
+pitches [-]. The teeth stiffen the rim, so that it touches the wave generator only once
+per tooth, below the tooth or between two teeth."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,12 +41,12 @@ class MemberField:
     points: Array
     """Deformed positions of the nodes of every sector (N, n_nodes, 2) [m]."""
     stress: Array
-    """Stress components xx, yy, xy in the global frame (N, n_nodes, 3) [Pa]."""
+    """Stress components xx, yy, xy, zz in the global frame (N, n_nodes, 4) [Pa]."""
     quads: Index
     """Corner nodes of the elements of a sector, counter-clockwise (4, n_elements)."""
     outline: Index
-    """Nodes along the tooth of a sector, from its clockwise to its counter-clockwise
-    root."""
+    """Nodes along both flanks of a sector, from its clockwise to its counter-clockwise
+    root land."""
 
     @property
     def maxima(self) -> tuple[Array, Array, Array]:
@@ -85,7 +86,7 @@ def circular_spline_field(model: SectorModel, state: State) -> MemberField | Non
     compliance = model.circular_spline.compliance
     if stress is None or compliance is None:
         return None
-    # space 0 faces tooth 0 of the flexspline; tooth 0 is half a pitch from it
+    # tooth space 0 faces tooth 0 of the flexspline; tooth 0 is half a pitch from it
     pitch = 2.0 * pi / model.circular_spline.profile.teeth
     return _field(
         model,
@@ -106,7 +107,16 @@ def _field(
     angle: Array,
     stress: Array,
 ) -> MemberField:
-    """Field of a member from skeleton displacements and stresses in its frames."""
+    """Field of a member in the global frame.
+
+    Args:
+        model: The 2D model.
+        element: Condensed sector of the member.
+        skeleton: Skeleton displacements in the sector frames (N, 2 n_a) [m].
+        flank_force: Forces on the flank nodes in the sector frames (N, 2 n_b) [N].
+        angle: Angles of the sector frames (N,) [rad].
+        stress: Nodal stresses in the sector frames (N, n_nodes, 4) [Pa].
+    """
     n, mesh = len(angle), element.mesh
     nodes = len(element.displacement_from_skeleton)
     moved = skeleton @ element.displacement_from_skeleton.reshape(2 * nodes, -1).T
@@ -130,7 +140,7 @@ def _turns(model: SectorModel) -> Array:
 def tooth_angles(model: SectorModel, state: State) -> Array:
     """Angles of the flexspline's teeth from the first lobe.
 
-    The teeth are those of the undeformed, turned flexspline.
+    The places are those of teeth on the undeformed flexspline after its rotation.
 
     Args:
         model: The 2D model.
@@ -147,14 +157,14 @@ def tooth_angles(model: SectorModel, state: State) -> Array:
 def tooth_forces(model: SectorModel, state: State) -> Array:
     """Normal force on the right and on the left flank of every tooth.
 
-    The right flank is the clockwise one; seen from the axis, teeth point outwards.
+    The right flank is the clockwise one.
 
     Args:
         model: The 2D model.
         state: An equilibrium.
 
     Returns:
-        Forces of the whole drive (N, 2) [N].
+        Forces on all teeth of the drive, right flank first (N, 2) [N].
     """
     force = np.zeros((model.sectors, 2))
     if state.contacts is not None:
@@ -174,8 +184,8 @@ class WaveGeneratorContact:
     force: Array
     """Normal force at each station (n,) [N]."""
     line_load: Array
-    """Force per length of the bore, averaged over two tooth pitches with triangular
-    weights (n,) [N/m]."""
+    """Force per length of the bore (n,) [N/m]. It is a moving average over two tooth
+    pitches with triangular weights."""
     arcs: tuple[tuple[Arc, ...], ...]
     """Contact arcs of each lobe as angles from that lobe [rad]. A contact that extends
     from lobe to lobe is split half-way between them."""
@@ -219,7 +229,7 @@ def wave_generator_contact(
 
 
 def _arcs(angles: Array, gap: float) -> tuple[Arc, ...]:
-    """Runs of sorted angles whose neighbours are closer than a gap."""
+    """First and last angles of runs of sorted angles that no larger gap interrupts."""
     if not angles.size:
         return ()
     cuts = np.flatnonzero(np.diff(angles) > gap) + 1
@@ -231,8 +241,8 @@ class RootStress:
     """Stress at one node of every tooth root over a turn; arrays are (n_states, N)."""
 
     lobe_position: Array
-    """Angle from the node to the nearest lobe; grows as the input turns forward [rad].
-    """
+    """Angle from the node to the nearest lobe [rad]. It increases as the wave generator
+    turns forward."""
     tensile: Array
     """Tensile stress [Pa]."""
     compressive: Array
@@ -240,8 +250,8 @@ class RootStress:
     von_mises: Array
     """Von Mises stress [Pa]."""
     tooth: int
-    """Tooth that is farthest from its approaching lobe at the first state. In half a
-    turn of a two-lobe wave generator a lobe passes below it."""
+    """Index of the tooth that is farthest from its approaching lobe at the first state.
+    Half a turn of a two-lobe wave generator moves a lobe past this tooth."""
 
 
 def root_stress(
@@ -249,8 +259,8 @@ def root_stress(
 ) -> RootStress:
     """Stress at the tooth roots over a turn (thesis figures 4.18 to 4.20).
 
-    The node is the one with the largest von Mises stress over all states and teeth, on
-    the lower half of the dedendum at either side of a tooth.
+    The node is the one with the largest von Mises stress over all states and teeth. It
+    is sought on both sides of the tooth below the middle of the dedendum.
 
     Args:
         model: The 2D model.
@@ -262,7 +272,7 @@ def root_stress(
     low = radius < 0.5 * (profile.pitch_radius + profile.dedendum_radius)
     nodes = np.concatenate([mesh.flank_right[low], mesh.flank_left[low]])
     stress = np.array([flexspline_stress(model, state)[:, nodes] for state in states])
-    maxima = stress_maxima(stress)  # three times (n_states, sectors, n_nodes)
+    maxima = stress_maxima(stress)  # three arrays (n_states, sectors, n_nodes)
     worst = int(np.argmax(maxima[2].max(axis=(0, 1))))
     tensile, compressive, mises = (
         np.tile(values[..., worst], (1, model.copies)) for values in maxima

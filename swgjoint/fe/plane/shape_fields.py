@@ -1,7 +1,8 @@
-"""Fields of equilibria for a map: surface, stress and contact forces by tooth place.
+"""Fields of equilibria that a map stores for display: shape, stress, contact forces.
 
-Rows of nodes across a sector, from its clockwise to its counter-clockwise face, span
-the displayed surface.
+They are functions of the place of a tooth relative to the wave generator. The displayed
+surface connects rows of nodes that run across a sector, from its clockwise to its
+counter-clockwise face.
 """
 
 from __future__ import annotations
@@ -27,23 +28,27 @@ from swgjoint.maps.fields import DriveFields
 from swgjoint.typing import Array, Index
 
 PHASES = 4
-"""Most input positions within a pitch that are stored."""
+"""Largest number of input positions within a pitch that are stored."""
 EVERY = 2
-"""Stride of the displayed nodes along outline and bore."""
+"""Stride of the displayed nodes along outline and bore: every second node."""
 OUTLINE = 200
 """Number of points of the wave generator's outline."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SectorFields:
-    """One equilibrium by sector, in the frames of the turned, undeformed teeth."""
+    """Fields of one equilibrium by sector.
+
+    Vectors are in the frames of the teeth on the undeformed flexspline after its
+    rotation.
+    """
 
     displacement: Array
     """Displacement of the surface nodes (N, n_nodes, 3) [m]."""
     von_mises: Array
     """Von Mises stress at the surface nodes (N, n_nodes) [Pa]."""
     tooth_force: Array
-    """Contact force on each tooth (N, 3) [N]."""
+    """Force of the circular spline on each tooth (N, 3) [N]."""
     wave_generator_force: Array
     """Force of the wave generator on each sector (N, 3) [N]."""
 
@@ -55,24 +60,25 @@ class ShapeSurface:
     nodes: Index
     """Mesh nodes of the surface (n,)."""
     points: Array
-    """Undeformed positions (n, 3) [m]."""
+    """Undeformed positions of these nodes (n, 3) [m]."""
     triangles: Index
     """Triangles as indices into ``nodes`` (n_triangles, 3)."""
 
     @property
     def mirrored(self) -> Index:
-        """Index of the mirror image of each node (n,)."""
+        """Index of the node at the mirror image of each node (n,)."""
         image = self.points * np.array([-1.0, 1.0, 1.0])
         apart = np.linalg.norm(self.points[:, None] - image, axis=2)
         return np.asarray(apart.argmin(axis=0), dtype=np.int64)
 
 
 def surface_of(points: Array, rows: Sequence[Index]) -> ShapeSurface:
-    """Triangulate a surface through rows of nodes.
+    """Triangulated surface through rows of nodes.
 
     Args:
         points: Positions of the mesh nodes (n_nodes, 3) [m].
-        rows: Rows of nodes, each from face to face.
+        rows: Rows of nodes, each from the clockwise to the counter-clockwise face; at
+            least two, of any lengths.
     """
     triangles = np.concatenate([_between(a, b) for a, b in pairwise(rows)])
     nodes, number = np.unique(triangles, return_inverse=True)
@@ -84,7 +90,7 @@ def surface_of(points: Array, rows: Sequence[Index]) -> ShapeSurface:
 
 
 def _between(one: Index, other: Index) -> Index:
-    """Triangles between two rows of nodes of any lengths (n, 3)."""
+    """Triangles (n, 3) between two rows of nodes, which may differ in length."""
     n = max(len(one), len(other))
     a, b = (
         row[np.linspace(0, len(row) - 1, n).round().astype(int)] for row in (one, other)
@@ -96,7 +102,7 @@ def _between(one: Index, other: Index) -> Index:
 
 
 def outline_rows(plane: SectorMesh) -> tuple[Index, Index]:
-    """Node rows of bore and outline of a 2D section, clockwise face first."""
+    """Displayed node rows of a 2D section from its clockwise face: bore, outline."""
     right = plane.flank_right[::-1]
     half = np.unique(np.r_[0 : len(right) : EVERY, len(right) - 1])
     left = plane.flank_left[::-1][half][::-1]
@@ -127,7 +133,7 @@ def plane_fields(
     u += state.flank_force @ element.displacement_from_flank.reshape(2 * size, -1).T
     rest = np.asarray(element.mesh.mesh.p).T[surface.nodes]
     u = u.reshape(len(u), size, 2)[:, surface.nodes]
-    # from the sector frames to the frames of the turned, undeformed teeth
+    # from the sector frames to those of the undeformed teeth after the rotation
     back = frames.angle - model.place - state.rotation
     points = rotate(rest + u, back[:, None])
     pressed = np.einsum(
@@ -161,10 +167,12 @@ def drive_fields(
 
     Args:
         design: The drive.
-        states: Equilibria over one pitch, by torque [N·m].
+        states: Equilibria at equally spaced input positions over one pitch, by torque
+            [N·m].
         fields: Function that returns the fields of an equilibrium.
         surface: Displayed surface of a sector.
-        symmetric: Whether to add the opposite torques as mirror images.
+        symmetric: Whether to add the fields under the opposite torques, as mirror
+            images of those given.
     """
     teeth = design.drive.teeth_flexspline
     tables: dict[float, SectorFields] = {}
@@ -173,7 +181,8 @@ def drive_fields(
         phases = gcd(len(row), PHASES)
         used_states = row[:: len(row) // phases]
         kept = [fields(state) for state in used_states]
-        # from one position to the next the place of a tooth falls by pitch / phases
+        # from one input position to the next, the place of each tooth relative to the
+        # wave generator decreases by pitch / phases
         fallen = 2.0 * pi / teeth * np.arange(phases) / phases
         at = [state.rotation - state.wave_generator_angle for state in used_states]
         place[torque] = float(np.mean(at + fallen))
@@ -205,7 +214,7 @@ _KEYS = ("displacement", "von_mises", "tooth_force", "wave_generator_force")
 
 
 def _by_place(phases: list[Array]) -> Array:
-    """Interleave the sectors of all positions within a pitch, ordered by place."""
+    """Values of all sectors at all input positions, interleaved in order of place."""
     n, count = len(phases), len(phases[0])
     table = np.empty((count * n, *phases[0].shape[1:]))
     for k, values in enumerate(phases):
@@ -214,7 +223,7 @@ def _by_place(phases: list[Array]) -> Array:
 
 
 def _mirrored(fields: SectorFields, surface: ShapeSurface) -> SectorFields:
-    """Fields under the opposite torque, as the mirror image."""
+    """Fields under the opposite torque: the mirror image of the given ones."""
     flip = np.array([-1.0, 1.0, 1.0])
 
     def back(values: Array) -> Array:

@@ -55,13 +55,20 @@ def circular_spline_stress(model: SectorModel, state: State) -> Array | None:
 def _nodal_stress(
     element: Superelement, deformation: Array, flank_force: Array, angle: Array
 ) -> Array:
-    """Stress of all sectors; nodes on a face get the mean of their two sectors."""
+    """Nodal stresses of all sectors; on a face, the mean of the two sectors.
+
+    Args:
+        element: Condensed sector of the member.
+        deformation: Skeleton displacements in the sector frames (N, 2 n_a) [m].
+        flank_force: Forces on the flank nodes in the sector frames (N, 2 n_b) [N].
+        angle: Angles of the sector frames (N,) [rad].
+    """
     nodes = len(element.stress_from_skeleton)
     stress = deformation @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
     stress += flank_force @ element.stress_from_flank.reshape(nodes * 3, -1).T
     stress = stress.reshape(len(angle), nodes, 3)
     first, last = element.mesh.face_first, element.mesh.face_last
-    # angle from each sector's frame to the next one
+    # rotation from each sector's frame to the next one
     step = (np.roll(angle, -1) - angle)[:, None]
     after = np.roll(stress[:, first], -1, axis=0)
     mean = 0.5 * (stress[:, last] + turned_stress(after, step))
@@ -72,12 +79,13 @@ def _nodal_stress(
 
 
 def turned_stress(stress: Array, angle: Array) -> Array:
-    """Transform stresses to a frame from which the given frame is turned by an angle.
+    """Stress components in another frame about the same axis.
 
     Args:
-        stress: Components xx, yy, xy in the last axis [Pa]. Further components, the
-            axial stress, stay unchanged.
-        angle: Angle from the new frame to the given one, counter-clockwise [rad].
+        stress: Components xx, yy, xy and optionally the axial stress zz, which does not
+            change, in the last axis (..., 3 or 4) [Pa].
+        angle: Angle from the new frame to the frame of ``stress``, counter-clockwise
+            (...) [rad].
     """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
@@ -100,7 +108,7 @@ class StressMaxima:
 
     @classmethod
     def from_stress(cls, stress: Array) -> StressMaxima:
-        """Maxima over all nodes of stresses (..., 4)."""
+        """Maxima over all nodes of stresses xx, yy, xy, zz (..., 4) [Pa]."""
         tensile, compressive, von_mises = stress_maxima(stress)
         return cls(
             tensile=float(tensile.max()),
@@ -109,11 +117,12 @@ class StressMaxima:
         )
 
     def to_json(self) -> dict[str, float]:
-        """Values in MPa."""
+        """Largest stresses by kind [MPa]."""
         return {kind: getattr(self, kind) / 1e6 for kind in KINDS}
 
 
 KINDS = ("tensile", "compressive", "von_mises")
+"""Kinds of stress, as the fields of :class:`StressMaxima` name them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,12 +130,13 @@ class MemberMaxima:
     """Largest stresses of both members at one state."""
 
     flexspline: StressMaxima
+    """Stresses of the flexspline."""
     circular_spline: StressMaxima | None
     """Stresses of the circular spline; None if it is rigid."""
 
     @classmethod
     def from_state(cls, model: SectorModel, state: State) -> MemberMaxima:
-        """Recover the largest stresses of a state.
+        """Largest stresses of both members at a state.
 
         Args:
             model: The 2D model.
@@ -141,7 +151,7 @@ class MemberMaxima:
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:
-        """Values in MPa by member, null for a rigid circular spline."""
+        """Largest stresses by member and kind [MPa]; None for a rigid circular spline."""
         circular_spline = self.circular_spline
         return {
             "flexspline": self.flexspline.to_json(),

@@ -22,24 +22,24 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 POSITIONS = 4
-"""Input positions over one pitch, half a step from its ends. With a symmetric wave
-generator only two of them are solved, because the others are their mirror images. Width
-and work of the loop vary by half between positions; the mean of four is within 2 % of
-the mean of eight."""
+"""Number of input positions over one pitch; the first and the last one are half a step
+from its ends. With a symmetric wave generator only two of the four are solved, because
+the others are their mirror images. Width and work of the loop vary by half between
+positions; their mean over four positions is within 2 % of that over eight."""
 STEPS = 12
-"""Torque steps from zero to the largest torque, smaller at small torques."""
+"""Number of torque steps from zero to the largest torque, smaller at small torques."""
 FIRST_STEPS = 4
-"""Torque steps of the first loading and unloading, which serve to erase the initial
-state."""
+"""Number of torque steps in each part of the first loading and unloading, which only
+erases the memory of the initial state."""
 _LOOP, _FIELDS = "friction-loop-{:04d}", fields(FrictionLoop)
 
 
 def loop_torques(top: float, steps: int = STEPS) -> Array:
-    """Torques 0 -> T -> 0 -> -T in few steps, then -T -> T -> -T -> T.
+    """Torque path 0 -> T -> 0 -> -T in a few steps, then -T -> T -> -T -> T.
 
     Args:
         top: Largest torque T [N·m].
-        steps: Steps from zero to the largest torque, a multiple of
+        steps: Number of steps from zero to the largest torque, a multiple of
             :data:`FIRST_STEPS`.
 
     Returns:
@@ -61,20 +61,29 @@ def friction_loops(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> tuple[FrictionLoop, ...]:
-    """Torque loops of the drive with perfect teeth and history-dependent friction.
+    """Torque loops at several locked input positions, with friction between the teeth.
+
+    Manufacturing errors are not included. If the model contains the bearing of the wave
+    generator, its cage is fixed to the cam.
 
     Args:
         design: The drive; its friction coefficient may be zero.
         top: Largest torque [N·m].
-        positions: Input positions over one pitch of the fixed member.
-        steps: Steps from zero to the largest torque, a multiple of
+        positions: Number of input positions over one period of the gear without errors,
+            see :func:`swgjoint.gear.kinematics.periodicity`.
+        steps: Number of steps from zero to the largest torque, a multiple of
             :data:`FIRST_STEPS`.
-        progress: Called with the stage, the loops done and their number.
-        keep: Store of solved loops, from which an interrupted run resumes; None stores
-            none.
+        progress: Called with the stage, the number of finished loops and the number of
+            all loops.
+        keep: Store of finished loops, from which an interrupted run resumes; None
+            stores none.
+
+    Returns:
+        One loop per solved position: all of them or, with a symmetric wave generator,
+        the first half.
 
     Raises:
-        ComputationError: If an equilibrium cannot be solved.
+        ComputationError: If an equilibrium cannot be found.
     """
     perfect, drive = without_errors(design), design.drive
     period = 2.0 * pi / design.periodicity
@@ -129,7 +138,7 @@ def friction_loops(
 def _kept(
     keep: Unfinished | None, number: int, theta: float, torque: Array
 ) -> FrictionLoop | None:
-    """A loop from the store of an interrupted run; None if it has none."""
+    """Loop from the store of an interrupted run; None if it is not stored there."""
 
     def taken(arrays: dict[str, Any]) -> FrictionLoop:
         numbers = {
@@ -138,14 +147,23 @@ def _kept(
         }
         loop = FrictionLoop(**arrays | numbers)
         if loop.input_angle != theta or not np.array_equal(loop.torque, torque):
-            raise ValueError("stored loop has another input angle or other torques")
+            raise ValueError("stored loop: input angle or torques differ")
         return loop
 
     return None if keep is None else keep.read(_LOOP.format(number), taken)
 
 
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
-    """Equilibria with the input locked along a torque path that starts at zero."""
+    """Equilibria along a torque path that starts at zero, with the input locked.
+
+    Args:
+        follow: Continuation of the equilibria.
+        theta: Locked input angle [rad].
+        torques: Output torques (n,) [N·m].
+
+    Raises:
+        ComputationError: If an equilibrium cannot be found.
+    """
     state = follow.engage(follow.deflect(theta))
     states: list[State] = []
     for torque in torques.tolist():
@@ -153,8 +171,8 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
             state = follow.to_torque(state, torque)
         if not state.outcome.ok and not states:
             raise ComputationError(
-                f"no equilibrium without torque at input angle {theta:.4g} rad; a"
-                " friction loop needs an output that is not free in a clearance"
+                f"no equilibrium at zero torque and input angle {theta:.4g} rad:"
+                " friction loops need an output that cannot move freely in a clearance"
             )
         if not state.outcome.ok:
             raise ComputationError(

@@ -1,17 +1,19 @@
-r"""Ratcheting torque: the largest torque of the teeth with the wave generator locked.
+r"""Ratcheting torque: the largest torque that the teeth carry at a locked input.
 
-The output is turned against the locked wave generator, so that the torque is a result
-and may fall; at its maximum the teeth begin to ratchet. There
+The output is turned back step by step while the wave generator is locked, so that the
+torque is a result and may decrease. At its maximum,
 
 .. math:: \frac{dT}{d\psi} = 0,
 
-and no equilibrium exists at a larger torque. In the 2D model the wave generator is
-rigid and has no bearing. The torsion of a cup is in series and has no effect, but the
-radial compliance of cup and bearing, which the model lacks, would let the teeth ratchet
-earlier. The circular spline is what yields: if its outside is fixed, the teeth jam, and
-the torque at which the search ends is a lower bound of that model, far above the
-strength of steel; if its outside is free (:attr:`CircularSpline.outer_rim`), it becomes
-oval and releases the teeth.
+the teeth begin to ratchet: no equilibrium exists at a larger torque. The wave generator
+is rigid here, without its bearing. The torsion of a cup acts in series and has no
+effect. The radial compliance of cup and bearing, which the model does not contain,
+would let the teeth ratchet at a lower torque.
+
+The result depends on the outside of the circular spline. If it is free (design key
+``circular_spline.outer_rim = "free"``), the circular spline becomes oval and releases
+the teeth. If it is fixed, the teeth jam; the torque at which the search ends is then a
+lower bound for this model and is far above the strength of steel.
 """
 
 from __future__ import annotations
@@ -38,26 +40,27 @@ from swgjoint.typing import Array
 STEP = 0.04
 """Step of the output, in tooth pitches [-]."""
 SHORTEST = 1e-3
-"""Step below which the search is abandoned, in tooth pitches [-]."""
+"""Step of the output below which the search ends, in tooth pitches [-]."""
 CIRCULAR_SPLINE_RANGE = 2.0
 """Largest accepted displacement of the circular spline, in lobe heights [-]. The error
 of its linear model is of second order in its rotation: a displacement of one lobe
 height at the pitch radius is a rotation of 0.02 to 0.04 rad, and its square amounts to
 a few percent of the tooth depth."""
 ITERATIONS = 200
-"""Most iterations per equilibrium. Near the limit contact changes slowly; 120 suffice
-for a map."""
+"""Largest number of iterations per equilibrium. A map needs at most 120, but close to
+the largest torque the contacts settle slowly."""
 TOLERANCE = 1e-4
-"""Increment at which the iteration ends, in lobe heights [-]. Below it conforming
-flanks exchange contact points for many iterations while the torque hardly changes."""
+"""Increment of the nodes below which the iteration ends, in lobe heights [-]. Below it
+conforming flanks exchange contact points for many iterations while the torque remains
+almost constant."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RatchetingPath:
-    """Equilibria while the output is turned back against the locked wave generator."""
+    """Equilibria at which the output is turned back with the wave generator locked."""
 
     turned: Array
-    """Angle by which the output was turned, increasing from zero (n,) [rad]."""
+    """Angle by which the output is turned back, increasing from zero (n,) [rad]."""
     torque: Array
     """Output torque T (n,) [N·m]."""
     energy: Array
@@ -67,7 +70,7 @@ class RatchetingPath:
     pitch: float
     """Tooth pitch of the flexspline [rad]."""
     outcome: Outcome
-    """Outcome of the solve that ended the path; converged if none failed."""
+    """Outcome of the failed solve that ended the path; ``CONVERGED`` if none failed."""
 
     def __post_init__(self) -> None:
         turned = frozen_array(self.turned, "turned [rad]", ndim=1)
@@ -80,16 +83,18 @@ class RatchetingPath:
     def passed(self) -> bool:
         """Whether the path goes beyond the largest torque that the teeth carry.
 
-        Within the backlash the torque is round-off, so its maximum does not count.
+        A maximum without teeth in contact does not count: within the backlash the
+        torque is only round-off.
         """
         k = int(self.torque.argmax())
         return bool(self.pairs[k] > 0 and self.torque[-1] < self.torque[k])
 
     @property
     def limit(self) -> float:
-        """Largest torque of the path; a lower bound unless :attr:`passed` [N·m].
+        """Largest torque of the path [N·m].
 
-        It is the vertex of the parabola through the largest value and its neighbours.
+        It is the ratcheting torque if :attr:`passed`, otherwise a lower bound of it. A
+        parabola through the largest value and its neighbours gives the maximum.
         """
         k = int(self.torque.argmax())
         if not 0 < k < self.torque.size - 1:
@@ -121,21 +126,26 @@ def ratcheting_path(
     upto: float = 1.0,
     progress: Progress = silent,
 ) -> RatchetingPath:
-    """Turn the output until the torque of the teeth falls, or up to a given angle.
+    """Path of equilibria until the torque decreases, or up to a given output rotation.
 
     The teeth have neither errors nor friction.
 
     Args:
-        design: The drive. The support of its circular spline decides, see above.
-        input_angle: Angle at which the wave generator is locked [rad].
-        step: Step of the output, in tooth pitches [-].
-        upto: Output rotation at which the search ends at the latest, in tooth pitches
-            [-].
-        progress: Called with the stage, the part of the pitch in percent, and 100.
+        design: The drive. The result depends on whether the outside of its circular
+            spline is fixed or free.
+        input_angle: Locked input angle [rad].
+        step: Largest step of the output, in tooth pitches [-].
+        upto: Rotation of the output at which the search ends at the latest, in tooth
+            pitches [-].
+        progress: Called with the stage, the rotation of the output in percent of a
+            pitch, and 100.
+
+    Returns:
+        The path. It may also end early because a solve failed, see its ``outcome``.
 
     Raises:
         DesignError: If the design cannot be built.
-        ComputationError: If the unloaded drive cannot be solved.
+        ComputationError: If the start without load cannot be solved.
     """
     follow = path_follower(design)
     pitch = 2.0 * pi / design.drive.teeth_flexspline
@@ -173,7 +183,7 @@ def ratcheting_path(
 
 
 def path_follower(design: Design) -> Continuation:
-    """The 2D drive without errors and friction, with a solver for large torques."""
+    """Continuation of a drive without errors and friction, for large torques."""
     perfect = without_errors(design)
     small = TOLERANCE * lobe_height(design)
     solver = NewtonSolver(

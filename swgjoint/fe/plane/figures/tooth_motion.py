@@ -1,9 +1,9 @@
-"""Motion of the teeth by finite elements, for conjugate profiles.
+"""Motion of the teeth from the 2D model, for conjugate profiles.
 
 The neutral line of :mod:`swgjoint.gear.teeth.neutral_line` follows the wave generator
 and does not stretch. A real rim also bends between its teeth, lifts off where it is not
-supported and carries some tension. Here every tooth follows the rigid-body motion of
-its flanks when the wave generator deflects the flexspline.
+supported and carries some tension. Here the 2D model deflects the flexspline, and the
+motion of a tooth is the best-fit rigid-body motion of its flanks.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ class DeflectedRim:
     """Radius of the reference point of a tooth [m]."""
     place: Array
     """Angles of the teeth on the undeflected rim, from a lobe (n + 1,) [rad]; the last
-    entry is the first one a period later."""
+    entry is the first one plus a period."""
     moved: Array
-    """Tangential and radial displacement of the reference point [m] and rotation of the
-    tooth [rad], in the frame of its undeflected place (n + 1, 3)."""
+    """Tangential (counter-clockwise) and radial displacement of the reference point [m]
+    and rotation of the tooth [rad], at the place of the tooth on the undeflected rim
+    (n + 1, 3)."""
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        """Periodic spline of ``moved`` over ``place``."""
         return CubicSpline(self.place, self.moved, bc_type="periodic")
 
     def pose(self, theta: ArrayLike) -> Pose:
@@ -57,7 +59,7 @@ class DeflectedRim:
                 [rad].
 
         Returns:
-            Positions [m], angles [rad] and their derivatives by theta.
+            Positions [m], angles [rad] and their derivatives with respect to theta.
         """
         theta = np.asarray(theta, dtype=float)
         value, slope = self._spline(theta), self._spline(theta, 1)
@@ -74,10 +76,10 @@ class DeflectedRim:
 
 
 def deflected_rim(design: Design) -> DeflectedRim:
-    """Deflect the flexspline and determine the motion of each tooth from its flanks.
+    """Poses of the teeth when the wave generator deflects the flexspline.
 
     Raises:
-        DesignError: If the design cannot be built.
+        DesignError: If the design cannot be built or has manufacturing errors.
         ComputationError: If the deflection fails.
     """
     model = sector_model(
@@ -99,7 +101,7 @@ def deflected_rim(design: Design) -> DeflectedRim:
     still = np.concatenate([right, right * np.array([-1.0, 1.0])])
     flank = frames.displacement @ element.flank_from_skeleton.T
     nodes = still + flank.reshape(model.sectors, -1, 2)
-    # rigid motion of the flanks of each tooth, seen in its sector frame
+    # best-fit rigid motion of the flanks of each tooth in its sector frame
     centre, middle = still.mean(axis=0), nodes.mean(axis=1)
     about, seen = still - centre, nodes - middle[:, None]
     cross = np.einsum("ni,sni->s", rotate_right_angle(about), seen)
@@ -120,15 +122,15 @@ def deflected_rim(design: Design) -> DeflectedRim:
 
 
 def conjugate_by_fe(design: Design, member: MemberName) -> ToothProfile:
-    """Profile of a member conjugate to the other one under the motion of the teeth.
+    """Profile of a member, conjugate to that of the other one under the tooth motion.
 
     Args:
         design: The drive.
-        member: Member whose profile is wanted.
+        member: Member whose profile is returned.
 
     Raises:
-        DesignError: If there is no such tooth, in one line that names the key.
-        ComputationError: If the deflection fails.
+        DesignError: If no conjugate tooth exists; the message names the design key.
+        ComputationError: If the deflection of the flexspline fails.
     """
     motions = tooth_motions(design, line=deflected_rim(design))
     other = "circular_spline" if member == "flexspline" else "flexspline"
