@@ -1,8 +1,8 @@
-"""Compiled loops of the finite elements, next to the numpy code that they repeat.
+"""Compiled versions of the slowest loops of the finite-element code.
 
-The numpy code is the reference: it explains the method, runs wherever the package was
-built without a compiler, and every kernel is tested against it. The environment
-variable ``SWGJOINT_KERNELS=numpy`` selects it everywhere.
+The numpy version of each loop is the reference. It explains the method, it runs if the
+package was built without a compiler, and the tests compare the compiled loop with it.
+The environment variable ``SWGJOINT_KERNELS=numpy`` selects the numpy versions.
 """
 
 from __future__ import annotations
@@ -20,5 +20,5 @@ except ImportError:  # built without a compiler or the headers of Python
 
 
 def kernels() -> ModuleType | None:
-    """Module of the compiled loops; None to use numpy."""
+    """Module of the compiled loops; None if the numpy versions are to be used."""
     return None if os.environ.get("SWGJOINT_KERNELS") == "numpy" else _compiled

@@ -76,7 +76,7 @@ double Profile::project(const Piece& piece, Vec point, Vec* normal,
   }
   const Vec rel = point - piece.centre;
   const double r = std::hypot(rel.x, rel.y);
-  // angle from the middle of the arc, away from branch cuts
+  // angle measured from the middle of the arc, so that the arc crosses no branch cut
   const double angle = std::atan2(rel.y * piece.middle_cos - rel.x * piece.middle_sin,
                                   rel.x * piece.middle_cos + rel.y * piece.middle_sin);
   *inside = std::abs(angle) <= piece.half * (1.0 + 1e-9);
@@ -100,7 +100,7 @@ double Profile::signed_distance(Vec point, Vec* normal, double* curvature) const
     }
   }
   for (const Edge& edge : edges_) {
-    // in a wedge outside an edge, the edge itself is the closest point
+    // between the normals of both pieces at an edge, the edge is the closest point
     const Vec rel = point - edge.vertex;
     const double r = std::hypot(rel.x, rel.y);
     const bool wedge = dot(rel, edge.before) >= 0.0 && dot(rel, edge.after) <= 0.0;

@@ -1,7 +1,7 @@
-// Tooth profiles of circular arcs and straight lines, and displaced flanks on them.
+// Tooth profiles of circular arcs and straight lines, and interpolation in tables.
 //
-// The formulas are those of swgjoint/gear/teeth/profile.py, segments.py and
-// swgjoint/fe/plane/circular_spline.py, which are the reference of these functions.
+// The formulas are those of swgjoint/gear/teeth/profile.py and segments.py, which are
+// the reference for these functions. Lengths are in metres.
 
 #ifndef SWGJOINT_KERNELS_FLANK_H_
 #define SWGJOINT_KERNELS_FLANK_H_
@@ -26,35 +26,37 @@ struct At {
   double curvature;
 };
 
-// One arc or straight line: a row of ToothProfile.table.
+// One arc or straight line: a row of ToothProfile.pieces.
 struct Piece {
   Vec start, end;
   double length;
   Vec centre;
   double radius;  // zero for a straight line
   double sign;    // +1 convex, -1 concave
-  double first, last;  // directions of both ends from the centre [rad]
+  double first, last;  // polar angles of start and end about the centre [rad]
 
-  // derived
-  Vec direction, normal;  // of a straight line
+  // derived from these: direction and outward normal of a straight line
+  Vec direction, normal;
+  // middle direction and half angle [rad] of an arc, and its signed curvature [1/m]
   double middle_cos, middle_sin, half, curvature;
 };
 
-// Point where the chain has a corner, with the directions of the chain there.
+// Corner between two pieces, with the directions of the profile before and after it.
 struct Edge {
   Vec vertex, before, after;
 };
 
 class Profile {
  public:
-  // table: (n_pieces, 11), edges: (n_edges, 6), both row by row
+  // table: rows of ToothProfile.pieces (pieces, 11); edges: rows of ToothProfile.edges
+  // (n_edges, 6); side: +1 for external, -1 for internal teeth
   Profile(const double* table, std::size_t pieces, const double* edges,
           std::size_t n_edges, double side);
 
   At evaluate(double s) const;
 
-  // Signed distance of a point, with normal and curvature at its foot; infinite
-  // where the point projects on no piece.
+  // Signed distance of a point, with normal and curvature at its foot; infinite if the
+  // point has a foot neither on a piece nor at an edge.
   double signed_distance(Vec point, Vec* normal, double* curvature) const;
 
   double side() const { return side_; }
@@ -68,10 +70,12 @@ class Profile {
   double side_;
 };
 
-// Interval of increasing breaks that contains s; the end intervals reach beyond.
+// Index of the interval, between n increasing breaks, that contains s. The first and
+// the last interval also contain the values beyond the breaks.
 std::size_t interval_of(const double* breaks, std::size_t n, double s);
 
-// Value at x of the line through increasing points, constant beyond the ends.
+// Piecewise linear interpolation at x between n values at increasing points; constant
+// beyond the ends.
 double interpolate(const double* at, const double* value, std::size_t n, double x);
 
 }  // namespace swgjoint

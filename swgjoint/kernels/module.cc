@@ -1,6 +1,6 @@
 // Python interface of the compiled loops. Results are written into arrays of the
-// caller, so arrays are never converted. Shapes and indices are checked here: a wrong
-// one would read or write beyond an array.
+// caller, so array arguments must not be converted to copies. Shapes and indices are
+// checked here, because a wrong one would read or write beyond the end of an array.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -27,7 +27,7 @@ void require(bool fits, const char* what) {
   if (!fits) throw std::invalid_argument(what);
 }
 
-// A tooth profile, and its arc lengths by radius.
+// A tooth profile.
 struct Flank {
   swgjoint::Profile profile;
   Flank(In<2> table, In<2> edges, double side)
@@ -37,7 +37,7 @@ struct Flank {
   }
 };
 
-// One search; keeps the arrays that it reads.
+// The search at one state. It holds references to the arrays that it reads.
 class Search {
  public:
   Search(const Flank& flexspline, In<1> breaks, In<3> weights, double low, double high,

@@ -15,9 +15,10 @@ Vec rotate(Vec v, double cos, double sin) {
   return {cos * v.x - sin * v.y, sin * v.x + cos * v.y};
 }
 
-// A right flank's frame and its mirror image.
+// Mirror image about the tooth axis, which turns a left flank into a right one.
 Vec mirror(Vec v) { return {-v.x, v.y}; }
 
+// Displacement of a flank and its derivative with respect to the arc length.
 void evaluate(const FlankSplines& flanks, std::size_t flank, double s, Vec* value,
               Vec* slope) {
   const std::size_t j = interval_of(flanks.breaks, flanks.intervals + 1, s);
@@ -118,7 +119,7 @@ void ToothSearch::displaced(double s, const double* mirrored, Vec* point, Vec* t
     slope.y += by_s * mirrored[2 * k + 1];
   }
   *point = at.point + moved;
-  // tangent of the profile from tip to root: the outward normal turned back
+  // tangent of the profile from tip to root: the outward normal turned clockwise
   *tangent = {at.normal.y + slope.x, -at.normal.x + slope.y};
   *curvature = at.curvature;
 }
@@ -147,7 +148,7 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
       double slope = dot(seen.normal, tangent);
       double relative = curvature + seen.foot.curvature;
       if (seen.foot.corner) {
-        // the point of the flank that is closest to the corner
+        // at a corner, find the point of the flank that is closest to it
         slope = dot(seen.rest, tangent);
         relative = 1.0 + curvature * dot(seen.rest, seen.normal);
       }

@@ -1,6 +1,7 @@
 // Closest points of displaced flexspline flanks on displaced circular-spline flanks.
 //
-// The compiled twin of swgjoint/fe/plane/tooth_contact.py, which explains the method.
+// Compiled version of swgjoint/fe/plane/tooth_contact.py and of the feet in
+// circular_spline.py, which explain the method. Lengths are in metres.
 
 #ifndef SWGJOINT_KERNELS_TOOTH_SEARCH_H_
 #define SWGJOINT_KERNELS_TOOTH_SEARCH_H_
@@ -12,15 +13,16 @@
 
 namespace swgjoint {
 
-// Piecewise cubic weights of flank nodes: coefficients (4, intervals, nodes) of
-// descending powers, as in scipy's CubicSpline.
+// Piecewise cubic weights of flank nodes. The coefficients (4, intervals, nodes) belong
+// to descending powers of the distance from a break, as in scipy's CubicSpline.
 struct NodeSpline {
   const double* breaks;
   const double* coefficients;
   std::size_t intervals, nodes;
 };
 
-// Displacements of flanks: coefficients (flanks, intervals, 4, 2), ascending powers.
+// Piecewise cubic displacements of flanks. The coefficients (flanks, intervals, 4, 2)
+// belong to ascending powers of the distance from a break.
 struct FlankSplines {
   const double* breaks;
   const double* coefficients;
@@ -32,23 +34,24 @@ struct Foot {
   double gap;
   Vec normal;
   double curvature;
-  bool corner;  // the foot is an end of the flank
-  Vec rest;     // from that end to the point; zero otherwise
-  double station;
+  bool corner;  // whether the foot is an end of the flank
+  Vec rest;     // vector from that end to the point; zero for a perpendicular foot
+  double station;  // arc length of the foot
 };
 
-// Foot of one point, with vectors in the mirrored sector frame.
+// Foot of one point in the mirrored frame of a circular-spline tooth, and its vectors
+// in the mirrored sector frame.
 struct Seen {
   Foot foot;
-  Vec normal, rest;
+  Vec normal, rest;  // those of the foot
   std::int64_t tooth;
 };
 
-// Limits of the search, constants of the Python modules.
+// Constants of the search, with the values of the Python modules.
 struct Limits {
-  double corner, beyond;  // of circular_spline.py, as fractions of the flank [-]
-  double refined;         // change at which a refinement ends [m]
-  int refinements;
+  double corner, beyond;  // CORNER, BEYOND of circular_spline.py, per flank length [-]
+  double refined;         // change of the arc lengths below which refinement ends [m]
+  int refinements;        // largest number of refinement steps
 };
 
 class ToothSearch {
@@ -63,11 +66,14 @@ class ToothSearch {
         flanks_(flanks), teeth_(teeth), teeth_in_model_(teeth_in_model), angle_(angle),
         bearing_(bearing), limits_(limits) {}
 
-  // start: arc length near the foot, null to begin at the foot on the rigid flank
+  // Foot of a point in a mirrored sector frame. outward: outward normal of the
+  // flexspline at the point; start: arc length near the foot, or null to start from the
+  // foot on the rigid flank
   Seen see(Vec point, Vec outward, std::int64_t sector, std::int64_t side, bool rigid,
            const double* start, int steps) const;
 
-  // Refine n minima in place; mirrored: node displacements (n, nodes, 2)
+  // Refine n minima of the gap in place. station: their arc lengths; mirrored: node
+  // displacements of their flanks (n, nodes, 2); spacing: half width of the brackets
   void refine(std::size_t n, double* station, const double* mirrored,
               const std::int64_t* sector, const std::int64_t* side,
               double spacing) const;

@@ -151,7 +151,7 @@ class MemberMaxima:
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:
-        """Largest stresses by member and kind [MPa]; None for a rigid circular spline."""
+        """Largest stresses by member and kind [MPa]; None for a rigid member."""
         circular_spline = self.circular_spline
         return {
             "flexspline": self.flexspline.to_json(),
