@@ -76,7 +76,7 @@ class BoreStations:
             direction: Direction at each station (N, q, 2).
 
         Returns:
-            Derivatives by the node displacements (N, q, 2 m) [-].
+            Derivatives with respect to the node displacements (N, q, 2 m) [-].
         """
         local = self._local(direction)
         count, intervals, p, width = local.shape
@@ -99,7 +99,7 @@ class BoreStations:
             stiffness: Stiffness of each spring (N, q) [N/m].
 
         Returns:
-            Matrices in the node displacements (N, 2 m, 2 m) [N/m].
+            Stiffness matrices of the nodes (N, 2 m, 2 m) [N/m].
         """
         local = self._local(direction)
         count, intervals, p, width = local.shape
@@ -119,7 +119,7 @@ class BoreStations:
         return np.concatenate([nodes[:, k : k + intervals] for k in range(s)], axis=2)
 
     def _local(self, direction: Array) -> Array:
-        """Rows of :meth:`project` by the nodes of each interval (N, i, p, 2 s)."""
+        """Rows of :meth:`project` over the nodes of each interval (N, i, p, 2 s)."""
         shaped = direction.reshape(len(direction), -1, len(self.weights), 2)
         x, y = shaped[..., 0, None], shaped[..., 1, None]
         return np.asarray(x * self.weights[:, 0] + y * self.weights[:, 1])

@@ -104,7 +104,7 @@ def circular_spline_compliance(
         dofs = (2 * nodes[:, None] + np.arange(2)).ravel()
         rhs[:, dofs] = share
         rhs[0] += load
-        # three springs without load remove the rigid-body motion
+        # three springs, which carry no load, suppress the rigid-body motion
         blocks, first = blocks.copy(), 2 * nodes[0]
         for tooth, dof in ((0, first), (0, first + 1), (n_teeth // 2, first)):
             blocks[tooth, dof, dof] += scale
@@ -318,8 +318,8 @@ class Feet:
     """Feet of points on a flank of the circular spline."""
 
     gap: Array
-    """Signed distance of each point from the flank (n,) [m]; infinite without a foot.
-    """
+    """Signed distance of each point from the flank (n,) [m]; infinite if there is
+    neither a perpendicular foot nor a corner within reach."""
     normal: Array
     """Outward normal of the flank at the foot; at a corner, the opposite of the
     flexspline's normal (n, 2)."""

@@ -52,7 +52,7 @@ class SeenFeet:
     rest: Array
     """Vector from a corner to each point; zero for a perpendicular foot (n, 2) [m]."""
     tooth: Index
-    """Tooth of the circular spline on which each foot is (n,)."""
+    """Tooth of the circular spline that each point faces (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

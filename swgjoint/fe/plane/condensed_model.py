@@ -100,11 +100,11 @@ class CondensedModel:
 
     @cached_property
     def _teeth(self) -> tuple[Array, Array]:
-        """Linear system: tooth gaps and three more rows from the unknowns.
+        """Linear system of the tooth gaps, with three more rows.
 
-        The rows after the tooth gaps are the displacement of the anchor, which keeps
-        the tangent regular, the rotation of the flexspline, and the moment on the
-        circular spline.
+        Its rows are the tooth gaps, the displacement of the anchor (which keeps the
+        tangent regular), the rotation of the flexspline, and the moment on the circular
+        spline.
 
         Returns:
             Matrix (n + 3, n + 3) and offset (n + 3,).

@@ -81,7 +81,7 @@ def _supports_within(drive: CondensedModel, torque: float) -> Mask:
     """Whether each bore interval opens or closes within a torque change [N·m].
 
     All other contact changes are ignored. If more than :data:`MOST_SUPPORTS` intervals
-    do, only those that switch first are marked.
+    would change, only those that change first are marked.
 
     Returns:
         Mask (N, intervals).

@@ -169,8 +169,8 @@ class Continuation(Follower[State]):
         Args:
             flexspline: Shifts of its teeth in their frames (N, 2) [m].
             circular_spline: Shifts of its teeth in their frames (N_c, 2) [m].
-            tilt: Slope of the axis of the circular spline (2,) [rad]; must be zero,
-                because a 2D model has no axis to tilt.
+            tilt: Slope of the axis of the circular spline (2,) [rad]; it must be zero,
+                because a 2D model cannot tilt its axes.
         """
         assert not tilt.any()
         model = replace(

@@ -14,7 +14,8 @@ displacements p elongate the sector uniformly by one unit of length. (Without th
 the reference ring on its ellipse, under a hoop tension of 180 N, has an error of 0.2
 micrometre.)
 
-The gradient and the tangent below are exact for dead forces F in the sector frame.
+The gradient and the tangent below are exact for forces F that do not change in the
+sector frame.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The 2D model of a design and the continuation of its equilibria."""
+"""Construction of the 2D model of a design, and what the model represents."""
 
 from __future__ import annotations
 
@@ -67,9 +67,10 @@ def can_halve(design: Design, *, bearing: bool = True) -> bool:
 def carries_bearing(design: Design) -> bool:
     """Whether the 2D model includes the ball bearing of the wave generator.
 
-    The outline of the wave generator must have two lobes and neither corners nor
-    straight segments, and the circular spline must be fixed: the rolling motion of the
-    balls is derived for an outer race that turns with the flexspline as the output.
+    The design must have a bearing, an outline of the wave generator with two lobes and
+    with neither corners nor straight segments, and a fixed circular spline: the rolling
+    motion of the balls is derived for an outer race that turns with the flexspline as
+    the output.
     """
     generator = design.wave_generator
     return (
@@ -81,11 +82,12 @@ def carries_bearing(design: Design) -> bool:
 
 
 def check_modelled(design: Design, model: str) -> None:
-    """Reject unknown models and designs that the 2D model cannot represent.
+    """Reject unknown models and designs that a 2D model cannot represent.
 
     Args:
         design: The drive.
-        model: Name of the model; only ``2d`` is accepted.
+        model: Fidelity of the model. Only ``2d`` is accepted: callers treat ``ring``
+            and ``3d`` separately.
 
     Raises:
         DesignError: If the model is not ``2d`` or the axes are misaligned; the message
@@ -141,7 +143,7 @@ def sector_model(
     cage_held: bool = False,
     profiles: Mapping[MemberName, ToothProfile] | None = None,
 ) -> SectorModel:
-    """Build the 2D model of a design.
+    """2D model of a design.
 
     Args:
         design: The drive.
@@ -152,7 +154,7 @@ def sector_model(
             ``circular_spline.outer_rim`` of the design fixes or frees its outer
             diameter.
         friction: Whether the flanks have the friction coefficient of the design; False
-            gives the model without friction, which is conservative.
+            gives a model without friction, which conserves energy.
         bearing: Whether to support the rim on the ball bearing of the wave generator,
             if the design has one that the 2D model can represent; False uses a rigid
             surface.
@@ -269,7 +271,7 @@ def indentation(
 
 
 def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
-    """Condense the sector of one tooth of a member.
+    """Condensed sector of one tooth of a member.
 
     Args:
         design: The drive.

@@ -164,7 +164,7 @@ class Linearised:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bore:
-    """Contact of the bore, with derivatives for the k dofs ``contact_dofs``."""
+    """Contact of the bore; its k degrees of freedom are ``contact_dofs``."""
 
     gap: Array
     normal: Array
@@ -290,7 +290,7 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     """Gap, normal and curvature at the stations, see ``wave_generator_gap``.
 
     If no station of an interval is in contact and the gap in its middle exceeds
-    :data:`FAR`, all its stations get the values of the middle: none can close.
+    :data:`FAR`, all its stations get the values of the middle: none is near contact.
     """
     stations, alpha = model.stations, state.wave_generator_angle
     points = model.bore_points(state)

@@ -47,7 +47,7 @@ class SectorModel:
     circular_spline: CircularSpline
     """Teeth of the circular spline, elastic or rigid."""
     lobe_height: float
-    """Radial deflection at the lobes [m]."""
+    """Radial deflection of the rim at the lobes [m]."""
     half: bool = False
     """Whether the model is half of the ring, which a rotation by 180 deg completes."""
     nonlinear: bool = True
@@ -312,7 +312,7 @@ class SectorModel:
         return np.asarray(force)
 
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
-        """Best-fit rotation [rad] of bore nodes (N, n_bore + 1, 2) and its gradient."""
+        """Best-fit rotation of bore nodes (N, n_bore + 1, 2) [rad] and its gradient."""
         x0 = self.reference[:, self.bore_nodes]
         sine = float(np.einsum("sni,sni->", rotate_right_angle(x0), nodes))
         cosine = float(np.einsum("sni,sni->", x0, nodes))

@@ -33,7 +33,7 @@ class StateFigures:
     tooth_moment: float = 0.0
     """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
     energy: float = 0.0
-    """Strain energy, whole drive [J]."""
+    """Elastic energy of the whole drive, including that of the contacts [J]."""
     compliance: float = 0.0
     """Tangent compliance -d(output rotation)/dT at the active contacts [rad/(N·m)]; NaN
     in a 3D model whose torque is not prescribed."""

@@ -125,7 +125,7 @@ def condense(
     width: float,
     confinement: float = 0.0,
 ) -> Superelement:
-    """Condense the mesh of a tooth sector.
+    """Condensed sector of a tooth from its mesh.
 
     Args:
         mesh: Mesh of the sector.
