@@ -140,7 +140,7 @@ def _turns(model: SectorModel) -> Array:
 def tooth_angles(model: SectorModel, state: State) -> Array:
     """Angles of the flexspline's teeth from the first lobe.
 
-    The places are those of teeth on the undeformed flexspline after its rotation.
+    They refer to the undeformed flexspline after its rotation.
 
     Args:
         model: The 2D model.

@@ -1,4 +1,4 @@
-"""Torque loops with tooth friction at a locked input, for the hysteresis."""
+"""Loops of torque against torsion with tooth friction, for the hysteresis."""
 
 from __future__ import annotations
 

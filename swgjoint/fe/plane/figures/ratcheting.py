@@ -12,8 +12,8 @@ would let the teeth ratchet at a lower torque.
 
 The result depends on the outside of the circular spline. If it is free (design key
 ``circular_spline.outer_rim = "free"``), the circular spline becomes oval and releases
-the teeth. If it is fixed, the teeth jam; the torque at which the search ends is then a
-lower bound for this model and is far above the strength of steel.
+the teeth. If it is fixed, the teeth jam. The torque at which the search ends is then a
+lower bound in this model, at stresses far above the strength of steel.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ SHORTEST = 1e-3
 """Step of the output below which the search ends, in tooth pitches [-]."""
 CIRCULAR_SPLINE_RANGE = 2.0
 """Largest accepted displacement of the circular spline, in lobe heights [-]. The error
-of its linear model is of second order in its rotation: a displacement of one lobe
-height at the pitch radius is a rotation of 0.02 to 0.04 rad, and its square amounts to
-a few percent of the tooth depth."""
+of its linear model is of second order in its rotation. A displacement of one lobe
+height at the pitch radius is a rotation of 0.02 to 0.04 rad, and the displacement of
+second order amounts to a few percent of the tooth depth."""
 ITERATIONS = 200
 """Largest number of iterations per equilibrium. A map needs at most 120, but close to
 the largest torque the contacts settle slowly."""
@@ -93,7 +93,7 @@ class RatchetingPath:
     def limit(self) -> float:
         """Largest torque of the path [N·m].
 
-        It is the ratcheting torque if :attr:`passed`, otherwise a lower bound of it. A
+        It is the ratcheting torque if :attr:`passed`, otherwise a lower bound on it. A
         parabola through the largest value and its neighbours gives the maximum.
         """
         k = int(self.torque.argmax())
