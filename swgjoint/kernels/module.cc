@@ -63,6 +63,9 @@ class Search {
             "flanks: (2 teeth, intervals, 4, 2)");
   }
 
+  // Feet of n points. Columns of real: gap, normal and rest in the mirrored sector
+  // frame, curvature, arc length, then normal and rest in the mirrored frame of the
+  // circular-spline tooth.
   void see(In<2> points, In<2> outward, Index sector, Index side, bool rigid,
            nb::object start, int steps, Out<2> real, MaskOut corner, IndexOut tooth) const {
     const std::size_t n = points.shape(0);
@@ -102,6 +105,7 @@ class Search {
     }
   }
 
+  // Refine the arc lengths of n minima in place.
   void refine(Out<1> station, In<3> mirrored, Index sector, Index side,
               double spacing) const {
     const std::size_t n = station.shape(0);
@@ -115,6 +119,7 @@ class Search {
   }
 
  private:
+  // Check that indices of sectors and sides are within the arrays.
   void check(std::size_t n, const Index& sector, const Index& side) const {
     require(sector.shape(0) == n && side.shape(0) == n, "sector, side: (n,)");
     const auto sectors = static_cast<std::int64_t>(angle_.shape(0));
