@@ -149,7 +149,7 @@ class CompiledSearch:
         """
         n, rigid = len(points), rigid or self.rigid
         # columns: gap, normal and rest in the mirrored sector frame, curvature, arc
-        # length, then normal and rest in the mirrored frame of the circular-spline tooth
+        # length, and normal and rest in the mirrored frame of the circular spline
         real, corner = np.empty((n, 11)), np.empty(n, dtype=np.bool_)
         tooth = np.empty(n, dtype=np.int64)
         self.search.see(
