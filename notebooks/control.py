@@ -11,18 +11,20 @@
 # ---
 
 # %% [markdown]
-# # What control can take off a strain wave joint
+# # How control reduces the errors of a strain wave joint
 #
-# A motor knows its own angle to a hundredth of an arcmin of the output, and yet the
-# link behind the drive is off by minutes: friction, wind-up, kinematic error. Here one
-# joint learns to deal with them, one at a time, and each step is judged by the figure
-# that it is made for. `swgjoint study control` does the same for ten specimens.
+# A motor encoder resolves the output angle to a hundredth of an arcmin, yet the link
+# behind the drive deviates from its command by several arcmin, because of friction,
+# torsion and kinematic error. This notebook compensates these errors of one joint one
+# after the other. Each step is judged by the figure that it is meant to improve.
+# `swgjoint study control` does the same for ten specimens.
 #
-# The drive is a CSG-25-100 by its catalogue: stiffness, ratings, friction. What the
-# controllers are *not* told is the specimen: a kinematic error with the peak to peak
-# that the catalogue allows, friction that is up to a fifth off, a tenth of the load.
-# Encoders round, are noisy, and tell what was 1 ms ago: the delay is known, so that a
-# reading is held against the plan of the instant at which it was taken.
+# The drive is a CSG-25-100 with the stiffness, ratings and friction of its catalogue.
+# The controllers do *not* know the specimen: its kinematic error has the peak to peak
+# that the catalogue allows, its friction deviates by up to 20 % from the nominal value,
+# and the load by up to 10 %. The encoders have finite resolution and noise, and their
+# readings are 1 ms old. The controllers know this delay: they compare each reading with
+# the plan of the instant at which it was taken.
 
 # %%
 import matplotlib.pyplot as plt
@@ -52,18 +54,20 @@ print(f"friction: {plant.friction.coulomb / drive.friction.coulomb:.2f} of the n
 
 
 def error(run):
-    """Link against command, in arcmin."""
+    """Link error: position minus command [arcmin]. Shape (n,)."""
     return (run.position - run.reference)[:, 0] / arcmin
 
 
 # %% [markdown]
-# ## A fast move: what feed-forward knows
+# ## A fast motion: what feed-forward improves
 #
-# 20 degrees in 0.7 s under 26 N·m. The loop on the motor alone leaves the load and the
-# friction to its error. With the torque of the rigid arm and the friction of the
-# catalogue the motor follows, but the link hangs behind by the wind-up of the drive.
-# The flexible plan asks the map where the motor must stand so that the *link* is
-# right: $\theta$ from $T$, its torque from $\ddot\theta$.
+# The joint moves by 20 degrees in 0.7 s under 26 N·m. A PD controller of the motor
+# alone needs a position error to produce the torque against load and friction. With
+# feed-forward of the torque of a rigid arm and of the catalogue friction, the motor
+# follows its command, but the link lags behind by the torsion of the drive. The plan of
+# a flexible joint uses the map to compute the motor angle $\theta$ for which the *link*
+# is at its commanded position under the torque $T$, and the motor torque from
+# $\ddot\theta$.
 
 # %%
 plans = {"PD": ideal_plan, "feed-forward": rigid_plan, "flexible": flexible_plan}
@@ -84,13 +88,13 @@ print({name: round(float(value), 3) for name, value in rms.items()}, "arcmin rms
 assert rms["flexible"] < 0.5 * rms["feed-forward"] < 0.5 * rms["PD"]
 
 # %% [markdown]
-# ## One slow turn: the fingerprint of a specimen
+# ## One slow turn: the kinematic error of a specimen
 #
-# What is left is the kinematic error: two waves in a turn of the wave generator, that
-# beat with those of the other member. A record of one turn with a noisy encoder on the
-# link, at twice the load, tells its harmonics. The record is taken on a drive whose
-# *random* part is another one: only what repeats from drive to drive of that mounting,
-# the low orders, can be compensated.
+# The remaining error is the kinematic error: two cycles per turn of the wave generator,
+# from each of the two toothed members, which beat with each other. Its harmonics are
+# identified from a record of one turn with a noisy link encoder, at twice the load. The
+# record is taken on a drive with a different *random* part of the error. Only the low
+# orders, which are the same in both drives, can therefore be compensated.
 
 # %%
 record = record_turn(drive, SEED)
@@ -103,7 +107,7 @@ true = {
 for pq, pair in zip(table.orders, table.amplitudes, strict=True):
     size = np.hypot(*pair) / arcmin
     print("{:+d} alpha {:+d} beta:".format(*pq), end=" ")
-    print(f"{size:.4f} arcmin, of this specimen {true[tuple(pq)]:.4f}")
+    print(f"{size:.4f} arcmin, true value of this specimen {true[tuple(pq)]:.4f}")
 
 slow = {
     "flexible": MotorPID(flexible_plan, frequency=FREQUENCY),
@@ -119,19 +123,20 @@ for name, run in turns.items():
     pp = np.ptp(off)
     angle = np.degrees(run.reference[run.steady, 0])
     axis.plot(angle, off - off.mean(), lw=0.6, label=f"{name}: {pp:.2f} arcmin pp")
-axis.set(xlabel="output [deg]", ylabel="link error, mean off [arcmin]")
+axis.set(xlabel="output [deg]", ylabel="link error without mean [arcmin]")
 axis.legend(loc="upper right")
 pp = [np.ptp(error(run)[run.steady]) for run in turns.values()]
 print(f"one-way positioning error: {100 * (1 - pp[1] / pp[0]):.0f} % less")
 assert pp[1] < 0.7 * pp[0]
 
 # %% [markdown]
-# ## Constant speed: learn what turns repeat
+# ## Constant speed: learning what repeats with every turn
 #
-# At 30 degrees a second two waves a turn are 17 Hz, half way to the resonance; an error
-# of a tenth of an arcmin becomes newton metres. Learning needs no table: every quarter
-# turn of the output it fits the harmonics of what is left of the link's error and adds
-# a motion that takes most of it away.
+# At 30 degrees per second, two cycles per turn of the wave generator are 17 Hz, halfway
+# to the resonance, and an error of a tenth of an arcmin causes a torque of the order of
+# a newton metre. Learning needs no error table. After every quarter turn of the output
+# it fits the harmonics of the remaining link error and adds a motion that cancels most
+# of it.
 
 # %%
 even = {
@@ -157,5 +162,6 @@ print({name: round(value, 4) for name, value in waves.items()}, "N·m at 2 per t
 assert waves["learning"] < 0.1 * waves["flexible"]
 
 # %% [markdown]
-# What no rung removes: the random part at single teeth, friction that changes its sign
-# with the speed, and whatever the encoders do not see.
+# None of these controllers removes the random part of the error, which comes from
+# single teeth, the friction that changes its sign with the speed, or anything that the
+# encoders do not measure.

@@ -11,12 +11,13 @@
 # ---
 
 # %% [markdown]
-# # Error against run time: how much model does a question need?
+# # Error against run time: how detailed must a model be?
 #
-# Every level of this package answers in its own time, from a rigid gear at hundreds of
-# times real time to finite elements at seconds a position. The art is to pay for the
-# digits that a question needs and for no others. Here both ladders are climbed: the
-# joint in a scene, and the finite elements behind its map.
+# The levels of this package differ widely in run time, from a rigid gear at hundreds of
+# times real time to finite elements that take seconds per position. A model should be
+# as accurate as the question requires, and no slower than that. This notebook measures
+# error and run time for two series of models: the levels of a joint in a scene, and the
+# finite elements from which its map is built.
 
 # %%
 import matplotlib.pyplot as plt
@@ -33,10 +34,10 @@ from swgjoint.view.validity import step_error
 # %% [markdown]
 # ## The joint: levels and steps
 #
-# One joint turns slowly under rated torque, with a map of few positions (six over a
-# pitch, a few seconds). The reference is level `full` at a sixteenth of a millisecond;
-# error is the largest difference of the transmission error from it, over the time after
-# the start has settled.
+# One joint turns slowly under rated torque. Its map is built from few positions (six
+# per pitch, a few seconds). The reference is level `full` with a step of 1/16 ms. The
+# error is the largest difference of the transmission error from this reference after
+# the initial transient.
 
 # %%
 drive = load_drive("reference-2d-simplified", model="2d", angles=6)
@@ -49,13 +50,13 @@ STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)
 
 
 def at(level, step):
-    """The scene at a level and a step."""
+    """Run of the scene at one level and step [s]."""
     changes = {"defaults.level": level, "simulation.step_s": step}
     return run_scene(scene.with_changes(changes), drives={name: drive})
 
 
 def grid(run):
-    """Transmission error at the instants that all runs share, settled [arcmin]."""
+    """Settled transmission error at the instants that all runs share [arcmin]."""
     stride = round(2e-3 / (run.time[1] - run.time[0]))
     return run.transmission_error[::stride, 0][250:] / arcmin
 
@@ -65,7 +66,7 @@ print(f"reference: {np.mean(reference):.3f} arcmin, swing {np.ptp(reference):.4f
 errors, speeds = {}, {}
 for level in LEVELS:
     for step in STEPS:
-        # the second of two runs: the first one also warms up
+        # the faster of two runs: the first one includes the warm-up
         run = min((at(level, step) for _ in range(2)), key=lambda found: found.wall)
         errors[level, step] = float(np.abs(grid(run) - reference).max())
         speeds[level, step] = run.time[-1] / run.wall
@@ -79,18 +80,19 @@ figure, axis = plt.subplots(figsize=(8, 4.5), layout="constrained")
 for level in LEVELS:
     x = [1.0 / speeds[level, step] for step in STEPS]
     axis.loglog(x, [errors[level, step] for step in STEPS], "o-", label=level)
-axis.set_xlabel("seconds of one core a simulated second")
-axis.set_ylabel("error of the link angle [arcmin]")
+axis.set_xlabel("CPU seconds per simulated second")
+axis.set_ylabel("error of the transmission error [arcmin]")
 axis.set_title("one joint at rated torque; steps 2, 1, 0.5 and 0.25 ms")
 axis.grid(alpha=0.3, which="both")
 axis.legend()
 
 # %% [markdown]
-# Without torsion (`rigid`, `kinematic`) the whole wind-up is missing, and no smaller
-# step helps. The spring of `linear` is the secant to rated torque and so right at just
-# this load; that of `native` bends with the torque and is 2 % off here. What both miss
-# is the error of the teeth. Only `full` goes on falling with the step: it is the one
-# whose error the step decides. At 2 ms it has lost the teeth, too, see below.
+# Without torsion (`rigid`, `kinematic`), the error is the whole torsion under load, and
+# a smaller step does not reduce it. The spring of `linear` is the secant stiffness at
+# rated torque and therefore correct at this load only; the nonlinear spring of `native`
+# is 2 % off here. Both neglect the kinematic error. Only with `full` does the error
+# keep decreasing with the step. At 2 ms, `full` has also lost the tooth orders, as
+# shown below.
 
 # %%
 assert errors["rigid", 1e-3] > errors["linear", 1e-3] > errors["full", 1e-3]
@@ -100,9 +102,9 @@ assert errors["rigid", 2.5e-4] > 0.99 * errors["rigid", 1e-3]
 # %% [markdown]
 # ## Orders that the step leaves out
 #
-# A harmonic that turns by more than half a radian a step is left out and listed, never
-# aliased. At 3 deg/s a step of 2 ms cannot carry the tooth order, 122 per turn of the
-# input; 1 ms can.
+# A harmonic whose phase advances by more than half a radian per step is left out and
+# listed, never aliased. At 3 deg/s a step of 2 ms cannot resolve the tooth order, 122
+# per turn of the input; a step of 1 ms can.
 
 # %%
 for step in STEPS:
@@ -116,8 +118,9 @@ for step in STEPS:
 # %% [markdown]
 # ## An error estimate without a reference
 #
-# A user has no reference. Half the step with the same orders tells what the step is
-# worth; the report has it beside every result.
+# In practice there is no reference. A second run with half the step and the same orders
+# gives an estimate of the error due to the step. The report states it next to every
+# result.
 
 # %%
 coarse = at("full", 1e-3)
@@ -130,9 +133,9 @@ assert fine["transmission_error_arcmin"] < estimate["transmission_error_arcmin"]
 # %% [markdown]
 # ## The finite elements
 #
-# Stress at the root and the wind-up under rated torque on ever finer meshes, one
-# position of the wave generator. The finest is the reference here; a study against an
-# independent code is in `validation.py`.
+# The next cell computes the stress at the tooth root and the torsion under rated torque
+# on increasingly fine meshes, at two positions of the wave generator. The finest mesh
+# is the reference here; `validation.py` compares the results with an independent code.
 
 # %%
 design = Design.load(name)
@@ -166,16 +169,17 @@ for k, (label, best) in enumerate(
 for mesh, wall in zip(MESHES[:-1], walls, strict=True):
     axis.axvline(wall, color="0.85", zorder=0)
     axis.text(wall, axis.get_ylim()[0], f" {mesh:g}", color="0.4", va="bottom")
-axis.set_xlabel("seconds, set-up and two positions of half the drive")
+axis.set_xlabel("time for set-up and two positions of half the drive [s]")
 axis.set_ylabel(f"difference from refinement {MESHES[-1]:g} [%]")
 axis.grid(alpha=0.3, which="both")
 axis.legend()
 
 # %% [markdown]
-# The mesh of the thesis (refinement 1) has the torsion within one percent, where the
-# stress at a root is still eight percent below that of the finest here, and ten below
-# that of refinement 2: a map for a joint is cheap, a fatigue figure is not. `swgjoint
-# bench fe` measures this ladder from thin rings to solids, with memory and Pareto
-# front, and names the cheapest setting within 1, 5 and 15 %; `swgjoint bench joint`
-# does it for levels, integrators and steps, and `swgjoint bench scaling` says how time
-# grows. What takes it is in `hot-paths.py`.
+# On the mesh of the thesis (refinement 1) the torsion is within one percent, but the
+# root stress is still eight percent below that of the finest mesh here and ten percent
+# below that of refinement 2. A map for a joint therefore needs only a coarse mesh, a
+# fatigue figure a fine one. `swgjoint bench fe` makes this comparison for all models
+# from thin rings to 3D elements, with memory and Pareto front, and names the cheapest
+# setting within 1, 5 and 15 %. `swgjoint bench joint` does it for levels, integrators
+# and steps, and `swgjoint bench scaling` shows how the time grows. `hot-paths.py` shows
+# which parts of the code take the time.

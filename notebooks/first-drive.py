@@ -13,9 +13,9 @@
 # %% [markdown]
 # # A first drive: from the teeth to a moving joint
 #
-# A strain wave gear is described in a text file. Here it becomes, step by step, two
-# tooth flanks, a deformed flexspline, a map of torsion and angles, and a joint of a
-# robot whose error can be measured.
+# A text file describes a strain wave gear. This notebook goes from that file to the
+# tooth flanks, the deformed flexspline, a map of torque against torsion and gear
+# angles, and finally to a robot joint whose error can be measured.
 
 # %%
 import matplotlib.pyplot as plt
@@ -32,8 +32,8 @@ from swgjoint.units import arcmin, deg, mm
 # %% [markdown]
 # ## The design
 #
-# The attributes of a design are the keys of its file, with their units. A changed copy
-# is checked like a file.
+# The attributes of a design are the keys of its file; their names include the unit. A
+# changed copy is checked in the same way as a file.
 
 # %%
 design = swgjoint.Design.load("reference-2d")
@@ -46,8 +46,8 @@ print(f"rated {ratings.rated_torque:g} NÂ·m, peak {ratings.repeated_peak:.4g} NÂ
 # %% [markdown]
 # ## The teeth
 #
-# Flanks are chains of arcs and a straight line, known exactly: points, normals and
-# curvature at any arc length.
+# Each flank is a chain of arcs and a straight line. Points, normals and curvature are
+# known exactly at any arc length.
 
 # %%
 figure, axes = plt.subplots(figsize=(6, 3.5))
@@ -65,8 +65,8 @@ axes.legend()
 # ## Meshing
 #
 # The wave generator deflects the flexspline, the teeth engage, the torque is applied,
-# then the wave generator turns. Here it moves over one tooth pitch of the circular
-# spline, after which everything repeats.
+# and then the wave generator turns. Here it turns by the angle of one tooth pitch of
+# the circular spline; after that everything repeats.
 
 # %%
 pitch = 1.0 / design.drive.teeth_circular_spline
@@ -84,7 +84,8 @@ lower.plot(angle, error - error.mean(), ".-")
 lower.set(xlabel="wave-generator angle [deg]", ylabel="output error [arcmin]")
 
 # %% [markdown]
-# Energy is the judge: the mean torque on the wave generator is T/i.
+# The energy balance is a check of the solution: the mean torque on the wave generator
+# must be T/i.
 
 # %%
 input_torque = meshing.series("wave_generator_torque")
@@ -95,9 +96,10 @@ assert abs(input_torque.mean() / ideal - 1.0) < 0.005
 # %% [markdown]
 # ## The map
 #
-# Samples over one pitch and both signs of torque become a potential. It takes about
-# half a minute and is kept in the cache. Torque and stiffness are its derivatives, so
-# that the joint can neither create nor lose energy by them.
+# The map is a potential energy, fitted to samples over one pitch and for both signs of
+# the torque. It takes about half a minute and is then stored in the cache. Torque and
+# stiffness are derivatives of the potential, so this part of the joint can neither
+# create nor dissipate energy.
 
 # %%
 drive = swgjoint.build_map(design)
@@ -112,8 +114,8 @@ print(f"{len(drive.orders) - 1} harmonics, lowest {drive.orders[1][0]} per input
 # %% [markdown]
 # ## A joint of any arm
 #
-# `attach` edits a MuJoCo model: the joint gets a rotor and the drive between them. The
-# bench has one joint and no actuator, so a torque on the link just winds the drive up.
+# `attach` edits a MuJoCo model: the joint gets a rotor, and the drive connects rotor
+# and link. The bench has one joint and no actuator.
 
 # %%
 spec = mujoco.MjSpec.from_file(str(models_path() / "arms" / "bench.xml"))
@@ -127,8 +129,8 @@ print(f"torsion mode at {joint.natural_frequency / (2 * np.pi):.0f} Hz")
 # %% [markdown]
 # ## A scene
 #
-# The bench turns at 3 deg/s under its rated load. The drive's error is what a rigid
-# joint never shows.
+# The bench turns at 3 deg/s under its rated load. A rigid joint would show none of the
+# errors that the drive causes.
 
 # %%
 scene = Scene.load_file("bench").with_changes({"simulation.duration_s": 3.0})

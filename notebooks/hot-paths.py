@@ -11,15 +11,16 @@
 # ---
 
 # %% [markdown]
-# # What takes the time
+# # Where the computing time goes
 #
-# Three programs make up most of what a user waits for: the equilibria behind a map in
-# the plane, a simulation of meshing in space, and the steps of an arm. Each is profiled
-# here on the machine that runs this page, and set beside the same program of an older
-# commit, measured in turns (`tests/benchmarks/profile_cost.py`). There are two such
-# pairs, of the run in space one, on two cores that other programs shared: one ratio may
-# be a third above the other, and what lies near one or on both sides of it is no
-# difference.
+# Three programs take most of the time for which a user waits: the equilibria from which
+# a 2D map is built, a 3D simulation of meshing, and the time steps of an arm. Each of
+# them is profiled here on the machine that runs this notebook, and compared with an
+# older commit. The two commits were measured alternately
+# (`tests/benchmarks/profile_cost.py`), on two cores shared with other programs: one
+# pair of measurements for the 3D run, two pairs for the other two programs. The ratios
+# of two pairs differ by up to a third. Ratios close to one, or on both sides of one,
+# therefore show no difference.
 
 # %%
 import cProfile
@@ -47,14 +48,18 @@ for task, one in stored["tasks"].items():
 
 # %%
 def profiled(work):
-    """CPU time by function, with what it calls."""
+    """CPU time of each function including the functions that it calls [s]."""
     profile = cProfile.Profile(time.process_time)
     profile.runcall(work)
     return {key: row[3] for key, row in pstats.Stats(profile).stats.items()}
 
 
 def seconds(times, file, *functions):
-    """Of functions that do not call one another; of those of one name the outermost."""
+    """Total CPU time of functions of one file [s].
+
+    The functions must not call one another. Of several functions with the same name
+    the slowest counts, which contains the others.
+    """
     found = dict.fromkeys(functions, 0.0)
     for (path, _, name), value in times.items():
         if path.endswith(file) and name in found:
@@ -63,7 +68,7 @@ def seconds(times, file, *functions):
 
 
 def bars(axis, parts, title):
-    """Shares of a whole, the largest first."""
+    """Draw the shares of the total CPU time, the largest at the top."""
     names = sorted(parts, key=parts.get)
     whole = sum(parts.values())
     axis.barh(names, [100.0 * parts[name] / whole for name in names])
@@ -71,35 +76,39 @@ def bars(axis, parts, title):
 
 
 def pairs(axis, task, title):
-    """Time over that before by part; a dot is one pair of runs in turns."""
+    """Draw the time of each part divided by that of the older commit.
+
+    A dot is one pair of measurements.
+    """
     parts = stored["tasks"][task]["parts"]
     for k, one in enumerate(parts.values()):
         axis.plot([k] * len(one["ratios"]), 1.0 / np.array(one["ratios"]), "ko")
     axis.margins(x=0.2)
     axis.axhline(1.0, color="0.6", label="before")
     axis.set_xticks(range(len(parts)), parts, fontsize=8, rotation=15)
-    axis.set(ylabel="time over that before", title=title, ylim=(0.0, 1.4))
+    axis.set(ylabel="time / time before", title=title, ylim=(0.0, 1.4))
     axis.legend(fontsize=8, loc="lower right")
 
 
 def commit(task):
-    """That of the time before."""
+    """Hash of the older commit of a task."""
     return stored["tasks"][task]["before"].split()[0]
 
 
 def page(task, shares, title):
-    """Both plots beside each other."""
+    """Draw shares and comparison next to each other."""
     _, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
     bars(axes[0], shares, f"{title} now")
     pairs(axes[1], task, f"{title}, against {commit(task)}")
 
 
 # %% [markdown]
-# ## A map in the plane
+# ## A 2D map
 #
-# `reference-2d`, two positions over a pitch at all torques, no cache. A Newton step
-# condenses the ring of sectors, which is a banded factorisation, and looks where teeth
-# touch, which is not linear algebra at all: feet of points on curved flanks.
+# The map is that of `reference-2d` with two positions per pitch, all torques and no
+# cache. Each Newton step condenses the ring of sectors, which is a banded
+# factorisation, and searches for tooth contact, which projects points onto curved
+# flanks.
 
 # %%
 design = swgjoint.Design.load("reference-2d")
@@ -116,24 +125,24 @@ plane = {
     "sector: mesh, condense": seconds(times, "superelement.py", "condense"),
 }
 plane["rest"] = whole - sum(plane.values())
-page("2d map", plane, "map in the plane")
+page("2d map", plane, "2D map")
 for name, value in plane.items():
     print(f"{name:26} {value:6.2f} s, {100 * value / whole:4.1f} %")
 
 # %% [markdown]
-# The search of contact is the largest part. It evaluated the flank piece by piece, arc
-# after line after arc; as a table of numbers all points go at once. In the two pairs
-# the map took 6 and 46 % longer before: it is faster, and two pairs do not tell by how
-# much.
+# The search for contact takes the largest share. In the older commit it evaluated the
+# flank piece by piece, arc after line after arc; now it evaluates all points at once
+# from a table. In the two pairs, the older commit took 6 and 46 % longer. The new
+# search is faster, but two pairs do not show by how much.
 
 # %%
 assert plane["search of tooth contact"] > plane["contact forces"]
 
 # %% [markdown]
-# ## A run in space
+# ## A 3D run
 #
-# A small gear, half of it, on the coarsest mesh: condensation, deflection, load, one
-# position, stresses.
+# The drive is half of a small gear on the coarsest mesh. The run consists of
+# condensation, deflection, load, one position and stresses.
 
 # %%
 small = swgjoint.Design.load("reference-3d-modified").with_changes(
@@ -147,8 +156,8 @@ small = swgjoint.Design.load("reference-3d-modified").with_changes(
 )
 
 
-def run_in_space():
-    """As many positions as a profile needs."""
+def run_3d():
+    """Simulate one position and its stresses."""
     ring = solid_sector_model(small, half=True)
     follow = SolidContinuation(model=ring, ratio=small.ratio)
     state = follow.to_torque(follow.engage(follow.deflect()), 5.0)
@@ -157,7 +166,7 @@ def run_in_space():
     return SolidMaxima.from_state(ring, state)
 
 
-times = profiled(run_in_space)
+times = profiled(run_3d)
 whole = max(times.values())
 space = {
     "condensation of sectors": seconds(times, "drive3d.py", "solid_sector_model"),
@@ -167,27 +176,27 @@ space = {
     "stresses": seconds(times, "solid/stress.py", "at"),
 }
 space["rest"] = whole - sum(space.values())
-page("3d run", space, "run in space")
+page("3d run", space, "3D run")
 for name, value in space.items():
     print(f"{name:26} {value:6.2f} s, {100 * value / whole:4.1f} %")
 
 # %% [markdown]
-# Condensing the sectors is done once and the same for any number of positions; after
-# that the dense blocks of the ring, the tangents of its segments and the search of
-# contact share the time. No part is more than 14 % faster or slower than it was in the
-# one pair there is, which is no difference.
+# The sectors are condensed once for any number of positions. The remaining time is
+# shared by the dense blocks of the ring, the tangents of its segments and the search
+# for contact. In the only pair of measurements no part is more than 14 % faster or
+# slower than before, so there is no significant difference.
 
 # %% [markdown]
 # ## A step of a joint
 #
-# Six joints in a chain, one step of 1 ms. Levels differ by what they add to the rigid
-# chain: a rotor and a tendon (`native`), and the map (`full`), here with ever more
-# harmonics.
+# Six joints in a chain make steps of 1 ms. The levels differ in what they add to the
+# rigid chain: `native` adds a rotor and a tendon, and `full` also the map, here with an
+# increasing number of harmonics.
 
 
 # %%
 def step_time(**keys):
-    """Least CPU time of a step over some runs [µs]."""
+    """Lowest CPU time of a step in five runs [µs]."""
     model, data = chain_model(6, **keys)
     mujoco.mj_step(model, data, 200)
     least = []
@@ -204,7 +213,7 @@ full = {n: step_time(harmonics=n) for n in harmonics}
 figure, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
 names = ["rigid", "native", *(f"full, {n}" for n in harmonics)]
 axes[0].bar(names, [rigid, native, *full.values()], color="0.7")
-axes[0].bar(names, [rigid] * len(names), label="the arm itself")
+axes[0].bar(names, [rigid] * len(names), label="share of the rigid arm")
 axes[0].set(ylabel="CPU time of a step [µs]", title="six joints, harmonics of the map")
 axes[0].tick_params(axis="x", labelsize=8)
 axes[0].legend(fontsize=8)
@@ -214,12 +223,12 @@ print(f"rotors and tendons {native - rigid:.1f} µs, map {full[16] - native:.1f}
 print({n: f"{value:.1f} µs" for n, value in full.items()})
 
 # %% [markdown]
-# The map is the dearest part of `full`: more than the rotors, which double the degrees
-# of freedom, and their tendons, which `native` has as well. A few harmonics cost little
-# more than one, because four are summed side by side. How
-# all this grows with teeth, mesh and joints is what `swgjoint bench scaling` measures;
-# counts of iterations, factorisations and map evaluations are asserted in
-# `tests/test_counts.py`.
+# The map is the most expensive part of `full`. It costs more than the rotors, which
+# double the degrees of freedom, and their tendons, which `native` has as well. A few
+# harmonics cost little more than one, because four are summed in parallel. `swgjoint
+# bench scaling` measures how the time grows with teeth, mesh and joints;
+# `tests/test_counts.py` checks the numbers of iterations, factorisations and map
+# evaluations.
 
 # %%
 last = {k: v["after_s"] for k, v in stored["tasks"]["joint step"]["parts"].items()}

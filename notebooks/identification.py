@@ -13,11 +13,11 @@
 # %% [markdown]
 # # From the log of a test bench to a drive in a scene
 #
-# A drive stands on a bench: its motor swings the link there and back while a brake
-# loads it, and a logger writes time, both angles and both torques. Here the bench is
-# the simulator, with a drive whose hysteresis and kinematic error no catalogue states,
-# and sensors with noise. The same lines take the file of a real bench; on the command
-# line it is `swgjoint identify bench.csv --teeth 200/202 --rated 87 --out found`.
+# On a test bench, a motor moves the link of a drive back and forth while a brake loads
+# it, and a logger records time, both angles and both torques. Here the bench is a
+# simulation with noisy sensors. Its drive has hysteresis and a kinematic error that no
+# catalogue states. The same lines read the file of a real bench; the corresponding
+# command is `swgjoint identify bench.csv --teeth 200/202 --rated 87 --out found`.
 
 # %%
 from dataclasses import replace
@@ -93,7 +93,7 @@ rng = np.random.default_rng(0)
 
 
 def logged(signal: np.ndarray, deviation: float) -> np.ndarray:
-    """Mean over every sample's period, with noise."""
+    """Mean of a signal over each sampling period, with noise."""
     mean = 0.5 * (signal[1:, 0] + signal[:-1, 0])
     return mean + deviation * rng.normal(size=len(mean))
 
@@ -103,20 +103,21 @@ columns = {
     "motor_angle_rad": logged(run.motor_position, 1e-5),
     "link_angle_rad": logged(run.position, 2e-6),
     "output_torque_Nm": logged(run.output_torque, 0.5),
-    # a run has the torque of the motor beside the state that it led to
+    # a run stores the motor torque together with the state to which it led
     "motor_torque_Nm": run.motor_torque[1:, 0]
     + 5e-3 * rng.normal(size=len(run.time) - 1),
 }
 
 # %% [markdown]
-# ## Parameters with their intervals
+# ## Identified parameters and their confidence intervals
 #
-# The torques at which the stiffness changes are those of the catalogue, as are the
-# teeth; all else comes from the log. The intervals tell what noise does, not what the
-# averages leave out: this motor turns at up to 107 rad/s, its error of 4 per turn by
-# 2 rad in the 5 ms that are the default window, which puts hysteresis, viscous friction
-# and inertia 2 to 3 % off, outside their intervals (a note says so). A window of 1 ms
-# leaves 0.6 % at most, in narrower intervals.
+# The numbers of teeth and the torques at which the stiffness changes are those of the
+# catalogue; everything else comes from the log. The intervals include the effect of
+# noise, but not that of averaging over a time window. This motor turns at up to 107
+# rad/s, so that within the default window of 5 ms the phase of its error at 4 per turn
+# advances by 2 rad. With this window hysteresis, viscous friction and inertia would be
+# 2 to 3 % off and outside their intervals (a note in the result says so). The window of
+# 1 ms used here leaves errors of at most 0.6 %, with narrower intervals.
 
 # %%
 with TemporaryDirectory() as folder:
@@ -156,10 +157,11 @@ plt.axis("off")
 plt.show()
 
 # %% [markdown]
-# ## The found drive in a scene of its own
+# ## The identified drive in another scene
 #
-# Another motion, a chirp to 4 Hz under a constant load: the drive as the catalogue has
-# it, the found one, and the true one that the bench never told us.
+# In another motion, a chirp to 4 Hz under a constant load, three drives are compared:
+# the drive of the catalogue, the identified one, and the true one, which was not known
+# to the identification.
 
 # %%
 other = {
@@ -177,7 +179,7 @@ for name, drive in drives.items():
 for name in ("catalogue", "found"):
     plt.plot(got.time, error[name] - error["true"], label=name, lw=1)
 plt.xlabel("time [s]")
-plt.ylabel("link, off that of the true drive [arcmin]")
+plt.ylabel("link angle minus that of the true drive [arcmin]")
 plt.legend()
 plt.show()
 missed = {k: float(np.std(error[k] - error["true"])) for k in ("found", "catalogue")}

@@ -11,21 +11,21 @@
 # ---
 
 # %% [markdown]
-# # What micro-geometry buys
+# # The benefit of micro-geometry
 #
-# A cup is bent open by the wave generator like a cone: its open edge moves out further
-# than its closed one. A straight wave generator and straight teeth then bear on their
-# edges. Crowning takes material off both edges of a face, slope follows the cone.
-# Tenths of a millimetre at most, and yet the difference between a gear and scrap.
+# The wave generator deflects a cup into a slightly conical shape: its open edge moves
+# outwards more than its closed one. A straight wave generator and straight teeth then
+# bear on their edges. Crowning removes material at both edges of a face, and slope
+# follows the cone. Both amount to at most a tenth of a millimetre, but they decide
+# whether the gear is usable.
 #
-# The cup is `reference-3d` of the thesis, 120 and 122 teeth, 20 N·m; the relief is that
-# of `reference-3d-modified`: 100 µm of crowning and 90 µm of slope on the wave
-# generator, 45 µm of crowning on the flexspline. Five variants in space take ten
-# minutes of one core, so they are read from a file, which
+# The cup is `reference-3d` of the thesis with 120 and 122 teeth at 20 N·m. The relief
+# is that of `reference-3d-modified`: 100 µm of crowning and 90 µm of slope on the wave
+# generator, 45 µm of crowning on the flexspline. Computing the five variants in 3D
+# takes ten minutes on one core, so this notebook reads the results from a file. The
+# following command writes it:
 #
 #     python tests/benchmarks/micro_geometry.py notebooks/micro-geometry.json
-#
-# writes again.
 
 # %%
 import json
@@ -49,7 +49,7 @@ COLORS = dict(
 )
 
 # %% [markdown]
-# The file belongs to these designs: their content is the same.
+# The next cell checks that the file was computed for the bundled design.
 
 # %%
 initial, improved = (
@@ -66,10 +66,11 @@ print(
 # %% [markdown]
 # ## The cone
 #
-# Outward displacement of the bore at the two ends of the teeth, on the wave generator
-# alone, at the major axis. A straight one holds the closed edge at its full 1 mm, and
-# the open edge goes beyond it by 0.16 mm; one with slope or crowning lets the closed
-# edge stay back, where the cup is stiffest.
+# The numbers below are outward displacements of the bore at the major axis, at both
+# ends of the teeth, with the flexspline on its wave generator and without teeth in
+# contact. A straight wave generator holds the closed edge at the full 1 mm, and the
+# open edge moves 0.16 mm further. A wave generator with slope or crowning lets the
+# closed edge, where the cup is stiffest, move out less.
 
 # %%
 for name, found in variants.items():
@@ -81,12 +82,13 @@ for name, found in variants.items():
     )
 
 # %% [markdown]
-# ## Where it bears
+# ## Where the contact forces act
 #
-# Force of the teeth and of the wave generator over the face width, all teeth together,
-# at 20 N·m. Straight parts carry on their edges, the teeth on the open one. Each face
-# needs relief of its own: crowned teeth leave the wave generator on its edges, a
-# crowned wave generator leaves the teeth there, and slope alone moves neither.
+# The plots show the forces of the teeth and of the wave generator over the face width,
+# summed over all teeth, at 20 N·m. Straight parts carry the load at their edges,
+# straight teeth at the open edge. Each of the two contacts needs its own relief:
+# crowned teeth leave the force of the wave generator at its edges, a crowned wave
+# generator leaves the force of the teeth at theirs, and slope alone moves neither.
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
@@ -97,13 +99,13 @@ for axis, (key, title) in zip(axes, keys.items(), strict=True):
         share = 100.0 * force / force.sum()
         axis.plot(found["z_mm"], share, "o-", ms=4, color=COLORS[name], label=name)
     axis.set(xlabel="z [mm], open edge on the left", ylabel="share of the force [%]")
-    axis.set_title(f"{title}, plane by plane of the mesh")
+    axis.set_title(f"{title}, by plane of the mesh")
     axis.grid(alpha=0.3)
 axes[0].legend(fontsize="small")
 
 
 def on_edges(found, key):
-    """Share of the two outermost planes."""
+    """Share of the force in the two outermost planes of the mesh [-]."""
     force = np.array(found[key])
     return float((force[0] + force[-1]) / force.sum())
 
@@ -117,24 +119,27 @@ for name, found in variants.items():
     )
 
 # %% [markdown]
-# The forces themselves tell more than their place. 20 N·m need about 0.2 kN at the
-# flanks of half of the drive; without relief the coned cup wedges its teeth and they
-# carry more than twice that. The wave generator bends the cup straight with 6 kN and
-# carries 0.5 kN once it follows the cone: that is a life of its bearing.
+# The size of the forces matters even more than their position. A torque of 20 N·m
+# requires about 0.2 kN at the flanks of half of the drive. Without relief the coned cup
+# wedges its teeth, and they carry more than twice that force. A straight wave generator
+# carries 6 kN because it bends the cup straight; one that follows the cone carries 0.5
+# kN, which extends the life of its bearing considerably.
 
 # %%
 force = {name: sum(found["wave_generator_force_N"]) for name, found in variants.items()}
 assert force["all"] < 0.2 * force["none"]
 
 # %% [markdown]
-# ## What it does to the stress
+# ## Effect on the stress
 #
-# Largest nodal stress of the flexspline, mean over two positions. Compressive and von
-# Mises stress sit beside the contact, the tensile one in the root: that is what fatigue
-# asks for. Crowned teeth take two thirds off the contact and nearly nothing off the
-# root; slope or crowning of the wave generator halve the root, because they let the cup
-# bend where it wants to. Together they bring the root to a third; the contact is not as
-# mild as under crowned teeth alone, since one plane of the mesh has most of it.
+# The bars show the largest nodal stress of the flexspline, as a mean over two
+# positions. Compressive and von Mises stress are largest next to the contact; the
+# tensile stress, which determines fatigue, is largest in the root. Crowned teeth reduce
+# the contact stress by two thirds and the root stress by almost nothing. Slope or
+# crowning of the wave generator halve the root stress, because they let the cup take
+# its natural conical shape. All three together reduce the root stress to a third. The
+# contact stress is then higher than with crowned teeth alone, because one plane of the
+# mesh carries most of the force.
 
 # %%
 kinds = ("tensile", "compressive", "von_mises")
@@ -164,13 +169,12 @@ assert both["tensile"] < 0.4 * none["tensile"]
 assert all(on_edges(variants["all"], key) < 0.05 for key in keys)
 
 # %% [markdown]
-# ## And its price
+# ## Its price
 #
-# Teeth that no longer wedge at the edge leave the output free for a moment: the
-# improved drive has play (1.14 mrad at this centre distance) and then rises from 1.0e5
-# to 2.0e5 N·m/rad, where the initial one starts at 1.66e5 without any. For a robot that
-# is the question, not the stress alone. As a joint:
+# Teeth that no longer wedge at the edge have play: 1.14 mrad at this centre distance.
+# Beyond the play the stiffness of the improved drive rises from 1.0e5 to 2.0e5 N·m/rad,
+# while the initial drive starts at 1.66e5 N·m/rad and has no play. For a robot the play
+# is as important as the stress. The following command compares both drives as joints.
+# It builds two 3D maps (a quarter of an hour each), which are then stored in the cache:
 #
 #     swgjoint compare reference-3d reference-3d-modified --scene bench --out relief
-#
-# which builds two maps in space (a quarter of an hour each, then kept).

@@ -13,22 +13,24 @@
 # %% [markdown]
 # # A learned policy against the ripple of a joint
 #
-# A strain wave gear makes ripple: its kinematic error comes back twice and four times
-# per turn of the wave generator, and the torque at the output follows. In the
-# environment `RippleSuppression-v0` a servo drive turns the joint at constant speed
-# under load, and a policy may add a little torque to the motor. It reads the motor's
-# encoder, a torque sensor at the output, and knows speed and load; readings have
+# The kinematic error of a strain wave gear repeats two and four times per turn of the
+# wave generator and causes a torque ripple at the output. In the environment
+# `RippleSuppression-v0` a servo drive turns the joint at constant speed under load, and
+# a policy may add a small torque to that of the motor. The policy observes the motor
+# encoder, a torque sensor at the output, speed and load. The readings have finite
 # resolution, noise and a delay of one millisecond.
 #
-# The policy is small, two layers of 32 tanh units, and was trained by PPO (Schulman et
-# al. 2017, arXiv:1707.06347) in `training/train_ripple_policy.py`, which needs torch,
-# in about 6 minutes of one core, always on the same drive and with one seed. It is the
-# third run: two before it, with another reward and without the harmonics of the gear's
-# angles among the inputs, learned little (ripple 1.05 to 0.72 %), and led to both. What
-# is stored is the best point of the curve below. Here its numbers are replayed with
-# numpy alone. When it was trained, the drive's error had the phases and peak to peak of
-# the drive here, but amplitudes as 3, 3, 2, 2 (here those of finite elements, as 1,
-# 0.98, 0.46, 0.48), and the loop alone left a ripple of 1.07 %.
+# The policy is a small network with two layers of 32 tanh units.
+# `training/train_ripple_policy.py` trained it with PPO (Schulman et al. 2017,
+# arXiv:1707.06347) in about 6 minutes on one core, always on the same drive and with
+# one seed; the script needs torch. It is the third training run. Two earlier runs, with
+# another reward and without the harmonics of the gear angles among the inputs, learned
+# little (ripple 1.05 to 0.72 %) and led to both changes. The stored policy is the best
+# point of the learning curve below; this notebook evaluates it with numpy alone.
+#
+# The kinematic error has changed since the training: phases and peak to peak are the
+# same, but the amplitudes had the ratios 3, 3, 2, 2 (now 1, 0.98, 0.46, 0.48 from
+# finite elements), and the ripple without the policy was 1.07 %.
 
 # %%
 import csv
@@ -47,9 +49,9 @@ print(f"numbers in the policy: {sum(x.size for x in policy.values())}")
 # %% [markdown]
 # ## Learning curve
 #
-# Every point is the mean of 32 episodes with seeds that training does not use, of the
-# policy without its exploration noise. The dashed line is the servo drive's own loop,
-# without any added torque.
+# Each point is the mean over 32 episodes of the policy without exploration noise, with
+# seeds that the training does not use. The dashed line is the servo drive alone,
+# without added torque.
 
 # %%
 with open(ripple_policy.folder / "ripple-policy.csv", newline="") as file:
@@ -72,11 +74,11 @@ fig.tight_layout()
 plt.show()
 
 # %% [markdown]
-# ## Against the loop alone
+# ## Comparison with the servo loop alone
 #
-# A dozen fresh seeds, for the drive on which the policy was trained and for specimens
-# of it: other stiffness, friction and size of the error, and above all an error that
-# begins elsewhere in its cycle, as after every assembly.
+# Twelve new seeds are used for the drive on which the policy was trained, and for other
+# specimens of it. These differ in stiffness, friction and size of the error, and above
+# all in its phase, which changes with every assembly.
 
 # %%
 seed = 20_000
@@ -92,20 +94,18 @@ for name, keys in cases.items():
         print(f"{'':27s}{reward:>16s}{torque:>18s} %{error:>15s} arcmin")
     better = np.mean(figures["with the policy"][1] < figures["loop alone"][1])
     less = 1.0 - figures["with the policy"][1].mean() / figures["loop alone"][1].mean()
-    print(
-        f"{'':27s}ripple lower in {better:.0%} of the episodes, by {less:.0%} on mean"
-    )
+    print(f"{'':27s}ripple lower in {better:.0%} of episodes, mean lower by {less:.0%}")
 
 # %% [markdown]
-# ## Where the ripple goes
+# ## Orders of the ripple
 #
-# One motion, once with the loop alone and once with the policy: torque behind the
-# drive over the angle of the wave generator, and its orders.
+# One motion is simulated with the servo loop alone and with the policy. The plots show
+# the torque behind the drive over the angle of the wave generator, and its orders.
 
 
 # %%
 def record(with_policy):
-    """Motor angle and torque ripple of the steady part of one episode."""
+    """Motor angle [rad] and torque ripple [N·m] in the steady part of one episode."""
     env = gymnasium.make_vec(ENVIRONMENT, 1, **ARGUMENTS)
     observation, _ = env.reset(seed=seed)
     rows = []
@@ -135,11 +135,12 @@ fig.tight_layout()
 plt.show()
 
 # %% [markdown]
-# ## What it learned
+# ## What the policy learned
 #
-# On the drive of its training the policy takes most of the ripple away at both orders.
-# On specimens it does not beat the loop alone: it learned where the error of one drive
-# lies in its cycle, not how to find out. A compensation that is identified on each
-# joint, as in the notebook `control`, has no such trouble. To train on specimens, add
-# `"randomise": True` to the arguments in `training/ripple_policy.py`; a network with a
-# memory, or one that sees a longer history, would then have something to identify.
+# On the drive of its training the policy removes most of the ripple at both orders. On
+# other specimens it is no better than the servo loop alone: it learned the phase of the
+# error of one drive, not how to identify it. A compensation that is identified on each
+# joint, as in the notebook `control`, does not have this limitation. To train on random
+# specimens, add `"randomise": True` to the arguments in `training/ripple_policy.py`.
+# The task would then also need a network with memory or with a longer history as input,
+# so that the policy could identify the phase.

@@ -13,13 +13,14 @@
 # %% [markdown]
 # # Does this arm meet its spec? Drives for a UR5e that carries 5 kg
 #
-# A robot designer has an arm, a motion, a payload and a list of limits, and asks which
-# drives to buy. Here every joint gets the same catalogue drive first, then each joint
-# is asked what it costs, then the money goes where it matters.
+# A robot designer has an arm, a motion, a payload and a list of limits, and must choose
+# the drives. In this notebook all joints first get the same catalogue drive. The next
+# step determines how much each joint contributes to the error of the tool. Larger
+# drives are then used only where they improve the result most.
 #
-# The arm, its links and its motion are those of the bundled scene `ur5e-catalogue`;
-# 5 kg hang 60 mm in front of the flange. The maps come from the stiffness, ratings and
-# losses that a catalogue states, so nothing has to be built.
+# Arm and motion are those of the bundled scene `ur5e-catalogue`, with a payload of 5 kg
+# mounted 60 mm in front of the flange. The maps follow directly from the stiffness and
+# the ratings that the catalogue states, without finite elements.
 
 # %%
 from itertools import pairwise
@@ -39,10 +40,10 @@ scene = Scene.load_file("ur5e-catalogue").with_changes(LOAD)
 # %% [markdown]
 # ## The limits
 #
-# What `swgjoint compare --spec FILE` reads from a file with a table `[spec]`. Torques
-# count against the ratings of each drive: the peak against the repeated peak torque,
-# the cubed mean against the rated one, as a catalogue asks for. The tool may leave its
-# path by 0.8 mm rms.
+# `swgjoint compare --spec FILE` reads such limits from a table `[spec]` of a file.
+# Torques are compared with the ratings of each drive as the catalogue specifies: the
+# peak torque with the repeated peak torque, the cubic mean torque with the rated
+# torque. The rms deviation of the tool from its path is limited to 0.8 mm.
 
 # %%
 spec = {
@@ -54,8 +55,9 @@ spec = {
 # %% [markdown]
 # ## One size for all joints
 #
-# The smallest sizes carry the arm, but not the payload; the next ones carry it, but
-# wind up too far. Ratings alone would have chosen too small a drive.
+# The smallest sizes can carry the arm, but not the payload. The next larger ones can
+# carry it, but their torsion is too large. A selection by ratings alone would therefore
+# have chosen drives that are too small.
 
 # %%
 sizes = ("CSG-14-100", "CSG-17-100", "CSG-20-100", "CSG-25-100", "CSG-32-100")
@@ -65,14 +67,14 @@ for row in rows:
     print(
         f"{row.argument:12}  {row.peak_torque_of_rating:4.2f}"
         f"  {row.cubed_mean_torque_of_rating:4.2f}  {row.tool_path_rms_mm:9.3f}"
-        f"  {row.torsion_arcmin:16.2f}  misses: {', '.join(row.missed) or 'nothing'}"
+        f"  {row.torsion_arcmin:16.2f}  misses: {', '.join(row.missed) or 'no limit'}"
     )
 
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained", sharey=True)
 titles = (
     "peak torque / repeated peak",
-    "cubic mean torque / rated torque",
-    "tool path error, rms [mm]",
+    "cubic mean torque / rated",
+    "tool off its path, rms [mm]",
 )
 for axis, (key, limit), title in zip(axes, spec.items(), titles, strict=True):
     values = [getattr(row, key) for row in rows]
@@ -88,8 +90,8 @@ for axis, (key, limit), title in zip(axes, spec.items(), titles, strict=True):
 axes[0].invert_yaxis()
 
 # %% [markdown]
-# Torsion falls with every size, as the stiffness grows with about the cube of the
-# diameter; the same load finds a stiffer spring.
+# Torsion decreases with every size, because the stiffness grows with about the cube of
+# the diameter while the load stays the same.
 
 # %%
 for small, large in pairwise(rows):
@@ -97,11 +99,11 @@ for small, large in pairwise(rows):
     assert large.K1_Nm_rad > small.K1_Nm_rad
 
 # %% [markdown]
-# ## Which joint costs what
+# ## The contribution of each joint
 #
-# One joint keeps its drive of size 20, all others are made rigid: what the tool then
-# misses is the share of that joint. The shares are vectors: they add up to more than
-# the whole.
+# One joint keeps its drive of size 20, and all others are made rigid. The remaining
+# error of the tool is the contribution of that joint. The contributions are vectors, so
+# the sum of their magnitudes exceeds the total.
 
 # %%
 base = scene.with_drive("CSG-20-100")
@@ -125,10 +127,11 @@ for joint, share in shares.items():
     print(f"{short(joint):14} {share:6.3f} mm")
 
 # %% [markdown]
-# ## The money where it matters
+# ## Larger drives only where they help
 #
-# Size 32 in shoulder lift and elbow, size 17 in the wrists, 20 in the pan joint: three
-# small drives at the end of the arm and yet a better tool than size 25 everywhere.
+# This selection has size 32 in shoulder lift and elbow, size 17 in the wrists and size
+# 20 in the pan joint. It has three small drives at the end of the arm, and still a
+# smaller tool error than size 25 in all joints.
 
 # %%
 mixed = dict.fromkeys(scene.joints, "CSG-17-100") | {
@@ -138,12 +141,12 @@ mixed = dict.fromkeys(scene.joints, "CSG-17-100") | {
 }
 chosen = scene.with_changes({f"joints.{k}.drive": v for k, v in mixed.items()})
 (row,) = compare(["full"], chosen, spec=spec)
-print(f"mixed: tool {row.tool_path_rms_mm:.3f} mm, misses: {row.missed or 'nothing'}")
+print(f"mixed: tool {row.tool_path_rms_mm:.3f} mm, misses: {row.missed or 'no limit'}")
 for joint, figures in row.run.metrics()["joints"].items():
     use = figures["ratings"]
     print(
         f"{short(joint):14} {mixed[joint]}  peak {use['peak_Nm']:5.1f}"
-        f" of {use['repeated_peak_Nm']:5.0f} N·m, cubed mean"
+        f" of {use['repeated_peak_Nm']:5.0f} N·m, cubic mean"
         f" {use['cubed_mean_Nm']:5.1f} of {use['rated_Nm']:4.1f} N·m"
     )
 assert missed_limits(row, spec) == ()
@@ -152,10 +155,11 @@ assert row.tool_path_rms_mm < rows[sizes.index("CSG-25-100")].tool_path_rms_mm
 # %% [markdown]
 # ## What this does not tell
 #
-# A catalogue states the transmission accuracy as an upper bound, so these maps have no
-# kinematic error and hardly any ripple; a design with finite elements behind it has
-# both (`wave-generators.py`). Links, bearings and flange are rigid here. The same check
-# for a script, with exit status 1 where a limit is missed:
+# A catalogue states the transmission accuracy only as an upper bound, so this scene
+# switches the kinematic error of its drives off, and their ripple is close to zero. A
+# map from finite elements contains both (`wave-generators.py`). The scene has no
+# friction either. Links, bearings and flange are rigid here. This command makes the
+# same comparison in a script, with exit status 1 if a limit is missed:
 #
 #     swgjoint compare CSG-20-100 CSG-25-100 --scene ur5e-catalogue --spec spec.toml \
 #         --set payload.mass_kg=5 --out check

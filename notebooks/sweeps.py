@@ -11,11 +11,12 @@
 # ---
 
 # %% [markdown]
-# # Many designs: a sweep, a cluster, a search, and what a million would take
+# # Many designs: a sweep, a cluster, a search, and the cost of a million designs
 #
-# A designer does not ask about one drive but about the space of drives. A sweep file
-# says which designs, and what is computed of each; this one takes four ellipses and
-# rims in the plane, on a coarse mesh. The bundled ones are in `models/sweeps`:
+# A designer compares many drives, not just one. A sweep file defines the designs and
+# the figures to be computed for each. The sweep below combines two ellipses with two
+# rim thicknesses, as 2D models on a coarse mesh. Bundled sweeps are in `models/sweeps`,
+# and a search in `models/optimisations`:
 #
 #     swgjoint sweep wave-generator --out wave-generator
 #     swgjoint sweep tolerances --out tolerances
@@ -79,8 +80,9 @@ file = SweepFile.load(folder / "rim.toml")
 # %% [markdown]
 # ## On this machine
 #
-# The same as `swgjoint sweep rim.toml --jobs 2 --out results`. Every result is kept as
-# soon as it is there, under the hash of the design, what is asked and the code.
+# This cell does the same as `swgjoint sweep rim.toml --jobs 2 --out results`. Every
+# result is stored as soon as it is available, under a hash of the design, the requested
+# figures and the code.
 
 # %%
 place = place_of(folder / "results")
@@ -106,10 +108,10 @@ for axis in axes:
     axis.legend()
 
 # %% [markdown]
-# ## Stopped and gone on with
+# ## Resuming an interrupted sweep
 #
-# A sweep that was stopped, by whatever means, goes on where it was; what is finished is
-# not computed again. Here nothing is left to do.
+# An interrupted sweep resumes when it is started again, and finished designs are not
+# computed again. Here nothing is left to do.
 
 # %%
 again = run_sweep(file, executor=LocalPool(2), place=place)
@@ -120,14 +122,15 @@ assert again.rows() == found.rows()
 # %% [markdown]
 # ## On a cluster
 #
-# The same file on the workers of a [dask](https://distributed.dask.org) scheduler, here
-# three processes of this machine (`pip install 'swgjoint[cluster]'`):
+# The workers of a [dask](https://distributed.dask.org) scheduler compute the same file.
+# Here the cluster consists of three processes on this machine (`pip install
+# 'swgjoint[cluster]'`):
 #
 #     dask scheduler --host 127.0.0.1 --port 8786
 #     dask worker tcp://127.0.0.1:8786 --nworkers 2 --nthreads 1
 #     swgjoint sweep wave-generator --scheduler tcp://127.0.0.1:8786 --out results
 #
-# or, with a table `[cluster]` in the file, in jobs of SLURM that it submits itself:
+# If the file contains a table `[cluster]`, the sweep submits SLURM jobs as its workers:
 #
 #     [cluster]
 #     kind = "slurm"
@@ -136,26 +139,26 @@ assert again.rows() == found.rows()
 #     memory_GB = 32.0
 #     walltime = "02:00:00"
 #
-# A worker that dies costs nothing but the design that it had in hand, which another one
-# computes again.
+# If a worker dies, only the designs of its current task are lost, and another worker
+# computes them again.
 
 
 # %%
 def same(one, other):
-    """Whether two sweeps have the same rows, but for the time that they took."""
+    """Whether two sweeps have the same rows, apart from their computing times."""
     rows = [[{**row, "work_s": None} for row in sweep.rows()] for sweep in (one, other)]
     return rows[0] == rows[1]
 
 
 handing = None
 if importlib.util.find_spec("distributed") is None:
-    print("dask is not installed: this part is left out")
+    print("dask is not installed: this part is skipped")
 else:
     told = folder / "scheduler.json"
     options = ["--scheduler-file", str(told), "--host", "127.0.0.1", "--no-dashboard"]
 
     def started(kind, *more):
-        """A process of the cluster, as the commands above start it."""
+        """Start a process of the cluster in the same way as the commands above."""
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}"]
         return subprocess.Popen(
             [*command, *options, *more],
@@ -179,17 +182,17 @@ else:
         for process in reversed(processes):
             process.terminate()
             process.wait()
-    print(f"identical: {same(on_cluster, found)}; {1e3 * handing:.1f} ms to hand out")
+    print(f"identical: {same(on_cluster, found)}; dispatch {1e3 * handing:.1f} ms")
     assert same(on_cluster, found)
 
 # %% [markdown]
 # ## A search instead of a plan
 #
-# Where the question is which design is best, a genetic search chooses the values. It is
-# a file, too: what counts, what may change, how the front is computed again. Each of
-# its generations is a sweep, so that it runs where sweeps run and goes on where it was
-# stopped. Here a small one, on the coarse mesh; `swgjoint optimise qca-stress` searches
-# on the mesh of the thesis.
+# To find the best design, a genetic search chooses the values. A file states the
+# objectives, the parameters that may change, and how the front is computed again. Each
+# generation of the search is a sweep, so it runs wherever sweeps run and resumes in the
+# same way. The search below is a small one on the coarse mesh; `swgjoint optimise
+# qca-stress` searches on the mesh of the thesis.
 #
 #     swgjoint optimise search.toml --jobs 2 --out results
 
@@ -244,7 +247,7 @@ positions = 2
 """
 (folder / "search.toml").write_text(SEARCH)
 if importlib.util.find_spec("optuna") is None:
-    print("optuna is not installed (swgjoint[tune]): this part is left out")
+    print("optuna is not installed (swgjoint[tune]): this part is skipped")
 else:
     search = OptimisationFile.load(folder / "search.toml")
     optimum = optimise(search, executor=LocalPool(2), place=place)
@@ -261,13 +264,18 @@ else:
     assert told["front"][0]["von_mises_MPa"] < told["start"]["von_mises_MPa"]
 
 # %% [markdown]
-# ## What a million designs would take
+# ## The cost of a million designs
 #
-# Six measured numbers: the work of a design, what it costs to check it and to name its
-# result, what it costs to hand out a task (of two hundred empty ones, two workers, so
-# rather too much), how long a process takes to start and to import the finite elements,
-# how much a result weighs, and how much memory a design takes in the process that hands
-# out, where it is kept as its values and key: the worker makes it.
+# The estimate uses six measured values:
+#
+# - the CPU time of a design,
+# - the time to check a design and to compute the hash of its result,
+# - the time to dispatch a task (from two hundred empty tasks and two workers, so rather
+#   an overestimate),
+# - the time in which a process starts and imports the finite elements,
+# - the size of a result,
+# - the memory per design in the dispatching process, which keeps only values and key of
+#   a design (the worker constructs it).
 
 # %%
 work = np.array([record.work_s for record in found.records])
@@ -292,40 +300,40 @@ held = tracemalloc.get_traced_memory()[0] / len(points)
 tracemalloc.stop()
 sizes = [path.stat().st_size for path in (folder / "results").rglob("*.json")]
 low, high = work.min(), work.max()
-print(f"work of a design    {work.mean():8.2f} s ({low:.2f} to {high:.2f})")
-print(f"planning of a design{1e3 * planning:8.2f} ms")
-print(f"handing out a task  {1e3 * handing:8.2f} ms")
-print(f"start of a process  {start:8.2f} s")
-print(f"a result            {np.mean(sizes):8.0f} bytes")
-print(f"memory of a design  {held:8.0f} bytes")
+print(f"CPU time of a design   {work.mean():8.2f} s ({low:.2f} to {high:.2f})")
+print(f"planning of a design   {1e3 * planning:8.2f} ms")
+print(f"dispatch of a task     {1e3 * handing:8.2f} ms")
+print(f"start of a process     {start:8.2f} s")
+print(f"size of a result       {np.mean(sizes):8.0f} bytes")
+print(f"memory per design      {held:8.0f} bytes")
 assert held < 2000.0
 
 # %% [markdown]
-# List scheduling says the rest: whichever worker is free takes the next task, and one
-# process hands them out. First the check that it tells the sweep above: two workers,
-# the measured work in the order of the plan.
+# The wall time follows from list scheduling: each free worker takes the next task, and
+# one process dispatches all tasks. The first step compares this model with the sweep
+# above, with two workers and the measured CPU times in the order of the plan.
 
 # %%
 told_wall = schedule(work, found.workers, start=start, handing=handing).wall
 print(f"simulated {told_wall:.1f} s, measured {found.wall_s:.1f} s")
-# the work alone is a lower bound; the rest depends on what else the machine does
+# the CPU times alone give a lower bound; the rest depends on the load of the machine
 assert schedule(work, found.workers).wall < found.wall_s
 
 # %% [markdown]
-# Then a million designs whose work is drawn from the measured ones. The sweep puts
-# cheap designs together until a task lasts two seconds; handing them out one by one
-# would keep fewer workers busy.
+# The second step simulates a million designs whose CPU times are drawn from the
+# measured ones. The sweep combines cheap designs until a task takes two seconds.
+# Dispatching them one by one would keep fewer workers busy.
 
 # %%
 million = 1_000_000
 drawn = np.random.default_rng(0).choice(work, size=million)
 start += million * planning  # before the first task is handed out
 tasks = tasks_of(drawn, TASK_S)
-tenths = tasks_of(drawn / 10.0, TASK_S)  # ten times cheaper: coarser, or a ring model
-print(f"core hours: {drawn.sum() / 3600:.0f}, with a tenth of the work a tenth")
-print(f"memory of the process that hands out: {million * held / 1e9:.1f} GB of designs")
+tenths = tasks_of(drawn / 10.0, TASK_S)  # coarser elements or thin rings
+print(f"CPU time: {drawn.sum() / 3600:.0f} h")
+print(f"memory of the dispatching process: {million * held / 1e9:.1f} GB of designs")
 print(f"results: {million * np.mean(sizes) / 1e9:.1f} GB in a million files")
-print(f"{'':8} {'':>9} {'':>6}    a tenth of the work")
+print(f"{'':8} {'':>9} {'':>6}    designs ten times cheaper")
 header = ("workers", "wall [h]", "busy", "wall [h]", "busy", "one by one")
 print("{:>8} {:>9} {:>6} {:>10} {:>8} {}".format(*header))
 for workers in (16, 128, 1024):
@@ -338,24 +346,25 @@ for workers in (16, 128, 1024):
         f" {single.efficiency:10.0%}"
     )
 limit = np.mean(tasks) / handing
-print(f"one scheduler feeds about {limit:.0f} workers with these tasks")
+print(f"one scheduler keeps about {limit:.0f} workers busy with these tasks")
 assert schedule(tasks, 16, start=start, handing=handing).efficiency > 0.8
 
 # %% [markdown]
-# What the plan says:
+# The results show:
 #
-# - Up to about a hundred workers the wall time is the core hours over the workers:
-#   take as many as the queue gives.
-# - Beyond that the process that hands out is the bound, not the drives. A task of more
-#   designs (`swgjoint.explore.sweep.sweep.TASK_S`) moves it in proportion; so do
-#   several sweeps of a part of the plan each, into the same folder.
-# - That process needs about 1 GB for a million designs with their records, and some
-#   5 GB while it writes the tables at the end: run it where it may have them.
-# - A million small files are slow to list on a parallel file system, though few
-#   gigabytes: give `--out` an object store (`s3://bucket/sweep`), or sweep in parts.
-#   The table `sweep.parquet` is one file.
-# - A worker that dies loses one task, two seconds; the process that hands out loses
-#   what is in hand, and goes on with the same command.
+# - Up to about a hundred workers, the wall time is the CPU time divided by the number
+#   of workers, so more workers always help.
+# - With more workers, the dispatching process is the bottleneck. The limit rises in
+#   proportion to the duration of a task (`swgjoint.explore.sweep.sweep.TASK_S`).
+#   Several sweeps of parts of the plan, into the same folder, raise it as well.
+# - The dispatching process needs about 1 GB for a million designs with their records,
+#   and about 5 GB while it writes the tables at the end. It must run on a machine with
+#   that much memory.
+# - A million small files take only a few gigabytes, but are slow to list on a parallel
+#   file system. Use an object store (`--out s3://bucket/sweep`) or sweep in parts. The
+#   table `sweep.parquet` is a single file.
+# - If a worker dies, one task of two seconds is lost. If the dispatching process dies,
+#   the tasks in progress are lost, and the same command resumes the sweep.
 
 # %%
 for path in sorted(folder.rglob("*"), reverse=True):

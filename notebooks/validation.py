@@ -11,18 +11,19 @@
 # ---
 
 # %% [markdown]
-# # Against CalculiX, in the plane and in space
+# # Comparison with CalculiX in 2D and 3D
 #
-# CalculiX is an independent finite element code. `tests/peer/study.py` gives it the
-# same flexspline in elements of its own (eight nodes, large displacements) and writes
-# `calculix.json`, `tests/peer/solid_study.py` does it with the cup and writes
-# `calculix-solid.json`. Both are shown here; CalculiX is not needed to read them.
+# CalculiX is an independent finite element code. `tests/peer/study.py` computes the
+# same flexspline in CalculiX with its own elements (eight nodes, large displacements)
+# and writes `calculix.json`; `tests/peer/solid_study.py` does the same for the cup and
+# writes `calculix-solid.json`. This notebook shows both files and does not need
+# CalculiX.
 #
-# ## In the plane
+# ## 2D
 #
-# A flexspline under contact forces is a soft spring: 0.2 micrometre of a deflection of
-# 1 mm is 0.02 % of its stiffness. So this is a hard test of the shape, and both codes
-# need fine meshes for it.
+# A flexspline under contact forces is a soft spring, so the comparison of its shape is
+# a strict test. A difference of 0.2 µm is only 0.02 % of the deflection of 1 mm, and
+# both codes need fine meshes to resolve it.
 
 # %%
 import json
@@ -46,10 +47,12 @@ print(study["date"], *(f"{name} {value}" for name, value in study["versions"].it
 # %% [markdown]
 # ### The wave generator alone, and two meshed positions
 #
-# Our contact forces as nodal loads. "mesh" is the refinement, ours and that of
-# CalculiX; CPE8R, with reduced integration, converges fastest in shape, CPE8 in stress
-# at a surface. Both have the constants of plane stress. Shape is CalculiX minus ours,
-# along the bore; root stress is the largest principal stress in the fillets.
+# Our contact forces are applied in CalculiX as nodal loads. The column "mesh" gives the
+# refinement of our code and of CalculiX. CPE8R elements (reduced integration) converge
+# fastest in shape, CPE8 elements in stress at a surface; both have the material
+# constants of plane stress. The columns "radial" and "tang." are the displacement in
+# CalculiX minus ours along the bore. The root stress is the largest principal stress in
+# the fillets.
 
 # %%
 replays = [row for row in rows if "own_contact_Pa_per_m" not in row]
@@ -76,10 +79,11 @@ for row in replays:
     show(row)
 
 # %% [markdown]
-# ### How each code changes with its mesh
+# ### Convergence of each code with its mesh
 #
-# The finest pair of every state, the change of root stress from the mesh before it, and
-# the difference that is left.
+# For the finest pair of meshes of every state, these lines give the remaining
+# difference in shape and root stress, and the change of the root stress from the
+# previous mesh.
 
 
 # %%
@@ -114,11 +118,11 @@ for state in states:
     assert max(change(state, code) for code in ("ours", "calculix")) < 0.015
 
 # %% [markdown]
-# Part of the difference is our mesh, part the model. In the limit of fine meshes, where
-# ours is extrapolated with the square of the element size, the model's share remains.
-# Where the wave generator presses all around (the ellipse), the rim is under hoop
-# tension; without the tension's work on what the rim turns within a sector this limit
-# was 0.3 um.
+# One part of the difference comes from our mesh, the rest from the model. Extrapolation
+# of our results with the square of the element size to infinitely fine meshes leaves
+# the part of the model. Where the wave generator supports the rim all around (the
+# ellipse), the rim is under hoop tension. Without the work of this tension on the
+# rotation of the rim within a sector, this part was 0.3 µm.
 
 
 # %%
@@ -157,9 +161,9 @@ axes.legend()
 # %% [markdown]
 # ### CalculiX with its own contact
 #
-# No force of ours: rigid outlines of the wave generator and of the teeth of the
-# circular spline, frictionless penalty contact. The row of our forces on the same mesh
-# comes first: on one mesh only the contact differs.
+# In these rows CalculiX does not use our forces: the wave generator and the teeth of
+# the circular spline are rigid outlines with frictionless penalty contact. The first
+# row of each state shows our forces on the same mesh, so that only the contact differs.
 
 # %%
 print(header)
@@ -174,9 +178,10 @@ for row in rows:
         print(f"output {theirs:.2f} microradian, ours {ours:.2f}")
 
 # %% [markdown]
-# ### Is the file still about this code?
+# ### Are the stored results still valid?
 #
-# The elliptical state again, now: root stress as in the file.
+# The elliptical state is computed again with the present code; its root stress must
+# agree with the stored one.
 
 # %%
 stored = next(r for r in replays if r["state"] == "elliptical")
@@ -190,12 +195,13 @@ print(f"{tensile.max() / 1e6:.2f} MPa now, {stored['root_ours_MPa']:.2f} MPa sto
 assert abs(tensile.max() / 1e6 / stored["root_ours_MPa"] - 1) < 1e-3
 
 # %% [markdown]
-# ## In space: the cup
+# ## 3D: the cup
 #
-# A quarter of the improved reference cup on its wave generator, under our forces and on
-# the same mesh of hexahedra with incompatible modes (C3D8I there). Ours condenses each
-# sector to few points; in the first row there are too few, with straight lines through
-# the wall, the second is the default. Shape is CalculiX minus ours at every node.
+# A quarter of the improved reference cup on its wave generator is computed under our
+# contact forces, in both codes on the same mesh of hexahedra with incompatible modes
+# (C3D8I in CalculiX). Our code condenses each sector to a few points. The first row has
+# too few points, with straight lines through the wall; the second row is the default.
+# The columns show the displacement in CalculiX minus ours over all nodes.
 
 # %%
 solid = json.loads((here / "calculix-solid.json").read_text(encoding="utf-8"))
@@ -216,7 +222,8 @@ assert max(cup["radial_max_um"], cup["tangential_max_um"]) < 1.0
 assert abs(cup["root_calculix_MPa"] / cup["root_ours_MPa"] - 1) < 0.05
 
 # %% [markdown]
-# Largest von Mises stress in each part, from the teeth to the bore of the diaphragm.
+# The next lines compare the largest von Mises stress in each part, from the teeth to
+# the bore of the diaphragm.
 
 # %%
 parts = cup["von_mises_ours_calculix_MPa"]
@@ -236,7 +243,8 @@ left.set_ylabel("von Mises stress [MPa]")
 left.legend()
 
 # %% [markdown]
-# What the mesh does to the root stress: two teeth alone, both codes on finer meshes.
+# A model of two teeth shows the influence of the mesh on the root stress, in both codes
+# on increasingly fine meshes.
 
 # %%
 teeth = [row for row in solid["rows"] if row["compared"].startswith("two teeth")]

@@ -13,10 +13,11 @@
 # %% [markdown]
 # # Wave generators compared: one line of the design, four different joints
 #
-# The same 120 and 122 teeth, the same rim, four shapes that deflect it: an ellipse that
-# holds the rim all around, two half circles that leave it free between the lobes
-# (simplified), a parabola that fits the lobe only, and four rollers. The thesis behind
-# these designs compares their stresses; here they become joints of a UR5e.
+# Four wave generators deflect the same rim with the same 120 and 122 teeth: an ellipse
+# supports the rim all around, two half-circles (simplified) leave it free between the
+# lobes, a parabola fits it at the lobes only, and four rollers touch it at four places.
+# The thesis from which these designs come compares their stresses; this notebook
+# compares them as joints of a UR5e.
 
 # %%
 from pathlib import Path
@@ -44,14 +45,14 @@ COLORS = dict(
 # %% [markdown]
 # ## Four maps
 #
-# Finite elements in the plane, both members elastic, contact everywhere, large
-# rotations, 24 or 48 positions of the wave generator over a pitch, as many torques as
-# contacts ask for. That takes half a minute to two minutes of a core a drive, so the
-# maps are read from files, which
+# The maps come from 2D finite elements with two elastic members, contact of teeth and
+# wave generator, and large rotations. They have 24 or 48 positions of the wave
+# generator per pitch, and as many torques as the changes of contact require. A map
+# takes half a minute to two minutes on one core, so this notebook reads the maps from
+# files. The following command writes one of them; the others are written in the same
+# way:
 #
 #     swgjoint map reference-2d --no-fields -o notebooks/maps/reference-2d.swg
-#
-# writes again, and the other designs alike.
 
 # %%
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
@@ -67,12 +68,13 @@ for name, sheet in sheets.items():
     print(f"{name:13} {K1:13.0f} {accuracy:18.4f} {ripple:15.2f}")
 
 # %% [markdown]
-# ## Torsion: what holds the rim decides
+# ## Torsion depends on the support of the rim
 #
-# Input locked, torque up and down at the output. The ellipse is an order of magnitude
-# stiffer than the next, because the rim cannot leave it. Where the rim is free beside
-# the lobes, it first bends and then lies down on the wave generator: the simplified
-# drive hardens fivefold.
+# With locked input, the torque at the output is varied in both directions. The ellipse
+# is an order of magnitude stiffer than the next stiffest, because the rim cannot move
+# away from it. Where the rim is free next to the lobes, it first bends and then comes
+# into contact with the wave generator: the stiffness of the simplified drive increases
+# fivefold.
 
 # %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
@@ -94,9 +96,9 @@ for axis in (left, right):
     axis.grid(alpha=0.3)
 
 # %% [markdown]
-# Error over a pitch comes in the opposite order: four rollers hold the rim at four
-# lines and let the teeth push it about. Two things follow, and they pull against each
-# other: a soft drive winds up, a stiff one turns every error into torque.
+# The error over a pitch has the opposite order: four rollers hold the rim at only four
+# lines, so that the teeth can displace it. The two effects conflict: a soft drive has a
+# large torsion, and a stiff drive converts every error into torque.
 
 # %%
 K = {name: sheet.figures["K1_Nm_rad"] for name, sheet in sheets.items()}
@@ -108,9 +110,9 @@ assert error["elliptical"] == min(error.values())
 # %% [markdown]
 # ## On the arm
 #
-# A slow sweep of a UR5e, once with each drive in all joints. `ripple rms` [% of rated
-# torque] and mean `torsion` [arcmin] are those of the worst joint; `tool` [mm, rms] is
-# the distance of the tool from that of the rigid arm.
+# A UR5e makes a slow sweep, once with each drive in all joints. The table shows the
+# largest torque ripple and the largest mean torsion [arcmin] of all joints, the rms
+# deviation of the tool from that of the rigid arm [mm], and the steps per second.
 
 # %%
 scene = Scene.load_file("ur5e-sweep")
@@ -136,14 +138,15 @@ for name, run in runs.items():
 comparison_figure(runs, rigid=rigid)
 
 # %% [markdown]
-# Torque ripple is error times stiffness, filtered by the arm. The parabolic drive has
-# the most: thirteen times stiffer than four rollers at a fifth of their error. The
-# simplified drive has the least, and a tool a millimetre off its path. Which is better
-# depends on what the joint is for; a position-controlled arm wants the ellipse, a
-# torque-controlled one may prefer a softer drive.
+# The torque ripple is the product of error and stiffness, filtered by the arm. The
+# parabolic drive has the most ripple: it is thirteen times stiffer than the four
+# rollers, with a fifth of their error. The simplified drive has the least ripple, but a
+# tool that is about a millimetre off its path. Which drive is better depends on the
+# task: a position-controlled arm needs the ellipse, while a torque-controlled arm may
+# benefit from a softer drive.
 #
-# Pan and wrists turn too fast for a step of 1 ms to carry their tooth order, which is
-# left out there and listed; see `error-against-time.py` for what that costs.
+# Shoulder pan and wrists turn too fast for a step of 1 ms to resolve their tooth order.
+# It is therefore left out and listed; `error-against-time.py` shows the consequence.
 
 # %%
 ripple = {
@@ -158,8 +161,8 @@ for name, run in runs.items():
             print(f"{joint:20} lowest order left out: {left_out[0]:g}")
 
 # %% [markdown]
-# The same as a table, a picture and a page for the browser, with stresses at rated
-# torque:
+# This command gives the same comparison as a table, a picture and a page for the
+# browser, with the stresses at rated torque:
 #
 #     swgjoint compare reference-2d reference-2d-parabolic reference-2d-simplified \
 #         reference-2d-four-roller --scene ur5e-sweep --out compared

@@ -106,10 +106,10 @@ def grid(*, full: bool) -> list[GridJoint]:
 def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
     """Initial conditions by group, with the rotor speed for the region check [rad/s].
 
-        ``free``: rotation at rated speed without torque. ``loaded``: slow rotation under
-            full torque. ``released``: release from full torque at rest. ``step``: slow
-        rotation with a torque step at which a real drive would ratchet.
-        """
+    ``free``: rotation at rated speed without torque. ``loaded``: slow rotation under
+    full torque. ``released``: release from full torque at rest. ``step``: slow rotation
+    with a torque step at which a real drive would ratchet.
+    """
     full = drive.ratings.repeated_peak
     return {
         "free": (Start(speed=FAST), FAST),
