@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # Wave generators compared: one line of the design, four different joints
+# # Wave generators compared: one section of the design, four different joints
 #
 # Four wave generators deflect the same rim with the same 120 and 122 teeth: an ellipse
 # supports the rim all around, two half-circles (simplified) leave it free between the
