@@ -1,4 +1,4 @@
-"""What a learned policy sees of RippleSuppression-v0, and how it acts; numpy alone."""
+"""Inputs and actions of a learned policy for RippleSuppression-v0, with numpy only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from swgjoint.units import arcmin
 
 
 def drive_of_training():
-    """CSG-25-100 whose two members err: 1 arcmin at 2 and 4 per turn against either."""
+    """CSG-25-100 with 1 arcmin of error at 2 and 4 cycles per turn of either angle."""
     drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
     orders, phase = ((2, 0), (0, 2), (4, 0), (0, 4)), np.arange(1.0, 5.0)
     size = np.array([[AMPLITUDES[pq]] for pq in orders])
@@ -31,19 +31,19 @@ ARGUMENTS = {
     "episode_s": 3.0,
 }
 RATIO, RATED = -100.0, 87.0
-"""Of that drive; torque in N·m."""
+"""Ratio and rated torque [N·m] of that drive."""
 SHARE = 0.25
-"""Of the environment's authority that the policy uses."""
+"""Share of the torque limit of the environment that the policy uses [-]."""
 folder = Path(__file__).parent
 TEST_SEED, TEST_COUNT = 10_000, 32
 
 
 def features(observation):
-    """Scaled readings, harmonics of the gear's two angles. Shape (n, 22).
+    """Scaled readings and harmonics of the two gear angles. Shape (n, 22).
 
-    Both members of the gear err, one at multiples of the wave generator's angle
-    against the circular spline (alpha), the other against the flexspline, which turns
-    with the output (beta); how much of it comes through depends on the speed.
+    The errors of the circular spline are periodic in the angle of the wave generator
+    relative to it (alpha), those of the flexspline in the angle relative to the
+    flexspline, which turns with the output (beta). Their effect depends on the speed.
     """
     angle, _, angle_error, speed_error, s, c, speed, load, last, torque = observation.T
     s2, c2 = 2.0 * s * c, c * c - s * s
@@ -70,7 +70,7 @@ def features(observation):
 
 
 def act(policy, observation):
-    """Mean action of the network, two layers of tanh. Shape (n, 1)."""
+    """Mean action of the network, which has two tanh layers. Shape (n, 1)."""
     x = np.clip(features(np.atleast_2d(observation)), -10.0, 10.0)
     for layer in ("1", "2"):
         x = np.tanh(x @ policy["weight" + layer].T + policy["bias" + layer])
@@ -79,11 +79,11 @@ def act(policy, observation):
 
 
 def evaluate(env, policy=None, seed=TEST_SEED):
-    """Episodes of a batch under a policy, or under the loop alone for None.
+    """Simulate episodes with a policy, or with the servo loop alone for None.
 
     Returns:
-        Mean reward of a step that counts, rms of the torque ripple in % of the rated
-        torque, rms of the link's uneven motion [arcmin]; shapes (n,).
+        Mean reward of the steady steps, rms of the torque ripple [% of the rated torque]
+        and rms of the uneven motion of the link [arcmin]. Shapes (n,).
     """
     observation, _ = env.reset(seed=seed)
     rewards, torques, errors = [], [], []
@@ -104,6 +104,6 @@ def evaluate(env, policy=None, seed=TEST_SEED):
 
 
 def load():
-    """The stored policy, plain arrays."""
+    """Load the stored policy as arrays by name."""
     with np.load(folder / "ripple-policy.npz", allow_pickle=False) as file:
         return {key: file[key].astype(float) for key in file.files}

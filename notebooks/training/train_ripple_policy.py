@@ -1,13 +1,12 @@
-"""Train a policy that takes ripple off a joint, by PPO of stable-baselines3.
+"""Train a policy that reduces the ripple of a joint with PPO of stable-baselines3.
 
-Not part of the tests; torch comes with the extra ``rl``:
+The tests do not run this script. The extra ``rl`` installs torch:
 
     pip install 'swgjoint[envs,rl]'
     python notebooks/training/train_ripple_policy.py [--minutes 10] [--seed 0]
 
-Writes beside itself ``ripple-policy.csv``, the learning curve, and
-``ripple-policy.npz``, the policy as plain arrays; ``reinforcement-learning.py`` shows
-both. PPO: Schulman et al. (2017), "Proximal policy optimization algorithms",
+The script writes the learning curve ``ripple-policy.csv`` and the arrays of the policy
+``ripple-policy.npz`` into its own folder; ``reinforcement-learning.py`` shows both. PPO: Schulman et al. (2017), "Proximal policy optimization algorithms",
 arXiv:1707.06347.
 """
 
@@ -89,7 +88,7 @@ class Batched(VecEnv):
 
 
 class Curve(BaseCallback):
-    """Evaluates now and then, keeps the best policy, ends when the time is over."""
+    """Evaluate at intervals, store the best policy, and stop at the time limit."""
 
     def __init__(self, minutes, every):
         super().__init__()
@@ -123,7 +122,7 @@ class Curve(BaseCallback):
 
 
 def weights(model):
-    """Layers of the acting network as plain arrays."""
+    """Layers of the policy network as arrays by name."""
     net = model.policy
     layers = [net.mlp_extractor.policy_net[0], net.mlp_extractor.policy_net[2]]
     got = {}
@@ -135,7 +134,7 @@ def weights(model):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=10.0, help="of one core")
+    parser.add_argument("--minutes", type=float, default=10.0, help="CPU time [min]")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     torch.set_num_threads(1)
