@@ -33,7 +33,7 @@ ARGUMENTS = {
 RATIO, RATED = -100.0, 87.0
 """Ratio and rated torque [N·m] of that drive."""
 SHARE = 0.25
-"""Share of the torque limit of the environment that the policy uses [-]."""
+"""Share of the largest added torque of the environment that the policy uses [-]."""
 folder = Path(__file__).parent
 TEST_SEED, TEST_COUNT = 10_000, 32
 
@@ -82,8 +82,8 @@ def evaluate(env, policy=None, seed=TEST_SEED):
     """Simulate episodes with a policy, or with the servo loop alone for None.
 
     Returns:
-        Mean reward of the steady steps, rms of the torque ripple [% of the rated torque]
-        and rms of the uneven motion of the link [arcmin]. Shapes (n,).
+        Mean reward of the steady steps, rms of the torque ripple [% of the rated
+        torque] and rms of the uneven motion of the link [arcmin]. Shapes (n,).
     """
     observation, _ = env.reset(seed=seed)
     rewards, torques, errors = [], [], []

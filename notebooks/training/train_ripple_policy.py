@@ -6,8 +6,10 @@ The tests do not run this script. The extra ``rl`` installs torch:
     python notebooks/training/train_ripple_policy.py [--minutes 10] [--seed 0]
 
 The script writes the learning curve ``ripple-policy.csv`` and the arrays of the policy
-``ripple-policy.npz`` into its own folder; ``reinforcement-learning.py`` shows both. PPO: Schulman et al. (2017), "Proximal policy optimization algorithms",
-arXiv:1707.06347.
+``ripple-policy.npz`` into its own folder; ``reinforcement-learning.py`` shows both.
+
+Source:
+    Schulman et al. (2017), "Proximal policy optimization algorithms", arXiv:1707.06347.
 """
 
 from __future__ import annotations
