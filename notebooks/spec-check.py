@@ -74,7 +74,7 @@ figure, axes = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained", share
 titles = (
     "peak torque / repeated peak",
     "cubic mean torque / rated",
-    "tool off its path, rms [mm]",
+    "tool path error, rms [mm]",
 )
 for axis, (key, limit), title in zip(axes, spec.items(), titles, strict=True):
     values = [getattr(row, key) for row in rows]
