@@ -48,3 +48,7 @@ class Search:
         side: Index,
         spacing: float,
     ) -> None: ...
+
+def ellipse_distance(
+    points: Array, major: float, minor: float, result: Array
+) -> None: ...

@@ -33,9 +33,11 @@ Profile::Profile(const double* table, std::size_t pieces, const double* edges,
       piece.normal = {side * -piece.direction.y, side * piece.direction.x};
     } else {
       const double middle = 0.5 * (piece.first + piece.last);
-      piece.middle_cos = std::cos(middle);
-      piece.middle_sin = std::sin(middle);
-      piece.half = 0.5 * std::abs(piece.last - piece.first);
+      const double half = 0.5 * std::abs(piece.last - piece.first) * (1.0 + 1e-9);
+      piece.middle = {std::cos(middle), std::sin(middle)};
+      piece.half_cos = std::cos(half);
+      piece.half_sin = std::sin(half);
+      piece.wide = piece.half_cos < 0.0;
       piece.curvature = piece.sign / piece.radius;
     }
     pieces_.push_back(piece);
@@ -75,13 +77,14 @@ double Profile::project(const Piece& piece, Vec point, Vec* normal,
     return dot(rel, piece.normal);
   }
   const Vec rel = point - piece.centre;
-  const double r = std::hypot(rel.x, rel.y);
-  // angle measured from the middle of the arc, so that the arc crosses no branch cut
-  const double angle = std::atan2(rel.y * piece.middle_cos - rel.x * piece.middle_sin,
-                                  rel.x * piece.middle_cos + rel.y * piece.middle_sin);
-  *inside = std::abs(angle) <= piece.half * (1.0 + 1e-9);
-  const double size = std::max(r, 1e-300);
-  *normal = {piece.sign * rel.x / size, piece.sign * rel.y / size};
+  const double r = size(rel);
+  const double ahead = dot(rel, piece.middle);
+  const double beside = std::abs(rel.y * piece.middle.x - rel.x * piece.middle.y);
+  // the sine tells small angles apart, the cosine those beyond a right angle
+  *inside = piece.wide ? ahead >= r * piece.half_cos
+                       : ahead >= 0.0 && beside <= r * piece.half_sin;
+  const double scale = piece.sign / std::max(r, 1e-300);
+  *normal = {scale * rel.x, scale * rel.y};
   return piece.sign * (r - piece.radius);
 }
 
@@ -102,7 +105,7 @@ double Profile::signed_distance(Vec point, Vec* normal, double* curvature) const
   for (const Edge& edge : edges_) {
     // between the normals of both pieces at an edge, the edge is the closest point
     const Vec rel = point - edge.vertex;
-    const double r = std::hypot(rel.x, rel.y);
+    const double r = size(rel);
     const bool wedge = dot(rel, edge.before) >= 0.0 && dot(rel, edge.after) <= 0.0;
     if (wedge && r < std::abs(best) && r > 0.0) {
       best = r;

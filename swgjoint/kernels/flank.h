@@ -6,6 +6,7 @@
 #ifndef SWGJOINT_KERNELS_FLANK_H_
 #define SWGJOINT_KERNELS_FLANK_H_
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -19,6 +20,8 @@ struct Vec {
 inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y}; }
 inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y}; }
 inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y; }
+// of lengths of a gear, far from overflow
+inline double size(Vec a) { return std::sqrt(dot(a, a)); }
 
 // Point, outward unit normal and signed curvature of a flank at one arc length.
 struct At {
@@ -37,8 +40,11 @@ struct Piece {
 
   // derived from these: direction and outward normal of a straight line
   Vec direction, normal;
-  // middle direction and half angle [rad] of an arc, and its signed curvature [1/m]
-  double middle_cos, middle_sin, half, curvature;
+  // direction of the middle of an arc from its centre, cosine and sine of half its
+  // angle, and its signed curvature [1/m]
+  Vec middle;
+  double half_cos, half_sin, curvature;
+  bool wide;  // whether half the angle exceeds a right angle
 };
 
 // Corner between two pieces, with the directions of the profile before and after it.

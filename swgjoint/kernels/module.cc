@@ -8,6 +8,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "ellipse.h"
 #include "flank.h"
 #include "tooth_search.h"
 
@@ -138,9 +139,19 @@ class Search {
   swgjoint::ToothSearch search_;
 };
 
+void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
+  const std::size_t n = points.shape(0);
+  require(points.shape(1) == 2 && result.shape(0) == n && result.shape(1) == 4,
+          "points: (n, 2), result: (n, 4)");
+  const nb::gil_scoped_release release;
+  swgjoint::ellipse_distance(points.data(), n, major, minor, result.data());
+}
+
 }  // namespace
 
 NB_MODULE(compiled, m) {
+  m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
+        nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
   nb::class_<swgjoint::Limits>(m, "Limits")
       .def(
           "__init__",

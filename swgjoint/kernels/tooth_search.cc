@@ -44,7 +44,7 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
     const double inside = outside ? 0.0 : foot.gap;
     const Vec near = {point.x - inside * foot.normal.x,
                       point.y - inside * foot.normal.y};
-    s = interpolate(radii_, stations_, samples_, std::hypot(near.x, near.y));
+    s = interpolate(radii_, stations_, samples_, size(near));
   } else {
     s = *start;
   }
@@ -57,12 +57,12 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
     evaluate(flanks_, flank, s, &moved, &slope);
     const Vec tangent = {side * at.normal.y + slope.x, side * -at.normal.x + slope.y};
     const Vec rest = point - at.point - moved;
-    const double size = std::hypot(tangent.x, tangent.y);
-    const Vec unit = {tangent.x / size, tangent.y / size};
+    const double length = size(tangent);
+    const Vec unit = {tangent.x / length, tangent.y / length};
     foot.normal = {side * -unit.y, side * unit.x};
     foot.curvature = at.curvature;
     foot.gap = dot(rest, foot.normal);
-    const double along = dot(rest, unit) / size;
+    const double along = dot(rest, unit) / length;
     wanted = s + along / std::max(1.0 + at.curvature * foot.gap, 0.1);
     s = std::clamp(wanted, low, high);
   }
@@ -74,7 +74,7 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
     foot.rest = point - (circular_.evaluate(s).point + moved);
     foot.normal = {-facing.x, -facing.y};
     const bool near =
-        std::hypot(foot.rest.x, foot.rest.y) < limits_.corner * (high - low);
+        size(foot.rest) < limits_.corner * (high - low);
     foot.gap = near ? dot(foot.rest, foot.normal) : kInfinity;
   } else if (outside) {
     foot.gap = kInfinity;
@@ -140,8 +140,8 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
       Vec point, tangent;
       double curvature;
       displaced(s, mirrored + 2 * spline_.nodes * i, &point, &tangent, &curvature);
-      const double size = std::hypot(tangent.x, tangent.y);
-      const Vec outward = {-tangent.y / size, tangent.x / size};
+      const double length = size(tangent);
+      const Vec outward = {-tangent.y / length, tangent.x / length};
       const Seen seen = see(point, outward, sector[i], side[i], rigid,
                             round ? &foot[i] : nullptr, round ? 2 : 3);
       foot[i] = seen.foot.station;

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 
@@ -67,6 +68,10 @@ class Elliptical(ClosedCurve):
         bracket is replaced by bisection.
         """
         a, b = self.major, self.minor
+        if (native := kernels()) is not None:
+            found = np.empty((len(points), 4))
+            native.ellipse_distance(np.ascontiguousarray(points), a, b, found)
+            return found[:, 0], found[:, 1:3], found[:, 3]
         x, y = np.abs(points[:, 0]), np.abs(points[:, 1])  # x = b sin t, y = a cos t
         t = np.arctan2(a * x, b * y)
         low, high = np.zeros_like(t), np.full_like(t, 0.5 * np.pi)
