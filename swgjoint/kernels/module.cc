@@ -10,6 +10,7 @@
 
 #include "ellipse.h"
 #include "flank.h"
+#include "tangents.h"
 #include "tooth_search.h"
 
 namespace nb = nanobind;
@@ -147,9 +148,58 @@ void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
   swgjoint::ellipse_distance(points.data(), n, major, minor, result.data());
 }
 
+void rotate_blocks(Out<3> matrices, In<1> angle) {
+  const std::size_t count = matrices.shape(0), size = matrices.shape(1);
+  require(matrices.shape(2) == size && size % 2 == 0 && angle.shape(0) == count,
+          "matrices: (n, 2 m, 2 m), angle: (n,)");
+  const nb::gil_scoped_release release;
+  swgjoint::rotate_blocks(matrices.data(), angle.data(), count, size);
+}
+
+void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
+                           Out<3> result) {
+  const std::size_t p = weights.shape(0), width = weights.shape(2);
+  const std::size_t count = stiffness.shape(0), q = stiffness.shape(1);
+  require(p > 0 && weights.shape(1) == 2 && q > 0 && q % p == 0, "weights: (p, 2, w)");
+  require(direction.shape(0) == count && direction.shape(1) == q &&
+              direction.shape(2) == 2,
+          "direction: (n, q, 2)");
+  const std::size_t size = width + 2 * (q / p - 1);
+  require(result.shape(0) == count && result.shape(1) == size && result.shape(2) == size,
+          "result: (n, m, m)");
+  const nb::gil_scoped_release release;
+  swgjoint::add_station_stiffness(weights.data(), p, width, direction.data(),
+                                  stiffness.data(), count, q / p, result.data());
+}
+
+void contact_compliance(Index block_of, In<3> blocks, Index tooth, In<2> weight,
+                        Out<2> result) {
+  const std::size_t n = tooth.shape(0), size = weight.shape(1);
+  const std::size_t teeth = block_of.shape(0);
+  require(teeth > 0 && blocks.shape(1) == size && blocks.shape(2) == size,
+          "blocks: (n, size, size)");
+  require(weight.shape(0) == n && result.shape(0) == n && result.shape(1) == n,
+          "weight: (n, size), result: (n, n)");
+  const auto count = static_cast<std::int64_t>(blocks.shape(0));
+  for (std::size_t i = 0; i < teeth; ++i) {
+    require(block_of.data()[i] >= -1 && block_of.data()[i] < count, "block_of");
+  }
+  const nb::gil_scoped_release release;
+  swgjoint::contact_compliance(block_of.data(), teeth, blocks.data(), size,
+                               tooth.data(), weight.data(), n, result.data());
+}
+
 }  // namespace
 
 NB_MODULE(compiled, m) {
+  m.def("rotate_blocks", &rotate_blocks, nb::arg("matrices").noconvert(),
+        nb::arg("angle").noconvert());
+  m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
+        nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("contact_compliance", &contact_compliance, nb::arg("block_of").noconvert(),
+        nb::arg("blocks").noconvert(), nb::arg("tooth").noconvert(),
+        nb::arg("weight").noconvert(), nb::arg("result").noconvert());
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
   nb::class_<swgjoint::Limits>(m, "Limits")

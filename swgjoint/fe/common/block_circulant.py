@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index
 
 
@@ -45,6 +46,18 @@ def contact_compliance(
     Returns:
         Compliance matrix (n, n) [m/N].
     """
+    if (native := kernels()) is not None:
+        block_of = np.full(teeth, -1)
+        block_of[np.asarray(offsets) % teeth] = np.arange(len(offsets))
+        result = np.empty((len(tooth), len(tooth)))
+        native.contact_compliance(
+            block_of,
+            blocks,
+            np.ascontiguousarray(tooth),
+            np.ascontiguousarray(weight),
+            result,
+        )
+        return result
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
     for offset, block in zip(offsets, blocks, strict=True):

@@ -26,6 +26,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 POINTS = 24
@@ -101,6 +102,18 @@ class BoreStations:
         Returns:
             Stiffness matrices of the nodes (N, 2 m, 2 m) [N/m].
         """
+        if (native := kernels()) is not None:
+            size = self.weights.shape[2] + 2 * (
+                len(self.stiffness) // len(self.weights) - 1
+            )
+            result = np.zeros((len(stiffness), size, size))
+            native.add_station_stiffness(
+                self.weights,
+                np.ascontiguousarray(direction),
+                np.ascontiguousarray(stiffness),
+                result,
+            )
+            return result
         local = self._local(direction)
         count, intervals, p, width = local.shape
         springs = stiffness.reshape(count, intervals, p, 1)

@@ -20,6 +20,7 @@ from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.plane.tooth_contact import ToothContact
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
@@ -311,6 +312,10 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
 def _in_global_frame(matrices: Array, angle: Array) -> Array:
     """Sector matrices (N, n, n) rotated by the angles of their frames (N,) [rad]."""
     count, n, _ = matrices.shape
+    if (native := kernels()) is not None:
+        turned = np.array(matrices)
+        native.rotate_blocks(turned, np.ascontiguousarray(angle))
+        return turned
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
     blocks = matrices.reshape(count, n // 2, 2, n // 2, 2)

@@ -1,0 +1,87 @@
+#include "tangents.h"
+
+#include <cmath>
+#include <vector>
+
+namespace swgjoint {
+
+void rotate_blocks(double* matrices, const double* angle, std::size_t count,
+                   std::size_t size) {
+  for (std::size_t s = 0; s < count; ++s, matrices += size * size) {
+    const double c = std::cos(angle[s]), d = std::sin(angle[s]);
+    for (std::size_t i = 0; i < size; i += 2) {
+      double *upper = matrices + i * size, *lower = upper + size;
+      for (std::size_t j = 0; j < size; j += 2) {
+        // R B R^T of one block B of two by two
+        const double xx = c * upper[j] - d * lower[j];
+        const double xy = c * upper[j + 1] - d * lower[j + 1];
+        const double yx = d * upper[j] + c * lower[j];
+        const double yy = d * upper[j + 1] + c * lower[j + 1];
+        upper[j] = c * xx - d * xy;
+        upper[j + 1] = d * xx + c * xy;
+        lower[j] = c * yx - d * yy;
+        lower[j + 1] = d * yx + c * yy;
+      }
+    }
+  }
+}
+
+void add_station_stiffness(const double* weights, std::size_t p, std::size_t width,
+                           const double* direction, const double* stiffness,
+                           std::size_t count, std::size_t intervals, double* result) {
+  const std::size_t size = width + 2 * (intervals - 1);
+  std::vector<double> row(width);
+  for (std::size_t s = 0; s < count; ++s, result += size * size) {
+    for (std::size_t k = 0; k < intervals; ++k) {
+      double* corner = result + 2 * k * (size + 1);
+      for (std::size_t i = 0; i < p; ++i, direction += 2, ++stiffness) {
+        // most stations do not touch
+        if (*stiffness == 0.0) continue;
+        const double *x = weights + 2 * width * i, *y = x + width;
+        for (std::size_t m = 0; m < width; ++m) {
+          row[m] = direction[0] * x[m] + direction[1] * y[m];
+        }
+        for (std::size_t m = 0; m < width; ++m) {
+          const double force = *stiffness * row[m];
+          double* line = corner + m * size;
+          for (std::size_t l = 0; l < width; ++l) line[l] += force * row[l];
+        }
+      }
+    }
+  }
+}
+
+void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
+                        const double* blocks, std::size_t size,
+                        const std::int64_t* tooth, const double* weight, std::size_t n,
+                        double* result) {
+  std::vector<double> moved(size);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double* own = weight + size * i;
+    for (std::size_t j = 0; j < n; ++j) {
+      // points of one tooth follow one another: keep what moves it
+      const bool again = j > 0 && tooth[j] == tooth[j - 1];
+      const auto count = static_cast<std::int64_t>(teeth);
+      const std::int64_t apart = ((tooth[i] - tooth[j]) % count + count) % count;
+      const std::int64_t block = block_of[apart];
+      double sum = 0.0;
+      if (block >= 0) {
+        if (!again) {
+          moved.assign(size, 0.0);
+          const double* rows = blocks + size * size * static_cast<std::size_t>(block);
+          for (std::size_t a = 0; a < size; ++a) {
+            // a point moves one flank of its tooth, half of the entries
+            if (own[a] == 0.0) continue;
+            const double* row = rows + size * a;
+            for (std::size_t b = 0; b < size; ++b) moved[b] += own[a] * row[b];
+          }
+        }
+        const double* other = weight + size * j;
+        for (std::size_t b = 0; b < size; ++b) sum += moved[b] * other[b];
+      }
+      result[n * i + j] = sum;
+    }
+  }
+}
+
+}  // namespace swgjoint

@@ -1,0 +1,34 @@
+// Dense sums behind the tangent of a drive: rotated blocks, springs of bore stations,
+// compliance between points of a ring of teeth.
+
+#ifndef SWGJOINT_KERNELS_TANGENTS_H_
+#define SWGJOINT_KERNELS_TANGENTS_H_
+
+#include <cstddef>
+#include <cstdint>
+
+namespace swgjoint {
+
+// Twin of _in_global_frame in swgjoint/fe/plane/linearise.py, in place:
+// matrices (count, size, size) of x, y pairs, turned by angles (count,) [rad].
+void rotate_blocks(double* matrices, const double* angle, std::size_t count,
+                   std::size_t size);
+
+// Twin of BoreStations.stiffness_of in swgjoint/fe/plane/bore_contact.py, added to
+// result (count, size, size): weights (p, 2, width), direction (count, q, 2),
+// stiffness (count, q), with q = p times the number of intervals.
+void add_station_stiffness(const double* weights, std::size_t p, std::size_t width,
+                           const double* direction, const double* stiffness,
+                           std::size_t count, std::size_t intervals, double* result);
+
+// Twin of contact_compliance in swgjoint/fe/common/block_circulant.py, result (n, n):
+// block_of: number of the block by tooth offset (teeth,), -1 for none;
+// blocks (n_blocks, size, size), tooth (n,), weight (n, size).
+void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
+                        const double* blocks, std::size_t size,
+                        const std::int64_t* tooth, const double* weight, std::size_t n,
+                        double* result);
+
+}  // namespace swgjoint
+
+#endif  // SWGJOINT_KERNELS_TANGENTS_H_

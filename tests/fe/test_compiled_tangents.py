@@ -1,0 +1,99 @@
+"""Compiled sums behind the tangent against the numpy code that they repeat."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.common.block_circulant import contact_compliance
+from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.linearise import _in_global_frame
+from swgjoint.kernels import kernels
+
+pytestmark = pytest.mark.skipif(
+    kernels() is None, reason="the package was built without compiled loops"
+)
+
+
+def near(ours, theirs):
+    scale = np.abs(theirs).max()
+    np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-14 * scale)
+
+
+def test_blocks_turn_as_in_numpy(monkeypatch):
+    rng = np.random.default_rng(1)
+    matrices, angle = rng.normal(size=(7, 12, 12)), rng.uniform(-4.0, 4.0, 7)
+    kept = matrices.copy()
+    ours = _in_global_frame(matrices, angle)
+    assert np.array_equal(matrices, kept)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    near(ours, _in_global_frame(matrices, angle))
+
+
+@pytest.mark.parametrize("touching", [0.0, 0.2, 1.0])
+def test_springs_of_stations_add_up_as_in_numpy(monkeypatch, touching):
+    """Stations with negative stiffness count, those without do not."""
+    rng = np.random.default_rng(2)
+    angle = np.linspace(-0.1, 0.1, 9)
+    nodes = 0.03 * np.stack([np.sin(angle), np.cos(angle)], -1)
+    stations = BoreStations.subdivide(nodes, layer=1e9)
+    q = len(stations.stiffness)
+    direction = rng.normal(size=(5, q, 2))
+    stiffness = rng.normal(size=(5, q)) * (rng.random((5, q)) < touching)
+    ours = stations.stiffness_of(direction, stiffness)
+    assert ours.any() == (touching > 0.0)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    near(ours, stations.stiffness_of(direction, stiffness))
+
+
+def test_springs_at_the_nodes_themselves(monkeypatch):
+    """One station an interval, as on a race."""
+    rng = np.random.default_rng(3)
+    stations = BoreStations.from_nodes(np.ones(6))
+    direction, stiffness = rng.normal(size=(4, 6, 2)), rng.random((4, 6))
+    ours = stations.stiffness_of(direction, stiffness)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    near(ours, stations.stiffness_of(direction, stiffness))
+
+
+def test_compliance_between_points_as_in_numpy(monkeypatch):
+    """Teeth in any order, pairs too far apart for a block, no point at all."""
+    rng = np.random.default_rng(4)
+    offsets, teeth, size = np.array([0, 1, -1, 2, -2]), 11, 8
+    blocks = rng.normal(size=(5, size, size))
+    tooth = rng.integers(0, teeth, 20)
+    weight = rng.normal(size=(20, size)) * (rng.random((20, size)) < 0.5)
+    for n in (20, 1, 0):
+        given = offsets, blocks, tooth[:n], weight[:n], teeth
+        monkeypatch.delenv("SWGJOINT_KERNELS", raising=False)
+        ours = contact_compliance(*given)
+        monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+        theirs = contact_compliance(*given)
+        assert ours.shape == (n, n)
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-12)
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    native = kernels()
+    index = np.zeros(2, dtype=np.int64)
+    with pytest.raises(ValueError):
+        native.rotate_blocks(np.zeros((2, 3, 3)), np.zeros(2))
+    with pytest.raises(ValueError):
+        native.rotate_blocks(np.zeros((2, 4, 4)), np.zeros(3))
+    with pytest.raises(ValueError):
+        native.add_station_stiffness(
+            np.zeros((2, 2, 4)),
+            np.zeros((1, 4, 2)),
+            np.zeros((1, 4)),
+            np.zeros((1, 4, 4)),
+        )
+    with pytest.raises(ValueError):
+        native.contact_compliance(
+            np.array([0, 7]),
+            np.zeros((2, 4, 4)),
+            index,
+            np.zeros((2, 4)),
+            np.zeros((2, 2)),
+        )
+    with pytest.raises(ValueError):
+        native.ellipse_distance(np.zeros((2, 3)), 1.0, 0.9, np.zeros((2, 4)))
