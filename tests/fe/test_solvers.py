@@ -36,6 +36,39 @@ def test_ring_solver_equals_a_dense_solution(sectors):
         assert np.abs(found[s] - exact[index[s]]).max() < 1e-12
 
 
+@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 7, 60, 61])
+@pytest.mark.parametrize("loaded", [[0], [2, 3], [5, 6, 7, 8, 9], [1, 31], [], None])
+def test_loads_in_some_sectors(sectors, loaded):
+    """The same there as the whole solution, wherever the ring is folded."""
+    rng = np.random.default_rng(sectors)
+    face, n = 3, 10
+    blocks = rng.normal(size=(sectors, n, n)) + 8.0 * np.eye(n)
+    within = np.unique(np.array([4] if loaded is None else loaded, dtype=int) % sectors)
+    factor = CyclicFactor(blocks, face, None if loaded is None else within)
+    rhs = np.zeros((sectors, n, 3))
+    rhs[within] = rng.normal(size=(len(within), n, 3))
+    whole = CyclicFactor(blocks, face).solve(rhs)
+    np.testing.assert_allclose(factor.solve(rhs), whole, rtol=0.0, atol=1e-13)
+    found = factor.solve_within(within, rhs[within])
+    np.testing.assert_allclose(found, whole[within], rtol=0.0, atol=1e-13)
+    # also for other sectors than those for which the ring was folded
+    other = (within[::-1] + 1) % sectors
+    rhs = np.roll(rhs, 1, axis=0)
+    found = factor.solve_within(other, rhs[other])
+    np.testing.assert_allclose(found, factor.solve(rhs)[other], rtol=0.0, atol=1e-13)
+
+
+def test_sectors_that_change_are_eliminated_anew():
+    """An update is a factorisation of the changed matrices."""
+    rng = np.random.default_rng(5)
+    blocks = rng.normal(size=(9, 8, 8)) + 8.0 * np.eye(8)
+    factor = CyclicFactor(blocks, 3)
+    blocks[[2, 7]] += rng.normal(size=(2, 8, 8))
+    factor.update(blocks, np.array([2, 7]))
+    rhs = rng.normal(size=(9, 8, 2))
+    assert np.array_equal(factor.solve(rhs), CyclicFactor(blocks, 3).solve(rhs))
+
+
 def random_problem(seed, m=12):
     """A contact-like problem with one free displacement and one multiplier."""
     rng = np.random.default_rng(seed)

@@ -33,11 +33,9 @@ class ForceLines:
     strips: Strips | None
     """Indentation strips of the candidates; None without indentation."""
     rows: Array
-    """Derivatives of the gaps of the lines with respect to the degrees of freedom of
-    their sectors (n, n_dofs) [-]."""
-    loads: Array
-    """Right-hand sides (N, n_dofs, n + 3): a column for minus the gradient, which each
-    solution overwrites, then unit loads on the lines, the anchor and the rotation."""
+    """Derivatives of the gaps of the lines (n, n_dofs)."""
+    constraints: Array
+    """Directions of the anchor and gradient of the rotation (N, n_dofs, 2)."""
     compliance: Array
     """Compliance of flexspline teeth, circular spline and indentation (n, n) [m/N]."""
     gap: Array
@@ -59,12 +57,9 @@ class ForceLines:
         sliding = _friction_lines(model, state, contacts)
         lines = contacts if sliding is None else sliding.lines
         strips = _strips(model, state, contacts)
-        n, rows = len(lines), linear.gap_gradient(lines)
-        loads = np.zeros((*linear.gradient.shape, n + 3))
-        loads[lines.sector, :, 1 + np.arange(n)] = rows
-        loads[:, :, n + 1] = linear.anchor
-        loads[:, :, n + 2] = linear.rotation_gradient
-        loads[linear.fixed] = 0.0
+        rows = linear.gap_gradient(lines)
+        constraints = np.stack([linear.anchor, linear.rotation_gradient], axis=-1)
+        constraints[linear.fixed] = 0.0
         local = lines.weight @ model.element.flank_compliance
         same = lines.sector[:, None] == lines.sector[None, :]
         compliance = np.where(same, local @ lines.weight.T, 0.0)
@@ -92,7 +87,7 @@ class ForceLines:
             sliding=sliding,
             strips=strips,
             rows=rows,
-            loads=loads,
+            constraints=constraints,
             compliance=compliance,
             gap=gap,
         )

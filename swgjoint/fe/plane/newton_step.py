@@ -175,7 +175,9 @@ class NewtonProblem:
             state=state,
             linear=linear,
             lines=ForceLines.from_candidates(model, state, linear, contacts),
-            factor=CyclicFactor(linear.anchor_tangent(), linear.face_dofs),
+            factor=CyclicFactor(
+                linear.anchor_tangent(), linear.face_dofs, np.unique(contacts.sector)
+            ),
         )
 
     def exchange(self, stations: Mask) -> NewtonProblem:
@@ -209,30 +211,42 @@ class NewtonProblem:
             ActiveSetError: If no set of active contacts is found.
         """
         linear, lines = self.linear, self.lines
-        lines.loads[:, :, 0] = np.where(linear.fixed, 0.0, -linear.gradient)
-        solved = self.factor.solve(lines.loads)
-        base, response = solved[:, :, 0], solved[:, :, 1:]
-        matrix, offset = self._matrix(response), self._offset(base)
+        loads = np.concatenate([-linear.gradient[:, :, None], lines.constraints], 2)
+        loads[linear.fixed] = 0.0
+        base, held = np.split(self.factor.solve(loads), [1], axis=2)
+        matrix, offset = self._matrix(held), self._offset(base[:, :, 0])
         guess = _first_guess(self.state, lines.contacts, offset, pressing)
         solution = _solve_condensed(matrix, offset, lines.sliding, guess, self.load)
-        loads = [*solution.force, solution.anchor, solution.multiplier]
-        return self._step(solution, base + response @ np.array(loads))
-
-    def _matrix(self, response: Array) -> Array:
-        """Matrix M (n + 3, n + 3) from displacements per load (N, n_dofs, n + 2)."""
-        lines, sector = self.lines.force, self.lines.force.sector
-        n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
-        driven = np.r_[0 : n + 1, n + 2]
-        matrix[np.ix_(np.arange(n), driven)] = np.einsum(
-            "kn,knl->kl", self.lines.rows, response[sector]
+        # the teeth push in a few sectors and move all
+        push = np.zeros_like(base)
+        np.add.at(
+            push[:, :, 0], lines.force.sector, solution.force[:, None] * lines.rows
         )
+        moved = base + self.factor.solve(push)
+        moved += held @ np.array([[solution.anchor], [solution.multiplier]])
+        return self._step(solution, moved[:, :, 0])
+
+    def _matrix(self, held: Array) -> Array:
+        """Matrix M (n + 3, n + 3).
+
+        Args:
+            held: Displacements per anchor force and multiplier (N, n_dofs, 2).
+        """
+        lines, rows = self.lines.force, self.lines.rows
+        n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
+        sectors, which = np.unique(lines.sector, return_inverse=True)
+        pushes = np.zeros((len(sectors), rows.shape[1], n))
+        pushes[which, :, np.arange(n)] = rows
+        response = self.factor.solve_within(sectors, pushes)
+        matrix[:n, :n] = np.einsum("kn,knl->kl", rows, response[which])
         matrix[:n, :n] += self.lines.compliance
         # anchor and rotation of the flexspline
         constrained = np.array([n, n + 2])
-        matrix[np.ix_(constrained, driven)] = np.einsum(
-            "snf,snl->fl", self.lines.loads[:, :, n + 1 :], response
+        by_line = np.einsum("kn,knf->kf", rows, held[lines.sector])
+        matrix[:n, constrained], matrix[constrained, :n] = by_line, by_line.T
+        matrix[np.ix_(constrained, constrained)] = np.einsum(
+            "snf,snl->fl", self.lines.constraints, held
         )
-        matrix[:n, constrained] = matrix[constrained, :n].T
         matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
         # turning the circular spline towards the teeth closes the gap by the lever arm
         arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
@@ -247,7 +261,7 @@ class NewtonProblem:
         offset[:n] = lines.gap + moved
         # anchor and rotation of the flexspline, torque on the circular spline
         constrained = np.array([n, n + 2])
-        offset[constrained] = np.einsum("snf,sn->f", lines.loads[:, :, n + 1 :], base)
+        offset[constrained] = np.einsum("snf,sn->f", lines.constraints, base)
         offset[n + 1] = -(load.on_circular_spline or 0.0) / self.model.copies
         offset[n + 2] += self.linear.rotation - (load.rotation or 0.0)
         return offset
