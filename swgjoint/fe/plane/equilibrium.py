@@ -262,11 +262,11 @@ def _finished(
         energy += race.energy
         input_torque, balls = race.balls.input_torque, race.balls.force
     else:
-        normal = model.wave_generator_normal(state)
-        arm = np.einsum(
-            "sqi,sqi->sq", rotate_right_angle(model.bore_points(state)), normal
-        )
-        input_torque = model.copies * float(np.sum(state.pressure * arm))
+        pushed = state.pressure != 0.0
+        points = model.bore_points(state)[pushed]
+        _, normal, _ = model.wave_generator_gap(points, state.wave_generator_angle)
+        arm = np.einsum("ki,ki->k", rotate_right_angle(points), normal)
+        input_torque = model.copies * float(state.pressure[pushed] @ arm)
         layer = 0.5 * state.pressure**2 / model.stations.stiffness
         energy += model.copies * float(np.sum(layer))
     work, law = 0.0, model.friction
