@@ -57,5 +57,10 @@ def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...
 def contact_compliance(
-    block_of: Index, blocks: Array, tooth: Index, weight: Array, result: Array
+    block_of: Index,
+    after: Index,
+    blocks: Array,
+    tooth: Index,
+    weight: Array,
+    result: Array,
 ) -> None: ...

@@ -172,7 +172,7 @@ void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
                                   stiffness.data(), count, q / p, result.data());
 }
 
-void contact_compliance(Index block_of, In<3> blocks, Index tooth, In<2> weight,
+void contact_compliance(Index block_of, Index after, In<3> blocks, Index tooth, In<2> weight,
                         Out<2> result) {
   const std::size_t n = tooth.shape(0), size = weight.shape(1);
   const std::size_t teeth = block_of.shape(0);
@@ -184,8 +184,13 @@ void contact_compliance(Index block_of, In<3> blocks, Index tooth, In<2> weight,
   for (std::size_t i = 0; i < teeth; ++i) {
     require(block_of.data()[i] >= -1 && block_of.data()[i] < count, "block_of");
   }
+  require(after.shape(0) == blocks.shape(0), "after: one per block");
+  for (std::int64_t k = 0; k < count; ++k) {
+    const std::int64_t next = after.data()[k];
+    require(next == -1 || (next > k && next < count), "after: increasing");
+  }
   const nb::gil_scoped_release release;
-  swgjoint::contact_compliance(block_of.data(), teeth, blocks.data(), size,
+  swgjoint::contact_compliance(block_of.data(), teeth, after.data(), blocks.data(), size,
                                tooth.data(), weight.data(), n, result.data());
 }
 
@@ -198,7 +203,7 @@ NB_MODULE(compiled, m) {
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
         nb::arg("result").noconvert());
   m.def("contact_compliance", &contact_compliance, nb::arg("block_of").noconvert(),
-        nb::arg("blocks").noconvert(), nb::arg("tooth").noconvert(),
+        nb::arg("after").noconvert(), nb::arg("blocks").noconvert(), nb::arg("tooth").noconvert(),
         nb::arg("weight").noconvert(), nb::arg("result").noconvert());
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());

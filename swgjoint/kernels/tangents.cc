@@ -52,7 +52,7 @@ void add_station_stiffness(const double* weights, std::size_t p, std::size_t wid
 }
 
 void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
-                        const double* blocks, std::size_t size,
+                        const std::int64_t* after, const double* blocks, std::size_t size,
                         const std::int64_t* tooth, const double* weight, std::size_t n,
                         double* result) {
   std::vector<double> moved(size);
@@ -63,12 +63,10 @@ void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
       const bool again = j > 0 && tooth[j] == tooth[j - 1];
       const auto count = static_cast<std::int64_t>(teeth);
       const std::int64_t apart = ((tooth[i] - tooth[j]) % count + count) % count;
-      const std::int64_t block = block_of[apart];
-      double sum = 0.0;
-      if (block >= 0) {
-        if (!again) {
-          moved.assign(size, 0.0);
-          const double* rows = blocks + size * size * static_cast<std::size_t>(block);
+      if (!again) {
+        moved.assign(size, 0.0);
+        for (std::int64_t k = block_of[apart]; k >= 0; k = after[k]) {
+          const double* rows = blocks + size * size * static_cast<std::size_t>(k);
           for (std::size_t a = 0; a < size; ++a) {
             // a point moves one flank of its tooth, half of the entries
             if (own[a] == 0.0) continue;
@@ -76,9 +74,10 @@ void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
             for (std::size_t b = 0; b < size; ++b) moved[b] += own[a] * row[b];
           }
         }
-        const double* other = weight + size * j;
-        for (std::size_t b = 0; b < size; ++b) sum += moved[b] * other[b];
       }
+      const double* other = weight + size * j;
+      double sum = 0.0;
+      for (std::size_t b = 0; b < size; ++b) sum += moved[b] * other[b];
       result[n * i + j] = sum;
     }
   }

@@ -22,10 +22,11 @@ void add_station_stiffness(const double* weights, std::size_t p, std::size_t wid
                            std::size_t count, std::size_t intervals, double* result);
 
 // Twin of contact_compliance in swgjoint/fe/common/block_circulant.py, result (n, n):
-// block_of: number of the block by tooth offset (teeth,), -1 for none;
-// blocks (n_blocks, size, size), tooth (n,), weight (n, size).
+// block_of: first block of a tooth offset (teeth,), after: next one of the same offset
+// (n_blocks,), larger than the one before, -1 for none; blocks (n_blocks, size, size),
+// tooth (n,), weight (n, size).
 void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
-                        const double* blocks, std::size_t size,
+                        const std::int64_t* after, const double* blocks, std::size_t size,
                         const std::int64_t* tooth, const double* weight, std::size_t n,
                         double* result);
 

@@ -56,11 +56,12 @@ def test_springs_at_the_nodes_themselves(monkeypatch):
     near(ours, stations.stiffness_of(direction, stiffness))
 
 
-def test_compliance_between_points_as_in_numpy(monkeypatch):
-    """Teeth in any order, pairs too far apart for a block, no point at all."""
+@pytest.mark.parametrize("most", [2, 5, 11])
+def test_compliance_between_points_as_in_numpy(monkeypatch, most):
+    """Teeth in any order, pairs without a block or with two, no point at all."""
     rng = np.random.default_rng(4)
-    offsets, teeth, size = np.array([0, 1, -1, 2, -2]), 11, 8
-    blocks = rng.normal(size=(5, size, size))
+    offsets, teeth, size = np.arange(-most, most + 1), 11, 8
+    blocks = rng.normal(size=(len(offsets), size, size))
     tooth = rng.integers(0, teeth, 20)
     weight = rng.normal(size=(20, size)) * (rng.random((20, size)) < 0.5)
     for n in (20, 1, 0):
@@ -90,10 +91,15 @@ def test_shapes_that_do_not_fit_are_refused():
     with pytest.raises(ValueError):
         native.contact_compliance(
             np.array([0, 7]),
+            index - 1,
             np.zeros((2, 4, 4)),
             index,
             np.zeros((2, 4)),
             np.zeros((2, 2)),
+        )
+    with pytest.raises(ValueError):  # a circle of blocks would never end
+        native.contact_compliance(
+            index, index, np.zeros((2, 4, 4)), index, np.zeros((2, 4)), np.zeros((2, 2))
         )
     with pytest.raises(ValueError):
         native.ellipse_distance(np.zeros((2, 3)), 1.0, 0.9, np.zeros((2, 4)))

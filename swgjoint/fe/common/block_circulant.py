@@ -47,11 +47,15 @@ def contact_compliance(
         Compliance matrix (n, n) [m/N].
     """
     if (native := kernels()) is not None:
-        block_of = np.full(teeth, -1)
-        block_of[np.asarray(offsets) % teeth] = np.arange(len(offsets))
+        # half a model has two offsets of the whole circle in one
+        block_of, after = np.full(teeth, -1), np.full(len(offsets), -1)
+        for k in reversed(range(len(offsets))):
+            at = offsets[k] % teeth
+            block_of[at], after[k] = k, block_of[at]
         result = np.empty((len(tooth), len(tooth)))
         native.contact_compliance(
             block_of,
+            after,
             blocks,
             np.ascontiguousarray(tooth),
             np.ascontiguousarray(weight),
