@@ -147,7 +147,7 @@ def test_a_rigid_circular_spline_cannot_rub():
     with pytest.raises(
         DesignError,
         match=naming(
-            "reference-2d", "friction.tooth_coefficient", "0.1", "elastic", "0"
+            "reference-2d", "friction.tooth_coefficient", "0.1", "0"
         ),
     ):
         sector_model(rubbing(), elastic_circular_spline=False)

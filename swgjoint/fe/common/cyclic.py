@@ -82,7 +82,7 @@ class Insides:
         inside, reach = rhs[:, self._inner], self._reach[sectors]
         return np.asarray(rhs[:, self._outer] - reach.transpose(0, 2, 1) @ inside)
 
-    def within(self, sectors: Index, faces: Array, rhs: Array) -> Array:
+    def substitute_faces(self, sectors: Index, faces: Array, rhs: Array) -> Array:
         """Solution of some sectors from the solution at their faces.
 
         Args:
@@ -302,7 +302,7 @@ class CyclicFactor:
         np.add.at(loads, at[1], outer[:, face:])
         solved = self._solve_faces(loads, start)
         both = np.concatenate([solved[at[0]], solved[at[1]]], axis=1)
-        return self._insides.within(sectors, both, rhs)
+        return self._insides.substitute_faces(sectors, both, rhs)
 
 
 def shift_rows(values: Array, shift: float) -> Array:
