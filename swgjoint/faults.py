@@ -291,7 +291,8 @@ def _accepted(info: Any, key: str) -> str:
         return limits
     annotation = getattr(info, "annotation", None)
     if models_in(annotation):
-        return "a table"
+        several = get_origin(annotation) in (tuple, list)
+        return f"a list, one [[{key}]] table for each item" if several else "a table"
     items = get_args(annotation)
     if get_origin(annotation) is tuple and Ellipsis not in items:
         return f"a list of {len(items)} numbers"

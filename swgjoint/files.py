@@ -192,7 +192,9 @@ def check_output_file(path: str | Path, suffix: str) -> Path:
     """
     path = Path(path)
     if path.suffix != suffix:
-        raise InputError(f"output file {str(path)!r}: accepted: a name ending {suffix}")
+        raise InputError(
+            f"output file {str(path)!r}: accepted: a name that ends in {suffix}"
+        )
     _check_length(path)
     if path.is_dir():
         raise InputError(f"output file {str(path)!r} is a folder")

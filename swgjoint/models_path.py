@@ -25,6 +25,8 @@ ECHOED = 120
 """Longest reference that a message quotes in full [characters]."""
 SHOWN = 12
 """Largest number of bundled names in a message."""
+_SHOWN_AS = {"drives": "designs"}
+"""Names of kinds in messages and commands, where they differ from the folder."""
 TOGETHER = {"scenes": ("arms",)}
 """Other kinds whose names are accepted instead of a kind."""
 
@@ -119,27 +121,31 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
         if bare in names:
             return models_path() / kind / f"{bare}{suffix}"
     if path.is_dir():
-        raise InputError(f"{what} {text[:200]!r} is a folder; needed: a {suffix} file")
+        raise InputError(
+            f"{what} {text[:200]!r} is a folder; accepted: a {suffix} file"
+        )
     bare = text.removesuffix(suffix)
     shown = text if len(text) <= ECHOED else f"{text[:57]}..."
     accepted = (kind, *TOGETHER.get(kind, ()))
     near = near_names(bare, [name for k in accepted for name in _names(k, suffix)])
     other = named_kind(bare)
     if other is not None and other not in accepted:
-        fault = f"{shown!r} is the name of {KINDS[other][1]}; needed: a {what}"
+        fault = f"{shown!r} is the name of {KINDS[other][1]}; accepted: a {what}"
     else:
         folders = " or ".join(f"models/{k}" for k in accepted)
         fault = f"{what} {shown!r} is neither a file nor in {folders}"
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    bundled = (f"{k}: {_listed(_names(k, suffix))}" for k in accepted)
+    bundled = (f"{_SHOWN_AS.get(k, k)}: {_listed(k, suffix)}" for k in accepted)
     raise InputError(f"{fault}{hint} (bundled {'; '.join(bundled)})")
 
 
-def _listed(names: list[str]) -> str:
-    """Names for a message, at most the first :data:`SHOWN`."""
+def _listed(kind: str, suffix: str) -> str:
+    """Bundled names of one kind for a message, at most the first :data:`SHOWN`."""
+    names = _names(kind, suffix)
     if len(names) <= SHOWN:
         return ", ".join(names)
-    more = f"and {len(names) - SHOWN} more, see 'swgjoint list'"
+    command = f"swgjoint list {_SHOWN_AS.get(kind, kind)}"
+    more = f"and {len(names) - SHOWN} more, see '{command}'"
     return ", ".join([*names[:SHOWN], more])
 
 

@@ -96,9 +96,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     if args.sort is not None and args.sort not in SORTABLE:
         near = near_names(args.sort, SORTABLE)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
         raise InputError(
-            f"--sort {args.sort}: unknown key{hint} accepted: {', '.join(SORTABLE)}"
+            f"--sort {args.sort}: unknown key; {hint}accepted: {', '.join(SORTABLE)}"
         )
     spec = _limits(args)
     scene = scene_or_arm(args.scene, args.overrides)

@@ -190,8 +190,8 @@ def _from_source(
     if isinstance(source, DriveMap):
         if model is not None:
             raise InputError(
-                f"model {model!r} for {_named(reference)!r}, a map of level"
-                f" {source.level!r}; accepted: a design"
+                f"model {model!r} with {_named(reference)!r}, a map of level"
+                f" {source.level!r}; accepted: with a design"
             )
         return source
     from swgjoint.drives.build_map import build_map
@@ -257,9 +257,9 @@ def _unknown(reference: str) -> str:
     sizes = sorted({int(size) for _, size in rows})
     return (
         f"drive {reference!r} is neither a file nor in models/drives or"
-        f" models/catalogue; {hint}accepted: {series} of sizes {sizes[0]} to"
-        f" {sizes[-1]} (swgjoint list drives), a design (swgjoint list designs),"
-        " size-NN-RRR, a design file or a .swg map"
+        f" models/catalogue; {hint}accepted: a catalogue drive ({series}; sizes"
+        f" {sizes[0]} to {sizes[-1]}; swgjoint list drives), a design (swgjoint list"
+        " designs), size-NN-RRR, a design file or a .swg map"
     )
 
 
@@ -293,8 +293,8 @@ def check_joint_names(
         InputError: If a name is not a joint of the arm, with one line for each.
     """
     lines = [
-        f"{where}: {key}.{name}: no such joint in arm {arm!r}"
-        f"{_meant(key, name, joints)}; accepted: {', '.join(joints)}"
+        f"{where}: {_placed(key, name)}: no such joint in arm {arm!r};"
+        f" {_meant(key, name, joints)}accepted: {', '.join(joints)}"
         for key, names in named.items()
         for name in sorted(names - set(joints))
     ]
@@ -302,9 +302,15 @@ def check_joint_names(
         raise InputError("\n".join(lines))
 
 
+def _placed(key: str, name: str) -> str:
+    """A joint name as a key below a table, or as the value of a key."""
+    is_value = key == "recording.joints" or key.endswith(".joint")
+    return f"{key} = {name!r}" if is_value else f"{key}.{name}"
+
+
 def _meant(key: str, name: str, joints: tuple[str, ...]) -> str:
     """Suggestion for a name that matches no joint."""
     if key == "joints" and name == "*":
-        return "; keys of all joints are under 'defaults', e.g. defaults.friction"
+        return "keys of all joints are under 'defaults', e.g. defaults.friction; "
     near = near_names(name, joints)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"did you mean {' or '.join(near)}? " if near else ""

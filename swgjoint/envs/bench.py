@@ -319,6 +319,6 @@ def settings_of(kind: type[Any], arguments: dict[str, Any]) -> Any:
     known = kind.__dataclass_fields__
     if unknown := sorted(set(arguments) - set(known)):
         raise InputError(
-            f"argument {unknown[0]!r} of an environment; accepted: {', '.join(known)}"
+            f"environment has no argument {unknown[0]!r}; accepted: {', '.join(known)}"
         )
     return kind(**arguments)

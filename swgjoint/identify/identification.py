@@ -242,7 +242,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
     estimates = _estimates(model, values, _covariance(information, kappa))
     element = estimates.get("hysteresis_yield_torque")
     if element is not None and element.low <= 0.0:
-        why = f"an element of {element.value:.3g} N·m is within its noise"
+        why = f"its yield torque, {element.value:.3g} N·m, is within its uncertainty"
         return _without_element(why, log, options)
     drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
     result = Identified(

@@ -125,9 +125,9 @@ class BenchLog:
         _, place, counts = np.unique(bins, return_inverse=True, return_counts=True)
         if counts.size < FEWEST:
             raise InputError(
-                f"{self.where}: {len(self.time)} samples over"
-                f" {np.ptp(self.time):g} s give {counts.size} windows of {window:g} s;"
-                f" accepted: at least {FEWEST}"
+                f"{self.where}: too few windows of {window:g} s in a log of"
+                f" {np.ptp(self.time):g} s with {len(self.time)} samples:"
+                f" {counts.size}; accepted: at least {FEWEST}"
             )
 
         def mean(values: Array | None) -> Array | None:

@@ -129,7 +129,7 @@ def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str,
     """
     table = read_toml(Path(path), what="spec").get("spec")
     if not isinstance(table, Mapping) or not table:
-        raise InputError(f"{path}: accepted: a table [spec] with limits")
+        raise InputError(f"{path}: no limits; accepted: a table [spec] with limits")
     return checked_limits(table, accepted, where=f"{path}: spec.")
 
 
@@ -155,8 +155,8 @@ def checked_limits(
             near = near_names(key, accepted)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
             faults.append(
-                f"{where}{key} = {value!r}: unknown figure; {hint}accepted: a positive"
-                f" number under {', '.join(accepted)}"
+                f"{where}{key} = {value!r}: unknown key; {hint}accepted: a positive"
+                f" number for {', '.join(accepted)}"
             )
         elif (
             isinstance(value, bool)

@@ -74,9 +74,9 @@ def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
     faults = []
     for pattern in (p for p in wanted if not found[p]):
         near = near_names(pattern, joints)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ";"
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
         faults.append(
-            f"--joints {pattern}: no such joint in arm {scene.arm!r}{hint} accepted:"
+            f"--joints {pattern}: no such joint in arm {scene.arm!r}; {hint}accepted:"
             f" {', '.join(joints)}, or a pattern such as 'wrist_*'"
         )
     if faults:

@@ -169,7 +169,7 @@ def _address(reference: str) -> str:
         parse_host_port(location)
     except ValueError:
         raise ValueError(
-            f"{address!r}: expected host and port, such as tcp://host:8786"
+            f"no host and port in {address!r}; accepted: for example tcp://host:8786"
         ) from None
     return str(address)
 

@@ -36,7 +36,9 @@ class FigureTask(Section):
                 near = get_close_matches(name, self.known, n=1)
                 hint = f"did you mean {near[0]}? " if near else ""
                 known = ", ".join(self.known)
-                faults.append((f"figures[{k}]", f"{name!r}: {hint}accepted: {known}"))
+                faults.append(
+                    (f"figures[{k}]", f"{name!r} is unknown; {hint}accepted: {known}")
+                )
         if faults:
             raise Fault(*faults)
         return self

@@ -49,9 +49,11 @@ class TuneSettings:
                 f"optimiser {self.optimiser!r}; accepted: {', '.join(OPTIMISERS)}"
             )
         if self.minutes is not None and self.evaluations is not None:
-            raise InputError("expected either minutes or evaluations, not both")
+            raise InputError(
+                "minutes and evaluations together; accepted: only one of them"
+            )
         if self.minutes is not None and not 0.0 < self.minutes <= 1440.0:
-            raise InputError(f"minutes {self.minutes:g}; accepted: > 0 and <= 1440")
+            raise InputError(f"minutes = {self.minutes:g}; accepted: > 0 and <= 1440")
         least = 2 * self.population
         if self.evaluations is not None and self.evaluations < least:
             raise InputError(

@@ -90,7 +90,9 @@ def tune(
         tunables[_NAMED] = named
     searches = {name: GainSearch() for name in tunables}
     if folder is None and resume:
-        raise InputError("resume needs the output folder of the run (--out)")
+        raise InputError(
+            "resume without a folder; accepted: with the folder of the run (--out)"
+        )
     training, held_out = settings.seeds
     trials = Trials(
         environment, arguments, seeds=training, candidates=settings.population

@@ -176,8 +176,9 @@ def sector_model(
         raise DesignError(
             f"{drive.name}: a half model needs even tooth counts, no tolerances and a "
             "wave generator that is symmetric under a rotation by 180 deg; the design "
-            f"has {drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and a "
-            f"wave generator of kind {design.wave_generator.kind!r}{balls}"
+            f"has {drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth, a wave "
+            f"generator of kind {design.wave_generator.kind!r}{balls} and "
+            f"{'' if has_errors(design) else 'no '}tolerances"
         )
     flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")

@@ -174,7 +174,9 @@ def check_modelled(design: Design) -> None:
     drive = design.drive
     faults = []
     if design.cup is None:
-        faults.append("the 3d model needs a [cup]; accepted without one: --model 2d")
+        faults.append(
+            "the 3d model needs a [cup] table; accepted without it: --model 2d"
+        )
     if design.friction.tooth_coefficient:
         faults.append(
             f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g}: the"

@@ -75,7 +75,7 @@ class DriveSection(Section):
             raise Fault(
                 (
                     "teeth_circular_spline",
-                    f"{difference} teeth more than the flexspline; accepted: a multiple"
+                    f"exceeds teeth_flexspline by {difference}; accepted: by a multiple"
                     " of the number of lobes of the wave generator (2 or 3), at most"
                     " 12",
                 )

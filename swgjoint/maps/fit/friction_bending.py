@@ -76,7 +76,7 @@ def bending_friction(
 def without_friction(design: Design) -> str:
     """Reason why a finite-element map has no losses, with the torque of rim bending."""
     return (
-        "the finite elements have no friction of bearing, seals and grease; bending of"
+        "the finite elements model no friction of bearing, seals and grease; bending of"
         f" the plain rim alone takes about {1e3 * bending_torque(design):.2g} mN·m"
         f" (loss factor {STEEL_LOSS_FACTOR:g}, assumed)"
     )

@@ -55,7 +55,9 @@ def read_loop(path: str | Path) -> TorqueLoop:
     data = read_columns(path, {"torque": TORQUE, "torsion": TORSION})
     torque, torsion = data["torque"], data["torsion"]
     if torque.size < 8:
-        raise InputError(f"{path}: {torque.size} samples; accepted: at least 8")
+        raise InputError(
+            f"{path}: too few samples: {torque.size}; accepted: at least 8"
+        )
     low, high = float(torque.min()), float(torque.max())
     if not (low < 0.0 < high and min(-low, high) > 0.05 * max(-low, high)):
         raise InputError(

@@ -217,7 +217,7 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
         return spec
     except (ValueError, OSError) as exc:
         line = " ".join(str(exc).split())
-        raise InputError(f"{path}: neither an MJCF nor a URDF arm: {line}") from None
+        raise InputError(f"{path}: cannot be read as MJCF or URDF: {line}") from None
 
 
 def _balance_inertia(spec: mujoco.MjSpec) -> None:

@@ -176,10 +176,11 @@ def _off_damping(
         if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
             continue
         own, got = mode.own_damping_ratio, mode.damping_ratio
-        part = f"the damping ratio {own:.2g} of the drive: it becomes {got:.2g}{where}"
+        part = f"damping ratio {own:.2g} of the drive"
         reason = (
-            f"steps of {1e3 * assembly.step:.3g} ms damp the torsion at"
-            f" {mode.own_frequency / hertz:.3g} Hz; a shorter simulation.step_s, or"
+            f"time steps of {1e3 * assembly.step:.3g} ms raise the damping ratio of the"
+            f" torsional vibration at {mode.own_frequency / hertz:.3g} Hz to"
+            f" {got:.2g}{where}; use a shorter simulation.step_s or"
             " joints.*.level = 'full'"
         )
         return [{"part": part, "reason": reason}]

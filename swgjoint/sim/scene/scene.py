@@ -369,13 +369,12 @@ def parse_override(text: str) -> tuple[str, Any]:
     key = key.strip()
     if not equals or not all(key.split(".")):
         raise InputError(
-            f"override {shorten(text)!r}: accepted: key=value with a dotted key, for"
-            " example simulation.step_s=0.0005"
+            f"{shorten(text)!r}: accepted: key=value, for example"
+            " simulation.step_s=0.0005"
         )
     if key.count(".") >= MAX_DEPTH:
         raise InputError(
-            f"override {shorten(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
-            " parts"
+            f"key {shorten(key)}: accepted: a dotted key of at most {MAX_DEPTH} parts"
         )
     return key, parse_value(value, where=key)  # a bare word is a name or a path
 

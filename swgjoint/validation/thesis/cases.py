@@ -217,7 +217,9 @@ class StudyFile(Section):
         unknown = [p for p in only if not any(chooses(p, g) for g in self.group)]
         if unknown:
             accepted = ", ".join(group.id for group in self.group)
-            raise InputError(f"unknown part {', '.join(unknown)}; accepted: {accepted}")
+            raise InputError(
+                f"--only {','.join(unknown)}: unknown part; accepted: {accepted}"
+            )
         return tuple(
             g for g in self.group if not only or any(chooses(p, g) for p in only)
         )
