@@ -75,37 +75,40 @@ class JointSection(Section):
     linear: LinearDrive | None = None
     """Drive of constant stiffness, instead of ``drive``."""
     model: Literal["ring", "2d", "3d"] | None = None
-    """Finite element model of a design; None takes 3d if it has a cup, otherwise 2d."""
+    """Fidelity of a design; by default 3d for a design with a cup, else 2d."""
     kinematic_error_arcmin: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
     """Assumed kinematic error, peak to peak over one output turn [arcmin], of a
     catalogue drive or of another drive without kinematic error; see
-    :mod:`swgjoint.maps.fit.error_spectrum`. None takes the transmission accuracy of the
-    catalogue. A drive that has its own kinematic error keeps it and accepts only 0."""
+    :mod:`swgjoint.maps.fit.error_spectrum`. The default is the transmission accuracy of
+    the catalogue. A drive with its own kinematic error keeps it and accepts only 0."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
-    """Seed of the assumed error, 0 if None; joints with equal seeds differ by name."""
+    """Seed of the assumed error, by default 0; with equal seeds, the errors of joints
+    with different names still differ."""
     level: Level | None = None
     """Level of detail of the joint model."""
     rotor_inertia_kgm2: Annotated[float, Field(gt=0, le=1)] | None = None
     """Inertia of rotor and wave generator about the motor axis [kg·m²]."""
     damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Damping ratio of the torsional vibration [-]; None takes that of the drive."""
+    """Damping ratio of the torsional vibration [-]; by default that of the drive."""
     hysteresis: bool | None = None
-    """Whether the levels native and full include the drive's hysteresis; None: yes."""
+    """Whether the levels native and full include the hysteresis of the drive; by
+    default true."""
     friction: bool | None = None
-    """Whether the levels native and full include the drive's friction; None: yes."""
+    """Whether the levels native and full include the friction of the drive; by
+    default true."""
     harmonics_tolerance_arcmin: Positive | None = None
     """Tolerance for omitting harmonics [arcmin]: at constant torque, the omitted
     harmonics together turn the output by less than this, see
-    :mod:`swgjoint.maps.fit.pruning`. None keeps all harmonics. The tolerance has no
-    effect at the levels rigid, linear and native, which have no harmonics. At the other
-    levels, a map is rejected if the variation of its stiffness, summed over the
-    harmonics, exceeds the mean stiffness, because a given torque then does not bound
-    the angle."""
+    :mod:`swgjoint.maps.fit.pruning`. By default all harmonics are kept. The tolerance
+    has no effect at the levels rigid, linear and native, which have no harmonics. At
+    the other levels, a map is rejected if the variation of its stiffness, summed over
+    the harmonics, exceeds the mean stiffness, because a given torque then does not
+    bound the angle."""
     rotor: Literal["gyroscopic", "lumped"] | None = None
     """Rotor model: ``gyroscopic`` (default), a body carried by the parent link, or
     ``lumped``, an inertia that rotates only relative to that link."""
     motor: MotorLimits | None = None
-    """Limits of the motor; None for a motor that delivers any commanded torque."""
+    """Limits of the motor; by default it delivers any commanded torque."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -25,6 +26,8 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 """Version of JSON Schema."""
 KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
 """Kinds of input files."""
+_ROLE = re.compile(r":[a-z]+:`~?([^`]+)`")
+"""Cross-reference of a docstring."""
 _SIGNS = {
     "exclusiveMinimum": ">",
     "minimum": ">=",
@@ -124,7 +127,7 @@ def _limits(kind: str) -> dict[str, Any]:
     figures = {}
     for key in (*upper, *lower):
         bound = "Largest" if key in upper else "Smallest"
-        text = f"{bound} value that is accepted. {meaning.get(key, '')}".strip()
+        text = f"{bound} accepted value. {meaning.get(key, '')}".strip()
         unit = {"unit": unit_of(key)} if unit_of(key) else {}
         entry = {"type": "number", "exclusiveMinimum": 0, "description": text}
         figures[key] = {**entry, **unit}
@@ -174,11 +177,32 @@ def _keys(
             "range": " or ".join(dict.fromkeys(filter(None, map(_range, values)))),
             "default": default if not isinstance(default, Mapping) else None,
             "required": name in required,
-            "meaning": entry.get("description")
-            or " ".join(str(values[0].get("description", "")).split()),
+            "meaning": _meaning(name, entry, values, table),
         }
         for form in values:
             yield from _below(form, root, key)
+
+
+def _meaning(
+    name: str,
+    entry: Mapping[str, Any],
+    values: Sequence[Mapping[str, Any]],
+    table: Mapping[str, Any],
+) -> str:
+    """Meaning of a key as plain text; the key ``kind`` has that of its table."""
+    own = entry.get("description")
+    if own is None and name == "kind":
+        own = table.get("description")
+    elif own is None and len(values) == 1 and not _kind_of(values[0]):
+        own = values[0].get("description")
+    paragraph = str(own or "").partition("\n\n")[0]
+    return " ".join(_ROLE.sub(r"\1", paragraph).replace("``", "").split())
+
+
+def _kind_of(form: Mapping[str, Any]) -> str | None:
+    """The only accepted value of the key ``kind`` of a table; None without it."""
+    kind: str | None = form.get("properties", {}).get("kind", {}).get("const")
+    return kind
 
 
 def _below(
@@ -186,8 +210,7 @@ def _below(
 ) -> Iterator[dict[str, Any]]:
     """Keys of a table, of tables with free names, and of the tables in a list."""
     if "properties" in form:
-        kind = form["properties"].get("kind", {}).get("const")
-        yield from _keys(form, root, f"{key}.", kind)
+        yield from _keys(form, root, f"{key}.", _kind_of(form))
     for inner, mark in (("additionalProperties", ".NAME"), ("items", "[]")):
         if isinstance(form.get(inner), Mapping):
             for item in _forms(form[inner], root):

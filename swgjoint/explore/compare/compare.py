@@ -59,7 +59,9 @@ class Compared:
     reasons: tuple[str, ...]
     """Reasons why the run is not valid."""
     ripple_rms_percent: float
+    """Rms torque ripple of the worst joint [% of rated torque]."""
     ripple_pp_percent: float
+    """Peak-to-peak torque ripple of the worst joint [% of rated torque]."""
     ripple_missing: str | None
     """Reason why no ripple is reported, such as a ripple below the integration noise;
     None if it is reported."""
@@ -80,9 +82,13 @@ class Compared:
     torsion_arcmin: float
     """Largest absolute mean torsion of a joint [arcmin]."""
     tool_path_rms_mm: float | None
+    """Rms deviation of the tool from the commanded path [mm]."""
     tool_ap_mm: float | None
+    """Largest pose accuracy AP after ISO 9283 [mm], or the error at the last pose."""
     tool_rp_mm: float | None
+    """Largest pose repeatability RP after ISO 9283 [mm]."""
     K1_Nm_rad: float | None
+    """Torsional stiffness K1 of the drive, at low torque [N·m/rad]."""
     von_mises_MPa: float | None
     """Largest von Mises stress of the flexspline at rated torque, averaged over one
     pitch [MPa]; None without a design."""
@@ -239,7 +245,7 @@ def _is_design(reference: str) -> bool:
 
 
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
-    """Limits that a row does not meet; unknown and invalid figures meet none.
+    """Limits that a row does not meet; a figure without a valid value meets none.
 
     A level without compliance meets every lower limit of the stiffness.
 

@@ -49,13 +49,13 @@ class MeshingTask(FigureTask):
 
     known = MESHING_FIGURES
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
-    """Output torque [N·m]; None for the rated torque of the design."""
+    """Output torque [N·m]; by default the rated torque of the design."""
     positions: Annotated[int, Field(ge=1, le=10_000)] = 6
     turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
-    """Input rotation [deg]; None for one pitch of the fixed member, after which the
+    """Input rotation [deg]; by default one pitch of the fixed member, after which the
     mesh cycle of a drive without errors repeats."""
     model: Literal["2d", "3d"] | None = None
-    """Fidelity; None for 3d if the design has a cup, else 2d."""
+    """Fidelity; by default 3d for a design with a cup, else 2d."""
 
     @model_validator(mode="after")
     def _loaded(self) -> MeshingTask:
