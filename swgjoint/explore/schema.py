@@ -133,7 +133,7 @@ def _limits(kind: str) -> dict[str, Any]:
         figures[key] = {**entry, **unit}
     table = {
         "type": "object",
-        "description": "Limits of figures.",
+        "description": "Limits, each of which must be met.",
         "properties": figures,
         "additionalProperties": False,
         "minProperties": 1,

@@ -43,7 +43,9 @@ class Limit(Section):
 
     figure: Text
     least: float | None = None
+    """Smallest accepted value, in the unit of the figure."""
     most: float | None = None
+    """Largest accepted value, in the unit of the figure."""
 
     @model_validator(mode="after")
     def _bounded(self) -> Limit:

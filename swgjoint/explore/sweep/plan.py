@@ -25,9 +25,13 @@ class Parameter(Section):
     """Keys that share one value, and the values that they take in turn."""
 
     keys: Annotated[tuple[Text, ...], Listed]
+    """Dotted keys of the design or the scene, all of which take the same value."""
     values: Annotated[tuple[Any, ...], Listed] | None = None
+    """Values of these keys, as an alternative to ``low`` and ``high``."""
     low: float | int | None = None
+    """Smallest value, in the unit of the keys."""
     high: float | int | None = None
+    """Largest value, in the unit of the keys."""
     count: Count | None = None
     """Number of equally spaced values in a grid."""
 
@@ -96,7 +100,9 @@ class LatinHypercube(Section):
 
     kind: Literal["latin_hypercube"] = "latin_hypercube"
     designs: Count
+    """Number of designs to draw."""
     seed: Seed = 0
+    """Seed of the random numbers."""
     parameters: Parameters
 
 
@@ -122,6 +128,7 @@ class SearchPlan(Section):
     designs: Count = 300
     """Number of designs to try, including those that cannot be built."""
     population: Annotated[int, Field(ge=2, le=10_000)] = 24
+    """Number of designs in a generation."""
     seed: Seed = 0
     minutes: Annotated[float, Field(gt=0, le=1e6)] | None = None
     """Time after which no further generation starts [min]. Without this limit, the same

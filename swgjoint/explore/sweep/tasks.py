@@ -27,6 +27,7 @@ class FigureTask(Section):
 
     known: ClassVar[tuple[str, ...]]
     figures: Annotated[tuple[Text, ...], Listed]
+    """Names of the quantities to compute; an unknown name lists those accepted."""
 
     @model_validator(mode="after")
     def _known(self) -> FigureTask:
@@ -51,6 +52,7 @@ class MeshingTask(FigureTask):
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
     """Output torque [N·m]; by default the rated torque of the design."""
     positions: Annotated[int, Field(ge=1, le=10_000)] = 6
+    """Number of wave-generator positions in the simulated rotation."""
     turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
     """Input rotation [deg]; by default one pitch of the fixed member, after which the
     mesh cycle of a drive without errors repeats."""
@@ -97,10 +99,13 @@ class SlurmCluster(Section):
 
     kind: Literal["slurm"] = "slurm"
     jobs: Annotated[int, Field(ge=1, le=10_000)]
+    """Number of jobs submitted to the cluster."""
     cores: Annotated[int, Field(ge=1, le=1_000)]
+    """Number of cores, and of processes, of one job."""
     memory_GB: Annotated[float, Field(gt=0, le=100_000)]
     """Memory of one job [GB]."""
     walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]
+    """Time limit of one job, as hours:minutes:seconds or days-hours:minutes:seconds."""
     queue: Text | None = None
     account: Text | None = None
     prologue: Annotated[tuple[Text, ...], Field(strict=False)] = ()
@@ -117,6 +122,7 @@ class AskedFile(Section):
     design: Reference | None = None
     """Base of the designs; without a base, the scene keeps its drives."""
     scene: Reference | None = None
+    """Scene that is run with each design, or whose keys are varied."""
     meshing: MeshingTask | None = None
     spec: SpecTask | None = None
     size: SizeTask | None = None
