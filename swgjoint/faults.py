@@ -26,7 +26,6 @@ _UNITS = {
     "kgm2": "kg·m²",
     "Nms_rad": "N·m·s/rad",
     "Nm_rad": "N·m/rad",
-    "Nms_rad": "N·m·s/rad",
     "Nm_A": "N·m/A",
     "deg_s": "deg/s",
     "deg_s2": "deg/s²",
