@@ -81,9 +81,9 @@ def report(result: dict[str, Any]) -> str:
             "",
             table(rows, header=header),
             "",
-            "errors: rms difference from the reference, which is level full with steps"
-            f" of {1e3 * reference['step_s']:g} ms and less, extrapolated to zero and"
-            f" converged to {reference['error']:.2g} {result['unit']}",
+            "errors: rms difference from the reference: level full with steps of"
+            f" {1e3 * reference['step_s']:g} ms and less, extrapolated to zero step (its"
+            f" uncertainty: {reference['error']:.2g} {result['unit']})",
             f"{result['wall_s']:.0f} s",
         ]
     )

@@ -220,9 +220,9 @@ def report(result: dict[str, Any]) -> str:
     for row in result["rows"]:
         lines += [f"{row['argument']}: {row['verdict']}: {r}" for r in row["reasons"]]
         for key in row["missed"]:
-            lines.append(
-                f"{row['argument']}: {key} {cell(row, key)}, limit {spec[key]:g}"
-            )
+            value = cell(row, key)
+            found = "has no value" if value == "-" else f"= {value}"
+            lines.append(f"{row['argument']}: {key} {found}; limit {spec[key]:g}")
     if spec is not None:
         passing = ", ".join(result["kept_by"])
         lines.append(f"all limits are met by: {passing or 'none'}")

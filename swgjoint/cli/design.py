@@ -87,23 +87,27 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.action != "new" and new_options:
         option = {"overrides": "set"}.get(new_options[0], new_options[0])
         raise InputError(
-            f"--{option} with design {args.action}; accepted: with design new"
+            f"--{option} does not apply to design {args.action}; accepted with design"
+            " new"
         )
     if args.action == "check":
         if args.out:
             raise InputError(
-                "--out with design check, which writes no files; accepted: with design"
-                " show or design export"
+                "--out does not apply to design check, which writes no files; accepted"
+                " with design show or design export"
             )
         return _check(args.designs)
     if len(args.designs) > 1:
         raise InputError(
-            f"design {args.action} with {len(args.designs)} files; accepted: one DESIGN"
+            f"design {args.action}: {len(args.designs)} designs; accepted: one DESIGN"
         )
     if args.action == "new":
         return _new(args)
     if not args.out:
-        raise InputError(f"design {args.action} needs --out DIR")
+        raise InputError(
+            f"design {args.action} writes files and needs a folder; accepted: with"
+            " --out DIR"
+        )
     folder = output_folder(args.out)
     from swgjoint.gear.design.check import raise_faults
     from swgjoint.gear.design.defaults import defaults_taken
@@ -129,9 +133,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _new(args: argparse.Namespace) -> dict[str, Any]:
     """Scale a design, make it feasible and write it to a file."""
     if args.out:
-        raise InputError("--out with design new; accepted: -o FILE.toml")
+        raise InputError(
+            "--out does not apply to design new; accepted: with -o FILE.toml"
+        )
     if not args.output:
-        raise InputError("design new needs -o FILE.toml")
+        raise InputError(
+            "design new writes a file and needs its name; accepted: with -o FILE.toml"
+        )
     path = check_output_file(args.output, ".toml")
     teeth = _teeth(args.teeth) if args.teeth else None
     from swgjoint.gear.design.design import Design

@@ -175,8 +175,8 @@ def report(result: dict[str, Any]) -> str:
     text = table(rows, header=("parameter", "value", "95 % from", "to"))
     lines = [f"identified from {result['log']}", text]
     lines += [
-        f"{key}: residual {r['rms_Nm']:.3g} N·m rms, {100 * r['share']:.3g} % of the"
-        " measured rms"
+        f"{key.replace('_', ' ')}: residual {r['rms_Nm']:.3g} N·m rms,"
+        f" {100 * r['share']:.3g} % of the measured rms"
         for key, r in result["residuals"].items()
     ]
     doubts = result["doubts"]
@@ -191,10 +191,10 @@ def status(result: dict[str, Any]) -> int:
 
 
 def _pair(text: str, option: str, form: str, mark: str, kind: type) -> tuple[Any, Any]:
+    """Two numbers of type ``kind`` separated by ``mark`` in the value of an option."""
     try:
         first, second = (kind(part) for part in text.split(mark))
     except ValueError:
-        raise InputError(
-            f"{option} {text[:40]}; accepted: two numbers, {form}"
-        ) from None
+        what = "integers" if kind is int else "numbers"
+        raise InputError(f"{option} {text[:40]}; accepted: {what} as {form}") from None
     return first, second

@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the percentiles of every figure, then the yield."""
+    """Format percentiles, mean and deviation of every figure, then the yield."""
     columns = ("p1", "p5", "p50", "p95", "p99", "mean", "std")
     rows = [
         [key, *(figure[column] for column in columns)]
@@ -117,10 +117,13 @@ def report(result: dict[str, Any]) -> str:
             f"no equilibrium was found for {result['failed']} of {count} drives"
         )
     off = result["validity"]["superposition_error"]
-    error = "unknown" if off is None else f"{100.0 * off:.1f} % of the peak to peak"
+    error = (
+        "an unknown amount"
+        if off is None
+        else f"{100.0 * off:.1f} % of the peak-to-peak value"
+    )
     lines.append(
-        "superposition of errors, first drive compared with full solves: difference"
-        f" {error}"
+        f"superposition of errors: the first drive differs by {error} from full solves"
     )
     if result["yield"] is not None:
         yields = result["yield"]
@@ -136,6 +139,6 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _share(yields: dict[str, Any]) -> str:
-    """A yield with its confidence interval, as text."""
+    """A yield with its 95 % confidence interval, as text."""
     low, high = 100.0 * yields["low"], 100.0 * yields["high"]
     return f"{100.0 * yields['part']:.1f} % ({low:.1f} to {high:.1f} %)"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.cli.shared.map_validity_text import validation_table
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
+from swgjoint.faults import split_unit
 from swgjoint.files import Outputs, check_output_file
 from swgjoint.maps.sheet.validation_notes import validation_of_map
 
@@ -120,8 +121,8 @@ def _built(args: argparse.Namespace) -> DriveMap:
     options = [name for name in _MEASURED if getattr(args, name) is not None]
     if options:
         raise InputError(
-            f"--{options[0].replace('_', '-')} with a design; accepted: with a .csv"
-            " file"
+            f"--{options[0].replace('_', '-')} does not apply to a design; accepted"
+            " with a .csv file"
         )
     from swgjoint.gear.design.design import Design
 
@@ -136,7 +137,8 @@ def _measured(args: argparse.Namespace) -> DriveMap:
     """Fit the map of a measured loop."""
     if args.model is not None:
         raise InputError(
-            f"--model {args.model} with a measured loop; accepted: with a design"
+            f"--model {args.model} does not apply to a measured loop; accepted with a"
+            " design"
         )
     if args.measured_teeth is None or args.measured_rated is None:
         raise InputError(
@@ -146,7 +148,7 @@ def _measured(args: argparse.Namespace) -> DriveMap:
     teeth = args.measured_teeth.split("/")
     if len(teeth) != 2 or not all(part.isdecimal() for part in teeth):
         raise InputError(
-            f"--measured-teeth {args.measured_teeth}; accepted: two numbers, FS/CS"
+            f"--measured-teeth {args.measured_teeth}; accepted: integers as FS/CS"
         )
     from swgjoint.maps.drive_map import DriveMap
 
@@ -194,7 +196,9 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
-    """Rows of a table for a nested object, named by the path of keys."""
+    """Rows of a table for a nested object, named by the path of keys with the unit."""
     if isinstance(value, dict):
         return [row for key, v in value.items() for row in _flat(f"{name} {key}", v)]
-    return [] if value is None else [(name, value)]
+    text, unit = split_unit(name)
+    label = text.replace("_", " ") + (f" [{unit}]" if unit else "")
+    return [] if value is None else [(label, value)]

@@ -100,7 +100,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     model = args.model or default_model(design)
     if args.resume and (folder is None or model != "3d"):
         raise InputError(
-            "--resume; accepted: with --model 3d and with --out DIR of the run"
+            "--resume needs a 3D model and the folder of the interrupted run; accepted:"
+            " with --model 3d and --out DIR"
         )
     meshing = simulate_meshing(
         design,
@@ -153,6 +154,16 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("\n".join(faults))
 
 
+def _labelled(label: dict[str, Any]) -> list[str]:
+    """Entries of the validity label in words, without absent ones."""
+    answers = {True: "yes", False: "no"}
+    return [
+        f"{key.replace('_', ' ')} {answers[v] if isinstance(v, bool) else v}"
+        for key, v in label.items()
+        if v is not None
+    ]
+
+
 def status(result: dict[str, Any]) -> int:
     """Return 1 if a position could not be solved, else 0."""
     return int(result["outcome"] != "converged")
@@ -179,7 +190,7 @@ def report(result: dict[str, Any]) -> str:
         f"meshing of {result.get('design', 'the design')}:"
         f" {result['nodes']} nodes, {result['elements']} elements,"
         f" {result['steps']} positions, {result['wall_s']:.1f} s",
-        "validity: " + ", ".join(f"{k} {v}" for k, v in label.items() if v is not None),
+        f"validity: {', '.join(_labelled(label))}",
         table(rows, header=("[MPa]", "tensile", "compressive", "von Mises")),
     ]
     steps = result["per_step"]

@@ -128,7 +128,10 @@ def report(result: dict[str, Any]) -> str:
                 f"front {k + 1} is at least as good in all objectives as {others}"
             )
     for task, label in result["validity"].items():
-        absent = [f"{part}: {why}" for part, why in label["not_modelled"].items()]
+        absent = [
+            f"not modelled, {part}: {why}"
+            for part, why in label["not_modelled"].items()
+        ]
         text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
         lines.append(f"validity of {task}: {text}")
     lines.append(

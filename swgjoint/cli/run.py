@@ -168,9 +168,9 @@ def report(result: dict[str, Any]) -> str:
         else f"ripple: {result['ripple_of']}",
         tool_line(result["tool"], random="sensors" in contains),
         *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
-        f"model: {contains['degrees_of_freedom']} degrees of freedom,"
-        f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
-        f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
+        f"model: degrees of freedom: {contains['degrees_of_freedom']}, tendons:"
+        f" {contains['tendons']}, plugin instances: {contains['plugin_instances']};"
+        f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
         *assumed_lines(contains),

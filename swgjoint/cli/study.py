@@ -94,8 +94,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     _check_response_options(args)
     if args.seeds is not None and args.name != "control":
         raise InputError(
-            f"--seeds {args.seeds} with study {args.name}, which draws no specimens;"
-            " accepted: with study control"
+            f"--seeds {args.seeds} does not apply to study {args.name}, which draws no"
+            " specimens; accepted with study control"
         )
     if args.seeds is not None and not 1 <= args.seeds <= MAX_SEEDS:
         raise InputError(f"--seeds {args.seeds}; accepted: 1 to {MAX_SEEDS}")
@@ -136,7 +136,8 @@ def _check_response_options(args: argparse.Namespace) -> None:
     named = [key for key, value in options.items() if value is not None]
     if named and args.name != "response":
         raise InputError(
-            f"--{named[0]} with study {args.name}; accepted: with study response"
+            f"--{named[0]} does not apply to study {args.name}; accepted with study"
+            " response"
         )
     for key in named:
         value = options[key]

@@ -122,7 +122,10 @@ def report(result: dict[str, Any]) -> str:
         more = ", ..." if len(numbers) > 8 else ""
         lines.append(f"{', '.join(map(str, numbers[:8]))}{more}: {reason}")
     for task, label in result["validity"].items():
-        absent = [f"{part}: {why}" for part, why in label["not_modelled"].items()]
+        absent = [
+            f"not modelled, {part}: {why}"
+            for part, why in label["not_modelled"].items()
+        ]
         text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
         lines.append(f"validity of {task}: {text}")
     share = result["efficiency"]

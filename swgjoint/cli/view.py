@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         the viewer. Ending that process ends the viewer.
 
     Raises:
-        InputError: If the file cannot be read or is no recording.
+        InputError: If the file cannot be read or is not a recording.
     """
     path = _recording(args.file)
     from swgjoint.view.recording.viewer import (
@@ -72,7 +72,9 @@ def _recording(name: str) -> Path:
         with path.open("rb") as file:
             head = file.read(4)
     except OSError as exc:
-        raise InputError(f"recording {name!r}: {exc.strerror}") from None
+        raise InputError(
+            f"recording {name!r}: cannot be read: {exc.strerror}"
+        ) from None
     if not head.startswith(RRD_MAGIC):
-        raise InputError(f"recording {name!r}: not a rerun recording (.rrd)")
+        raise InputError(f"{name!r} is not a recording; accepted: a rerun file (.rrd)")
     return path

@@ -173,7 +173,7 @@ def test_the_picture_and_the_report_show_every_argument(tmp_path, capsys):
     arguments = [SOFT, STIFF, SOFT, "--spec", str(spec), "--out", str(out)]
     assert main(["compare", *arguments, *SHORT]) == 1
     text = capsys.readouterr().out
-    assert re.search(f"^{SOFT}: K1_Nm_rad 47.., limit 10000$", text, re.MULTILINE)
+    assert re.search(f"^{SOFT}: K1_Nm_rad = 47..; limit 10000$", text, re.MULTILINE)
     assert text.count("MISSED") == 2 and text.count("met\n") == 1
     files = ["compare.json", "compare.png", "report.html", "run.rrd"]
     assert sorted(p.name for p in out.iterdir()) == files

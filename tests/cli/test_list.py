@@ -9,6 +9,7 @@ from messages import names
 
 from swgjoint.cli.list import KINDS
 from swgjoint.cli.main import main
+from swgjoint.cli.shared.text import table
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.from_catalogue import catalogue_names
 from swgjoint.models_path import bundled_names
@@ -56,3 +57,14 @@ def test_another_kind_is_refused_with_those_there_are(capsys):
         main(["list", "robots"])
     assert left.value.code == 2
     assert names(capsys.readouterr().err, "'robots'", *KINDS)
+
+
+def test_tables_align_text_left_and_numbers_right():
+    """By the content of a column: marks and units do not make a number a text."""
+    rows = [("a", "", "N·m", ""), ("b", "one", "! 1.5", "-"), ("c", "twelve", 10.25, 2)]
+    assert table(rows, header=("", "word", "torque", "n")).splitlines() == [
+        "   word    torque  n",
+        "a             N·m",
+        "b  one      ! 1.5  -",
+        "c  twelve   10.25  2",
+    ]

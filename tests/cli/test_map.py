@@ -69,7 +69,7 @@ def test_report(built, tmp_path, capsys):
     assert main(["map", "reference-2d", "-o", str(path)]) == 0
     out = capsys.readouterr().out
     assert str(path) in out.splitlines()[0]
-    assert "residual torque_Nm" in out
+    assert "residual torque [N·m]" in out
     assert "energy check relative" in out
 
 

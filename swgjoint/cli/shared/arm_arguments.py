@@ -91,7 +91,7 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
     if arm_options:
         raise InputError(
             f"{', '.join(arm_options)} with scene {args.scene!r}; accepted: with an arm"
-            " (an MJCF or URDF file); for a scene, set the keys of the scene instead"
+            " (an MJCF or URDF file); with a scene, use --set KEY=VALUE instead"
         )
     if drive:
         scene = Scene.load_file(args.scene).with_drive(drive)
@@ -100,7 +100,7 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
 
 
 def choice_lines(choice: dict[str, Any]) -> list[str]:
-    """Table of the automatically selected drives, and joints too strong for any.
+    """Table of the automatically selected drives, with remarks on those too weak.
 
     Args:
         choice: JSON objects of the selected drives by joint.
@@ -146,7 +146,8 @@ def _remark(one: dict[str, Any]) -> str:
         )
         return (
             f"too weak for {_torque(one['needed_Nm'])} from the"
-            f" {_SOURCES[one['decided_by']]}; largest drive: {one['drive']} ({others})"
+            f" {_SOURCES[one['decided_by']]}; largest drive: {one['drive']}; other"
+            f" requirements: {others}"
         )
     if one["larger_than_needed"]:
         return "smallest drive, its capacity is more than 10 times larger than required"

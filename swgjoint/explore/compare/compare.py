@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -204,7 +205,7 @@ def compare(
     Raises:
         InputError: If an argument is neither a drive nor a level.
     """
-    sources = {name: None if name in LEVELS else find_drive(name) for name in arguments}
+    sources = {name: _source(name) for name in arguments}
     kept: dict[str, DriveMap] = {}  # drives that the scene keeps
 
     def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
@@ -238,6 +239,18 @@ def compare(
         rows.append(replace(row, missed=missed_limits(row, spec or {})))
         progress("compared", number + 1, len(arguments))
     return rows
+
+
+def _source(argument: str) -> Design | DriveMap | None:
+    """The drive that an argument names, or None for a level."""
+    if argument in LEVELS:
+        return None
+    if near := get_close_matches(argument, LEVELS, n=1):
+        try:
+            return find_drive(argument)
+        except InputError as error:
+            raise InputError(f"{error}; or level {near[0]}") from None
+    return find_drive(argument)
 
 
 def _is_design(reference: str) -> bool:
