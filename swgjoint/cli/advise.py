@@ -82,8 +82,8 @@ def report(result: dict[str, Any]) -> str:
             table(rows, header=header),
             "",
             "errors: rms difference from the reference: level full with steps of"
-            f" {1e3 * reference['step_s']:g} ms and less, extrapolated to zero step (its"
-            f" uncertainty: {reference['error']:.2g} {result['unit']})",
+            f" {1e3 * reference['step_s']:g} ms and less, extrapolated to zero step;"
+            f" uncertainty {reference['error']:.2g} {result['unit']}",
             f"{result['wall_s']:.0f} s",
         ]
     )

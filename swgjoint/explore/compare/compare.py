@@ -249,7 +249,7 @@ def _source(argument: str) -> Design | DriveMap | None:
         try:
             return find_drive(argument)
         except InputError as error:
-            raise InputError(f"{error}; or level {near[0]}") from None
+            raise InputError(f"{error}; did you mean the level {near[0]}?") from None
     return find_drive(argument)
 
 
