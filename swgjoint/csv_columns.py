@@ -201,4 +201,4 @@ def _column(
 
 
 def _wanted(quantities: Mapping[str, Mapping[str, float]]) -> str:
-    return "needed: columns " + ", ".join(" or ".join(q) for q in quantities.values())
+    return "accepted: columns " + ", ".join(" or ".join(q) for q in quantities.values())

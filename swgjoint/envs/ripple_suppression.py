@@ -64,8 +64,8 @@ class RippleSettings(BenchSettings):
         way = self.max_speed_rad_s * self.episode_s
         if way > self.max_angle_rad:
             raise InputError(
-                f"max_angle_rad {self.max_angle_rad} rad; needed: at least {way:g} rad,"
-                " max_speed_rad_s * episode_s"
+                f"max_angle_rad {self.max_angle_rad} rad; accepted: at least {way:g}"
+                " rad, max_speed_rad_s * episode_s"
             )
 
 

@@ -244,12 +244,13 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
     )
     speed = np.abs(states[:, 1 + nq : 1 + nq + nv])
     if bad or not np.isfinite(states).all() or speed.max() > 1e6:
-        step = assembly.step
+        step, integrator = assembly.step, assembly.scene.simulation.integrator
+        other = "lower gains" if integrator == "discrete" else "integrator discrete"
+        # the engine restarts at t = 0 after it has diverged
         raise ComputationError(
             f"scene {assembly.scene.name!r}: the motion diverged before"
-            f" t = {states[-1, 0]:.3f} s with a step of {step:g} s and integrator"
-            f" {assembly.scene.simulation.integrator}; use a smaller simulation.step_s"
-            " or integrator discrete"
+            f" t = {states[:, 0].max() + step:.3f} s with a step of {step:g} s and"
+            f" integrator {integrator}; use a smaller simulation.step_s or {other}"
         )
 
 

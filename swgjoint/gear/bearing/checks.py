@@ -57,8 +57,8 @@ def bearing_checks(design: Design) -> list[Check]:
             bearing.race_thickness_mm,
             thinnest,
             "mm",
-            f"{where}.race_thickness_mm = {bearing.race_thickness_mm:g}: the groove for"
-            f" balls of {bearing.ball_diameter_mm:g} mm would cut through the race;"
+            f"{where}.race_thickness_mm = {bearing.race_thickness_mm:g} mm: the groove"
+            f" for balls of {bearing.ball_diameter_mm:g} mm would cut through the race;"
             f" accepted: at least {thinnest:.4g} mm",
         ),
         Check.upper_limit(

@@ -250,7 +250,7 @@ def read_points(
     time = columns["time"]
     if time.size < 2 or not (np.diff(time) > 0.0).all():
         raise InputError(
-            f"{path}: time_s does not increase from line to line; needed: two or more"
+            f"{path}: time_s does not increase from line to line; accepted: two or more"
             " points at increasing times"
         )
     nearest, length = float(np.diff(time).min()), float(time[-1] - time[0])

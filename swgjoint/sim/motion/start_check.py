@@ -71,7 +71,7 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
         f"{where}: joint {attached.joint!r}: link {body.name!r} has {inertia:.2g} kg·m²"
         f" about the joint (its own mass: {body.mass[0]:.2g} kg), so the peak torque"
         f" {torque:.3g} N·m of drive {attached.drive.name!r} would accelerate it by"
-        f" {fastest:.1g} rad/s²; needed: more than"
+        f" {fastest:.1g} rad/s²; accepted: more than"
         f" {torque / FASTEST:.1g} kg·m², that is, a realistic inertia in {arm.path}, or"
         " a joint without a drive"
     )

@@ -251,7 +251,11 @@ class Circle(ToolMotion):
         size = (a * a + b * b + c * c) * (x * x + y * y + z * z)
         if sum(v * v for v in across) <= 1e-12 * size:
             raise Fault(
-                ("towards", "parallel to normal; accepted: any other direction")
+                (
+                    "towards",
+                    "parallel to normal, or one of the two is zero; accepted: two"
+                    " directions that span a plane",
+                )
             )
         return self
 
