@@ -56,6 +56,11 @@ _BOUND_ERRORS = {
     "less_than",
     "less_than_equal",
 }
+_SIZES = {
+    "too_short": ("at least", "min_length"),
+    "string_too_short": ("at least", "min_length"),
+    "string_too_long": ("at most", "max_length"),
+}
 _TYPES = {
     "float_type": "a number",
     "int_type": "an integer",
@@ -148,9 +153,20 @@ def validate(
         return model.model_validate(dict(data))
     except ValidationError as exc:
         lines: list[str] = []
-        for detail in exc.errors(include_url=False):
-            lines += [f"{where}: {line}" for line in _lines(model, detail)]
+        details = exc.errors(include_url=False)
+        for detail in details:
+            if not _follows(detail, details):
+                lines += [f"{where}: {line}" for line in _lines(model, detail)]
         raise error("\n".join(dict.fromkeys(lines))) from None
+
+
+def _follows(detail: ErrorDetails, others: list[ErrorDetails]) -> bool:
+    """Whether a list is too short only because its items are faulty."""
+    loc = detail["loc"]
+    return detail["type"] == "too_short" and any(
+        len(other["loc"]) > len(loc) and other["loc"][: len(loc)] == loc
+        for other in others
+    )
 
 
 def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
@@ -171,7 +187,7 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
         hint = f"did you mean {near[0]}? " if near else ""
         return [f"{path}: unknown key; {hint}accepted here: {', '.join(accepted)}"]
     if kind == "missing":
-        return [f"{path}: missing; accepted: {_accepted(info, key)}"]
+        return [f"{path}: missing; accepted: {_accepted(info, key, path)}"]
     if kind == "union_tag_not_found":
         tags = ", ".join(repr(_tag(m)) for m in models_in(info.annotation))
         return [f"{path}.kind: missing; accepted: {tags}"]
@@ -192,6 +208,16 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
         bounds = f"{', each' if example else ''} {limits}" if limits else ""
         text = f"accepted: {_TYPES[kind]}{example}{bounds}"
         return [f"{path} = {_shown(value, '')}: {text}"]
+    if kind in _SIZES:
+        count, unit = (
+            ctx[_SIZES[kind][1]],
+            "item" if kind == "too_short" else "character",
+        )
+        plural = "" if count == 1 else "s"
+        text = f"{_SIZES[kind][0]} {count} {unit}{plural}"
+        return [f"{path} = {_shown(value, '')}: accepted: {text}"]
+    if kind == "string_pattern_mismatch":
+        return [f"{path} = {_shown(value, '')}: accepted: text like {ctx['pattern']}"]
     return [f"{path} = {_shown(value, key)}: {detail['msg']}"]
 
 
@@ -285,14 +311,18 @@ def _example(info: Any, key: str, path: str, kind: str) -> str:
     return f" [{path}] with {', '.join(keys)}"
 
 
-def _accepted(info: Any, key: str) -> str:
+def _accepted(info: Any, key: str, path: str = "") -> str:
     limits = _limits(info, key) if info is not None else ""
     if limits:
         return limits
     annotation = getattr(info, "annotation", None)
     if models_in(annotation):
         several = get_origin(annotation) in (tuple, list)
-        return f"a list, one [[{key}]] table for each item" if several else "a table"
+        return (
+            f"a list, one [[{path or key}]] table for each item"
+            if several
+            else "a table"
+        )
     items = get_args(annotation)
     if get_origin(annotation) is tuple and Ellipsis not in items:
         return f"a list of {len(items)} numbers"

@@ -76,7 +76,7 @@ def read_toml(
         size = path.stat().st_size
         other = _OTHER_FILES.get(path.suffix.lower())
         if other is not None:
-            raise error(f"{path}: this is {_a(other)}; {_a(what)} is needed, as TOML")
+            raise error(f"{path}: this is {_a(other)}; accepted: {_a(what)} as TOML")
         if size > MAX_BYTES:
             raise error(f"{path}: {size} bytes; {_a(what)} has at most {MAX_BYTES}")
         data = parse_toml(path.read_bytes().decode(), where=str(path), error=error)
@@ -86,7 +86,10 @@ def read_toml(
         raise error(f"{path}: not UTF-8 text at byte {exc.start}") from None
     kind = kind_of_file(data)
     if kind is not None and what in _MARKS and kind != what:
-        raise error(f"{path}: this is {_a(kind)} file; {_a(what)} is needed")
+        marks = ", ".join(sorted(_MARKS[what]))
+        raise error(
+            f"{path}: this is {_a(kind)} file; accepted: {_a(what)} with keys {marks}"
+        )
     return data
 
 

@@ -73,11 +73,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Check designs, or plot, export or scale one design.
 
     Returns:
-        ``feasible``, ``checks`` (list of objects with name, ok, value, unit, limit;
-        for several designs also ``design``), ``design`` or ``designs``, ``tooth_path``
-        (passage of a rigid tooth), ``defaults`` (default values of keys that the file
-        does not state), ``files``; for ``new`` also ``factors`` and ``moved`` (values
-        that were changed because scaling alone made the design infeasible).
+        ``action``, ``feasible``, ``checks`` (list of objects with name, ok, value,
+        unit, limit, numerical; for several designs also ``design``), ``design`` or
+        ``designs``, ``tooth_path`` (passage of a rigid tooth), ``defaults`` (default
+        values of keys that the file does not state), ``files``; for ``export`` also
+        ``points`` (number of points by part); for ``new`` also ``factors`` and
+        ``moved`` (values changed because scaling alone made the design infeasible).
 
     Raises:
         InputError: If an option does not fit the action.

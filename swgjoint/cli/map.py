@@ -69,9 +69,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Build the map, or read it from the cache, and save it.
 
     Returns:
-        ``residual``, ``energy_check`` and ``harmonics`` of the map's record,
-        ``validation`` against unseen solves (null with ``validation_reason``),
-        ``stiffness_Nm_rad``, ``torque_range_Nm``, ``level``, ``files``, ``wall_s``;
+        ``design``, ``level``, ``residual``, ``energy_check`` and ``harmonics`` of the
+        map's record, ``validation`` against unseen solves (null with
+        ``validation_reason``), ``stiffness_Nm_rad``, ``torque_range_Nm``, ``info``
+        (the rest of the record), ``files``, ``wall_s``;
         for a measured loop also ``fit``: ``hysteresis_loss_arcmin`` and
         ``lost_motion_arcmin`` of the loop and of the map, ``rms_arcmin`` (difference
         between loop and map), ``warnings``.

@@ -27,9 +27,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Build and check both tooth profiles.
 
     Returns:
-        For each member ``teeth``, ``straight_length_mm``, radii, thickness at the pitch
-        circle and ``segments``; ``points`` of both right flanks from tip to root [mm],
-        shape (n, 2); ``checks``; ``files``.
+        ``design``; for each member ``teeth``, ``straight_length_mm``, radii, thickness
+        at the pitch circle and ``segments``; ``points`` of both right flanks from tip
+        to root [mm], shape (n, 2); ``checks``; ``files``.
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.gear.design.design import Design

@@ -85,8 +85,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Simulate the scene.
 
     Returns:
-        ``scene``, ``arm``, ``drive_choice``, ``contains``, ``files``, ``live`` and the
-        keys of :meth:`swgjoint.sim.run.Run.metrics`, such as ``joints``, ``tool`` and
+        ``scene``, ``arm``, ``drives_by_rule`` (whether the drives of an arm were
+        selected by rule, as listed in ``drive_choice``), ``strict``, ``contains``,
+        ``files``, ``live`` (address of the viewer, or null) and the keys of
+        :meth:`swgjoint.sim.run.Run.metrics`, such as ``joints``, ``tool`` and
         ``steps_per_s``.
 
     Raises:

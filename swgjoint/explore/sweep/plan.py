@@ -39,7 +39,7 @@ class Parameter(Section):
     def _one_way(self) -> Parameter:
         ends = (self.low, self.high)
         if (self.values is None) == (ends == (None, None)):
-            raise Fault(("values", "accepted: either values or low and high"))
+            raise Fault(("values", "accepted: either values, or low and high"))
         if self.values is not None:
             if self.count is not None:
                 raise Fault(("count", "unused together with values"))
@@ -180,7 +180,7 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
     if isinstance(plan, List) and len(set(lengths)) > 1:
         counts = ", ".join(map(str, lengths))
         faults.append(
-            ("plan.parameters", f"{counts} values: expected lists of equal length")
+            ("plan.parameters", f"{counts} values; accepted: lists of equal length")
         )
     if isinstance(plan, Grid):
         total = 1
