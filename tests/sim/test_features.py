@@ -347,7 +347,7 @@ def test_a_sine_shakes_at_its_frequency(bench):
         (
             {"disturbance": [{"kind": "joint_pulse", "joint": "elbow", "torque_Nm": 1.0,
                               "start_s": 0.0, "duration_s": 1.0}]},
-            ("disturbance[0].joint.elbow", "arm 'bench'", "joint"),
+            ("disturbance[0].joint = 'elbow'", "arm 'bench'", "joint"),
         ),
         (
             {"disturbance": [{"kind": "tool_force", "force_N": [1.0, 2.0],

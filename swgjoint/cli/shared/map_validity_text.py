@@ -27,7 +27,9 @@ def validation_table(result: dict[str, Any]) -> list[str]:
         return [result["validation_reason"]]
     from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS
 
-    names = {key: f"{name}, % of peak to peak" for key, name in QUANTITIES.items()}
+    names = {
+        key: f"{name}, % of peak-to-peak value" for key, name in QUANTITIES.items()
+    }
     rows = []
     for key, name in (names | {STIFFNESS: "secant stiffness"}).items():
         if (worst := record.get(key)) is not None:

@@ -94,7 +94,7 @@ class Difference:
         )
 
     def __str__(self) -> str:
-        of = "" if self.quantity == STIFFNESS else "the peak to peak of "
+        of = "" if self.quantity == STIFFNESS else "the peak-to-peak value of "
         return (
             f"differs from unseen finite-element solves by {percent(self.largest)} of"
             f" {of}the {self.name} at {self.torque:.4g} N·m{self._line()}"

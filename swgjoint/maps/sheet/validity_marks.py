@@ -119,6 +119,6 @@ def mark_legend(marks: Collection[str]) -> str:
     }
     shown = [f"{sign} {text}" for sign, text in meaning.items() if sign in marks]
     return (
-        f"{'; '.join(shown)} of the peak to peak from finite-element solves that were"
-        " not used to build it"
+        f"{'; '.join(shown)} of the peak-to-peak value from finite-element solves that"
+        " were not used to build it"
     )
