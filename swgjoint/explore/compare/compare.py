@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,8 @@ import numpy as np
 
 from swgjoint.drives.fidelity import default_model
 from swgjoint.drives.references import find_drive, given_drives, load_drive
-from swgjoint.drives.sections import LEVELS
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.explore.compare.scene import drives_of, with_drive, with_level
+from swgjoint.explore.compare.scene import drives_of, source_of, with_drive, with_level
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.validity_marks import joints_judged
@@ -205,7 +203,7 @@ def compare(
     Raises:
         InputError: If an argument is neither a drive nor a level.
     """
-    sources = {name: _source(name) for name in arguments}
+    sources = {name: source_of(name) for name in arguments}
     kept: dict[str, DriveMap] = {}  # drives that the scene keeps
 
     def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
@@ -239,18 +237,6 @@ def compare(
         rows.append(replace(row, missed=missed_limits(row, spec or {})))
         progress("compared", number + 1, len(arguments))
     return rows
-
-
-def _source(argument: str) -> Design | DriveMap | None:
-    """The drive that an argument names, or None for a level."""
-    if argument in LEVELS:
-        return None
-    if near := get_close_matches(argument, LEVELS, n=1):
-        try:
-            return find_drive(argument)
-        except InputError as error:
-            raise InputError(f"{error}; did you mean the level {near[0]}?") from None
-    return find_drive(argument)
 
 
 def _is_design(reference: str) -> bool:

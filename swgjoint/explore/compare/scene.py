@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
 from fnmatch import fnmatchcase
 
+from swgjoint.drives.references import find_drive
 from swgjoint.drives.sections import LEVELS, JointSection
 from swgjoint.errors import InputError
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import near_names
 from swgjoint.sim.arm.scene import is_arm, rigid_arm_of, scene_of_arm
 from swgjoint.sim.scene.scene import Scene
@@ -83,6 +87,23 @@ def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
         raise InputError("\n".join(faults))
     chosen = {name for names in found.values() for name in names}
     return tuple(name for name in joints if name in chosen)
+
+
+def source_of(argument: str) -> Design | DriveMap | None:
+    """The drive that an argument of a comparison names, or None for a level.
+
+    Raises:
+        InputError: If the argument names neither; the message suggests a level with a
+            similar name.
+    """
+    if argument in LEVELS:
+        return None
+    try:
+        return find_drive(argument)
+    except InputError as error:
+        near = get_close_matches(argument, LEVELS, n=1)
+        hint = f"; did you mean the level {near[0]}?" if near else ""
+        raise InputError(f"{error}{hint}") from None
 
 
 def _fits(name: str, pattern: str) -> bool:
