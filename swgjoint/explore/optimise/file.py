@@ -30,7 +30,9 @@ class Objective(Section):
     """A figure to minimise or maximise."""
 
     figure: Text
+    """Name of the figure, one of those that the tasks of the file compute."""
     goal: Literal["minimise", "maximise"] = "minimise"
+    """Whether smaller or larger values are better."""
 
     @property
     def sign(self) -> float:
@@ -42,6 +44,7 @@ class Limit(Section):
     """Bounds of a figure that every design of the front must meet."""
 
     figure: Text
+    """Name of the figure, one of those that the tasks of the file compute."""
     least: float | None = None
     """Smallest accepted value, in the unit of the figure."""
     most: float | None = None
@@ -88,8 +91,11 @@ class OptimisationFile(AskedFile):
     """Figures to compute, objectives, limits, and parameters that may change."""
 
     objectives: Annotated[tuple[Objective, ...], Field(strict=False, min_length=1)]
+    """Figures to minimise or maximise."""
     limits: Annotated[tuple[Limit, ...], Field(strict=False)] = ()
+    """Bounds of figures that an accepted design must meet."""
     plan: SearchPlan
+    """Parameters and budget of the genetic search."""
     confirm: Confirmation | None = None
     beside: Annotated[tuple[Reference, ...], Field(strict=False)] = ()
     """Designs to compare with the front; the search does not use them."""

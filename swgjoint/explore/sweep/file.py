@@ -20,6 +20,7 @@ class SweepFile(AskedFile):
     """A file of ``models/sweeps``."""
 
     plan: Plan
+    """Parameters and how their values are combined, by kind."""
 
     @model_validator(mode="after")
     def _fits(self) -> SweepFile:

@@ -93,6 +93,7 @@ class Grid(Section):
 
     kind: Literal["grid"] = "grid"
     parameters: Parameters
+    """Parameters that are varied."""
 
 
 class LatinHypercube(Section):
@@ -104,6 +105,7 @@ class LatinHypercube(Section):
     seed: Seed = 0
     """Seed of the random numbers."""
     parameters: Parameters
+    """Parameters that are varied."""
 
 
 class List(Section):
@@ -111,6 +113,7 @@ class List(Section):
 
     kind: Literal["list"] = "list"
     parameters: Parameters
+    """Parameters that are varied."""
 
 
 Plan = Annotated[Grid | LatinHypercube | List, Field(discriminator="kind")]
@@ -130,10 +133,12 @@ class SearchPlan(Section):
     population: Annotated[int, Field(ge=2, le=10_000)] = 24
     """Number of designs in a generation."""
     seed: Seed = 0
+    """Seed of the random numbers."""
     minutes: Annotated[float, Field(gt=0, le=1e6)] | None = None
     """Time after which no further generation starts [min]. Without this limit, the same
     file gives the same designs on any machine."""
     parameters: Parameters
+    """Parameters that are varied."""
 
 
 AnyPlan = Grid | LatinHypercube | List | SearchPlan

@@ -73,6 +73,7 @@ class SpecTask(FigureTask):
 
     known = SPEC_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
+    """Fidelity of the map; by default 3d for a design with a cup, else 2d."""
     angles: Annotated[int, Field(ge=1, le=10_000)] | None = None
     """Number of positions of the map over a pitch; see :func:`swgjoint.build_map`."""
 
@@ -85,7 +86,9 @@ class RunTask(FigureTask):
 
     known = RUN_FIGURES
     model: Literal["ring", "2d", "3d"] | None = None
+    """Fidelity of the map; by default 3d for a design with a cup, else 2d."""
     angles: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """Number of positions of the map over a pitch; see :func:`swgjoint.build_map`."""
 
 
 class SizeTask(FigureTask):
@@ -107,7 +110,9 @@ class SlurmCluster(Section):
     walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]
     """Time limit of one job, as hours:minutes:seconds or days-hours:minutes:seconds."""
     queue: Text | None = None
+    """Partition of the cluster; by default that of SLURM."""
     account: Text | None = None
+    """Account that is charged; by default that of SLURM."""
     prologue: Annotated[tuple[Text, ...], Field(strict=False)] = ()
     """Shell commands run before a worker starts, such as ``module load``."""
     directives: Annotated[tuple[Text, ...], Field(strict=False)] = ()
@@ -118,7 +123,9 @@ class AskedFile(Section):
     """Keys of every sweep and search file: bases, tasks and cluster."""
 
     description: Annotated[str, Field(max_length=1000)] = ""
+    """Purpose of the file in a sentence."""
     source: Annotated[str, Field(max_length=1000)] = ""
+    """Source of the numbers in the file."""
     design: Reference | None = None
     """Base of the designs; without a base, the scene keeps its drives."""
     scene: Reference | None = None
@@ -128,6 +135,8 @@ class AskedFile(Section):
     size: SizeTask | None = None
     run: RunTask | None = None
     cluster: SlurmCluster | None = None
+    """Cluster that computes the designs unless ``--jobs`` or ``--scheduler`` is given;
+    by default this machine computes them."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
