@@ -71,7 +71,11 @@ def report(result: dict[str, Any]) -> str:
 def _stored(stored: dict[str, Any]) -> str:
     """State where the stored settings come from and whether they are still valid."""
     drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
-    state = "valid for this code" if stored["of_this_code"] else "from ANOTHER code"
+    state = (
+        "valid for this code"
+        if stored["of_this_code"]
+        else "NOT confirmed for this code"
+    )
     pace = stored["pace"]
     times = (
         ""
