@@ -251,7 +251,7 @@ def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path)
         ),
         ("", ("empty", "torque_Nm", "torsion_arcmin", "torsion_rad")),
         ("torque_Nm,torsion_rad\n", ("no line of numbers",)),
-        ("torque_Nm,torsion_rad\n-1,0\n1,1\n", ("2 samples", "8")),
+        ("torque_Nm,torsion_rad\n-1,0\n1,1\n", ("samples: 2", "8")),
         (
             "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{k}" for k in range(20)),
             ("torque_Nm", "0", "19 N·m", "signs"),
