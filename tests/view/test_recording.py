@@ -136,7 +136,7 @@ def test_a_scene_says_which_joints_and_signals_have_a_place(synthetic_map, tmp_p
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("joints", ["hip"], ("recording.joints.hip", "arm 'bench'", "joint")),
+        ("joints", ["hip"], ("recording.joints = 'hip'", "arm 'bench'", "joint")),
         (
             "plots",
             ["torque"],
