@@ -1,18 +1,21 @@
-r"""Feed-forward through the elastic drive: motor motion and torque from link motion.
+r"""Feed-forward for an elastic drive: motor motion and torque from the link motion.
 
 To follow :math:`\psi(t)`, the link needs the drive torque T(t). The drive map then
-determines the motor angle by
+determines the motor angle :math:`\theta(t)` by
 
 .. math:: F_\psi(\theta, \psi) - C\,\dot\Delta\,\partial_\psi\Delta = T.
 
-Motor speed and acceleration follow by differentiation, and the motor torque is
+Here :math:`F_\theta` and :math:`F_\psi` are the elastic torques on motor and output,
+:math:`\Delta` is the torsion and C is the damping along it. Differentiation gives motor
+speed and acceleration, and the motor torque is
 
 .. math:: \tau = J_m \ddot\theta - F_\theta(\theta, \psi)
-    + C\,\dot\Delta\,\partial_\theta\Delta + f(\dot\theta, T/i).
+    + C\,\dot\Delta\,\partial_\theta\Delta + f(\dot\theta, T/i)
 
-This includes torsion, stiffness curve and kinematic error of the map. With constant
-stiffness and without kinematic error it reduces to the feed-forward of Spong (1987)
-with T and its derivatives written out.
+with the rotor inertia :math:`J_m` and the friction torque f. The plan thus accounts for
+torsion, stiffness curve and kinematic error of the map. With constant stiffness and
+without kinematic error it reduces to the feed-forward of Spong (1987), with T and its
+derivatives written out.
 
 Source:
     Spong (1987), "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
@@ -35,8 +38,8 @@ from swgjoint.typing import Array
 RTOL = 1e-9
 """Tolerance of the torque residual relative to rated torque [-]."""
 ROUNDS = 3
-"""Number of fixed-point iterations for the damping torque, which is a few percent of a
-change of T."""
+"""Number of fixed-point iterations for the damping torque, which amounts to a few
+percent of the changes of T."""
 _CHUNK = 2048  # samples per call, so that the coefficient table fits in the CPU cache
 _DEGREE = 5
 
@@ -45,14 +48,15 @@ def flexible_plan(task: Task) -> MotorPlan:
     """Motor motion and torque that make the known drives move the link as commanded.
 
     A quintic spline through the samples differentiates torsion and kinematic error; the
-    ideal part of the motion is differentiated exactly. The planned speed is the change
-    of the angle over the last period, as an encoder and the integrator ``discrete``
-    measure it. It is therefore half a period old; the exact speed would differ from the
-    reading by a term of first order in the period.
+    derivatives of the ideal motion are those of the task. The planned speed is the
+    change of the planned angle over the last period divided by the period, which is the
+    speed that an encoder and the integrator ``discrete`` report. It is therefore half a
+    period old; the exact speed would differ from the reading by a term of first order
+    in the period.
 
-    A motion whose torque jumps requires a torque impulse of the motor. The ramps of
-    scenes are smooth enough; steps and trapezoids are not. A drive of level ``rigid``
-    has no torsion, so that its output deviates by its kinematic error only.
+    A motion whose torque jumps would require a torque impulse from the motor. The ramps
+    of scenes are smooth enough; steps and trapezoids are not. For a drive of level
+    ``rigid``, which has no torsion, the plan compensates only the kinematic error.
 
     Raises:
         ComputationError: If the map does not reach a torque of the motion.
@@ -94,14 +98,15 @@ def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
 
     Args:
         drive: Map of the drive.
-        psi: Output angles [rad].
-        torque: Torques on the output [N·m]. Same shape.
+        psi: Output angles [rad]. Any shape.
+        torque: Elastic torques on the output [N·m]. Same shape.
 
     Returns:
         Motor angles [rad]. Same shape.
 
     Raises:
-        ComputationError: If the iteration does not converge.
+        ComputationError: If the mean curve of the map does not reach a torque, or if
+            the iteration does not converge.
     """
     at, wanted = psi.reshape(-1), torque.reshape(-1)
     try:
@@ -117,7 +122,7 @@ def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
 
 
 def _solve(drive: DriveMap, psi: Array, torque: Array, mean: Array) -> Array:
-    """Newton iteration for all samples, started from torsions of the mean curve."""
+    """Motor angles [rad] by Newton's method from initial torsions ``mean`` [rad]."""
     i, rated = drive.ratio, drive.ratings.rated_torque
     theta = i * (psi + mean - drive.error_at(drive.phases(i * psi, psi))[0])
     softest = 1e-3 * drive.mean_stiffness / i**2
@@ -128,7 +133,7 @@ def _solve(drive: DriveMap, psi: Array, torque: Array, mean: Array) -> Array:
             return np.asarray(theta)
         ahead = drive.law(theta + nudge, psi).output_force
         behind = drive.law(theta - nudge, psi).output_force
-        # derivative of the torque by theta times the sign of i: never negative
+        # d(torque)/d(theta) times the sign of i, which is never negative
         slope = (ahead - behind) / (2.0 * nudge) * np.sign(i)
         theta = theta - np.sign(i) * residual / np.maximum(slope, softest * abs(i))
     worst = int(np.abs(residual).argmax())
@@ -147,7 +152,7 @@ def _motor_angle(
     damping: Array,
     period: float,
 ) -> Array:
-    """Motor angles of one joint along motions, including damping. Shape (n, ...)."""
+    """Motor angles of one joint along motions with damping [rad]. Shape (n, ...)."""
     if drive.level == "rigid":
         return motor_of_link(drive, psi)
     theta = motor_angle(drive, psi, torque)
@@ -170,7 +175,7 @@ def _input_torque(
     torque: Array,
     damping: Array,
 ) -> Array:
-    """Motor torque against the elastic and damping torque of the drive [N·m]."""
+    """Motor torque that balances elastic and damping torque of the drive [N·m]."""
     if drive.level == "rigid":
         return np.asarray(torque / drive.ratio)
     shape = theta.shape
@@ -189,7 +194,7 @@ def _input_torque(
 def _torsion_rate(
     drive: DriveMap, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
 ) -> tuple[Array, Array, Array]:
-    """Torsion rate [rad/s], and derivatives of the torsion by theta and psi [-]."""
+    """Torsion rate [rad/s], and torsion derivatives d/d(theta) and d/d(psi) [-]."""
     _, e_theta, e_psi = drive.error_at(drive.phases(theta, psi))
     by_theta, by_psi = 1.0 / drive.ratio + e_theta, -1.0 + e_psi
     return by_theta * theta_rate + by_psi * psi_rate, by_theta, by_psi

@@ -1,11 +1,10 @@
 r"""Identification and compensation of the kinematic error by a table of harmonics.
 
-The kinematic error of a drive is a sum of harmonics of the wave-generator angles alpha
-and beta relative to the two toothed members,
+The kinematic error of a drive is a sum of harmonics of alpha and beta, the angles of
+the wave generator relative to the two toothed members,
 :math:`e_0 = \sum_k a_k \cos\varphi_k + b_k \sin\varphi_k` with
 :math:`\varphi_k = p_k \alpha + q_k \beta`. A record of one slow output turn therefore
-determines it for all loads and motions. Manufacturers of drives compensate the
-transmission accuracy in this way.
+determines the kinematic error for all loads and motions.
 """
 
 from __future__ import annotations
@@ -29,11 +28,13 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 SEARCHED: tuple[tuple[int, int], ...] = (*ORDERS, (1, 1), (8, 0), (0, 8))
-"""Default orders (p, q) of the identification: low orders of either member, the output
-turn, and the combinations that an eccentric wave generator causes."""
+"""Default orders (p, q) of the identification: one to six and eight cycles per turn of
+alpha and of beta, one and two cycles per output turn, and the sum alpha + beta, which
+an eccentric wave generator excites."""
 SURE = 4.0
-"""Smallest amplitude of a harmonic that is kept, in standard errors [-]. If 20 searched
-harmonics are absent, noise passes this threshold in one of a hundred tables."""
+"""Smallest amplitude of a harmonic that is kept, in standard errors [-]. If a drive has
+none of 20 searched harmonics, noise exceeds this threshold in less than one of a
+hundred tables."""
 _TURN = 0.98  # fraction of an output turn that a record must cover
 _PER_WAVE = 4.0  # samples per period of the highest order
 _LEVERAGE = 1e4  # largest condition number at which the orders can be separated
@@ -58,7 +59,8 @@ class KinematicErrorTable:
     amplitudes: Array
     """Cosine and sine amplitudes [rad]. Shape (n, 2)."""
     deviation: float = 0.0
-    """Standard error of an amplitude if the residual of the fit is pure noise [rad]."""
+    """Standard error of the amplitudes if the residual of the fit is white noise
+    [rad]."""
 
     def __post_init__(self) -> None:
         orders = np.array(self.orders, dtype=np.int64).reshape(-1, 2)
@@ -68,15 +70,19 @@ class KinematicErrorTable:
         object.__setattr__(self, "amplitudes", pairs)
 
     def apply_to(self, drive: DriveMap) -> DriveMap:
-        """Replace the kinematic error of a drive by this one."""
+        """Copy a drive map with this kinematic error instead of its own."""
         return with_error(drive, self.orders, self.amplitudes)
 
     def scale_to(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
-        """Scale all amplitudes to a peak-to-peak kinematic error.
+        """Scale all amplitudes to a given peak-to-peak kinematic error.
 
         Args:
-            drive: Drive whose layout and teeth determine the peak-to-peak value.
-            wanted: Peak-to-peak kinematic error [rad].
+            drive: Drive whose layout and numbers of teeth determine the peak-to-peak
+                value.
+            wanted: Peak-to-peak kinematic error over one output turn [rad].
+
+        Returns:
+            The scaled table.
         """
         sized = self.amplitudes * wanted / peak_to_peak(self.apply_to(drive))
         return replace(self, amplitudes=sized)
@@ -91,12 +97,13 @@ def identify_kinematic_error(
     """Fit harmonics of alpha and beta to a slow record of one output turn.
 
     The least-squares fit includes a constant, which absorbs the torsion under a
-    constant load, and a linear trend, which absorbs its slow change. Only the orders
-    that exceed the noise of the record are kept, see :data:`SURE`.
+    constant load, and a linear trend, which absorbs slow changes of this torsion. Only
+    the orders whose amplitudes exceed the noise of the record are kept (see
+    :data:`SURE`), and these are fitted again.
 
     Args:
-        record: Readings in one direction of rotation, at least one output turn.
-        drive: Drive with layout and teeth; its kinematic error is not used.
+        record: Readings over at least one output turn in one direction of rotation.
+        drive: Drive whose ratio and layout are used; its kinematic error is not.
         orders: Orders (p, q) to search for.
 
     Raises:
@@ -117,8 +124,8 @@ def identify_kinematic_error(
     if theta.shape != psi.shape or span < _TURN * 2.0 * np.pi:
         raise InputError(
             f"record of {psi.size} link and {theta.size} motor angles over"
-            f" {span / deg:.4g} deg of the output; accepted: equal numbers of both,"
-            " over one turn, 360 deg"
+            f" {span / deg:.4g} deg of the output; accepted: equal numbers of both"
+            " over at least one output turn (360 deg)"
         )
     if psi.size < _PER_WAVE * most:
         raise InputError(
@@ -137,12 +144,13 @@ def identify_kinematic_error(
 
 
 def _basis(phases: Array, psi: Array) -> Array:
+    """Columns of the fit: constant, linear trend, cosines and sines."""
     line = np.stack([np.ones_like(psi), (psi - psi.mean()) / np.ptp(psi)], axis=-1)
     return np.hstack([line, np.cos(phases), np.sin(phases)])
 
 
 def _fit(basis: Array, error: Array, count: int) -> tuple[Array, float]:
-    """Cosine and sine amplitudes, and their standard error."""
+    """Cosine and sine amplitudes [rad], shape (count, 2), and their standard error."""
     weights, _, rank, sizes = np.linalg.lstsq(basis, error, rcond=None)
     if rank < basis.shape[1] or sizes[0] > _LEVERAGE * sizes[-1]:
         raise InputError(
@@ -158,14 +166,15 @@ def _fit(basis: Array, error: Array, count: int) -> tuple[Array, float]:
 def compensate(
     tables: Sequence[KinematicErrorTable], plan: Planner = flexible_plan
 ) -> Planner:
-    """Make a planner that uses identified kinematic errors.
+    """Make a planner that compensates identified kinematic errors.
 
     Args:
-        tables: Kinematic errors, one per joint.
+        tables: Identified kinematic errors, one per joint.
         plan: Planner that uses the drive maps of the task.
 
     Returns:
-        Planner that calls ``plan`` with the tables as kinematic errors of the drives.
+        Planner that calls ``plan`` with drive maps whose kinematic errors are those of
+        the tables.
     """
 
     def planned(task: Task) -> MotorPlan:
@@ -179,14 +188,14 @@ def compensate(
 
 
 class TurnRecorder:
-    """Controller that records the readings of another one; needs a link encoder."""
+    """Controller that records the readings of another one and needs a link encoder."""
 
     def __init__(self, inner: Controller) -> None:
-        """Record the readings that ``inner`` receives."""
+        """Wrap the controller ``inner``, which computes the torques."""
         self.inner = inner
 
     def start(self, task: Task) -> None:
-        """Discard the last record and start the inner controller."""
+        """Discard the previous record and start the inner controller."""
         self._read: list[tuple[Array, Array]] = []
         self.inner.start(task)
 
@@ -209,11 +218,11 @@ class TurnRecorder:
         return self.inner.torque(k, measured)
 
     def record(self, joint: int = 0, skip: int = 0) -> JointRecord:
-        """Readings of one joint.
+        """Recorded readings of one joint.
 
         Args:
             joint: Index of the joint.
-            skip: Number of instants omitted at the start.
+            skip: Number of control instants that are omitted at the start.
         """
         motor, link = np.moveaxis(np.array(self._read[skip:]), 1, 0)
         return JointRecord(motor_angle=motor[..., joint], link_angle=link[..., joint])

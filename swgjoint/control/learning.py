@@ -7,27 +7,32 @@ e^{j\varphi_k}` to the command. The nominal two-mass model converts it to a moto
 and a motor torque,
 
 .. math:: \theta/i = \left(1 - \frac{\omega^2 J_l}{K + j\omega C}\right) q, \quad
-    \tau = i J_m \ddot\theta/i + J_l \ddot q / i,
+    \tau = J_m \ddot\theta + J_l \ddot q / i,
 
-The coefficients :math:`c_k` are learned in blocks of several turns. At the end of a
-block, least squares determines the harmonics :math:`s_k` of the remaining link error
-(or of the output torque, divided by :math:`-\omega^2 J_l`), and
+with rotor and link inertias :math:`J_m` and :math:`J_l`, stiffness K, damping C and
+:math:`\omega = \dot\varphi_k`. The coefficients :math:`c_k` are learned in blocks of
+several turns. At the end of a block, a least-squares fit determines the harmonics
+:math:`s_k` of the remaining link error (or of the output torque, divided by
+:math:`-\omega^2 J_l`). The update is
 
-.. math:: c_k \leftarrow (1 - \rho)\,c_k - \mu s_k .
+.. math:: c_k \leftarrow (1 - \rho)\,c_k - \mu s_k
+
+with the learning rate :math:`\mu` and the forgetting :math:`\rho`.
 
 *Convergence.* The link responds to c with :math:`s = (1 + \epsilon) c + d`, where
 :math:`\epsilon(\omega)` is the relative error of the nominal model. A block multiplies
 the distance from the fixed point by :math:`1 - \rho - \mu(1 + \epsilon)`. The iteration
 converges for :math:`|\epsilon| < 1` if :math:`\mu (1 + |\epsilon|) + \rho < 1`, and for
-any model whose phase error is below 90 degrees if the rates are small enough. It leaves
-the fraction :math:`\rho/(\rho + \mu(1+\epsilon))` of d.
+any model whose phase error is below 90 degrees if the rates are small enough. The
+fraction :math:`\rho/(\rho + \mu(1+\epsilon))` of d remains.
 
-A block cannot separate orders of alpha and beta that differ by little: 2 alpha and
-2 beta differ by two periods per output turn. A ridge term distributes the sum among
-them, and later blocks at other phases separate them (Kaczmarz), the faster the more the
-phases differ. The default block is therefore a quarter turn of the output.
+A block cannot separate harmonics of alpha and beta whose phases differ only slightly:
+2 alpha and 2 beta differ by two periods per output turn. A ridge term distributes their
+sum among them. Later blocks at other phases separate them, as in the Kaczmarz method,
+and do so faster if the phases differ more between blocks. The default block is
+therefore a quarter turn of the output.
 
-The short list of orders acts as *robustness filter*: no other harmonics are fed back,
+The short list of orders acts as a *robustness filter*: no other harmonics are fed back,
 in particular none near the resonance unless the list contains them. Blocks in which the
 commanded speed changes are ignored.
 
@@ -55,14 +60,16 @@ from swgjoint.typing import Array
 Complex = NDArray[np.complex128]
 
 LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))
-"""Default orders (p, q), which pitch and roundness errors excite: 2 and 4 per turn
-relative to either member, and 2 per turn of an eccentric wave generator."""
+"""Default orders (p, q): 2 and 4 cycles per turn of the wave generator relative to
+either member, excited by pitch and roundness errors, and alpha + beta, excited by an
+eccentric wave generator with about 2 cycles per turn."""
 RIDGE = 1e-2
-"""Ridge term added to the mean square of each harmonic, which is 0.5 [-]."""
+"""Ridge term that is added to the mean square of each unit harmonic (0.5) in the normal
+equations [-]."""
 
 
 class LearningCompensation:
-    """Controller that adds a learned link motion to the command of another one."""
+    """Controller that adds a learned link motion to the command of an inner one."""
 
     def __init__(
         self,
@@ -76,19 +83,21 @@ class LearningCompensation:
         delay: float | None = None,
         limit: float = 3e-3,
     ) -> None:
-        """Extend a controller; it receives readings without the learned motion.
+        """Extend a controller, which receives readings without the learned motion.
 
         Args:
             inner: Controller that computes the torques without the compensation.
-            orders: Orders (p, q) of the learned harmonics, the robustness filter.
+            orders: Orders (p, q) of the learned harmonics; they act as robustness
+                filter.
             signal: Sensor signal from which the harmonics are learned.
             rate: Learning rate mu, the fraction of the remaining error that a block
                 removes [-], in (0, 1].
             forgetting: Fraction rho of the learned coefficients that a block forgets
                 [-], in [0, 1).
-            turns: Wave-generator turns in a block; None: a quarter turn of the output.
-            delay: Age of the readings of the signal [s]; None: the age that the task
-                states.
+            turns: Number of wave-generator turns in a block, at least 1; None: a
+                quarter turn of the output.
+            delay: Age of the readings of the signal [s]; None: the age stated by the
+                task.
             limit: Largest amplitude of a learned harmonic [rad].
 
         Raises:
@@ -107,7 +116,7 @@ class LearningCompensation:
         self.turns, self.delay, self.limit = turns, delay, limit
 
     def start(self, task: Task, learned: Complex | None = None) -> None:
-        """Prepare a motion, optionally with coefficients learned on another one.
+        """Prepare for a motion, optionally with coefficients learned in another one.
 
         Args:
             task: The commanded motion.
@@ -116,7 +125,8 @@ class LearningCompensation:
         """
         joints, i = task.joints, task.joints.ratio
         self._task = task
-        # periods per link turn (n_joints, n_orders); below (n, ..., n_joints, n_orders)
+        # cycles of each harmonic per link turn (n_joints, n_orders); the arrays below
+        # have shape (n, ..., n_joints, n_orders)
         layouts = [np.array(angle_coefficients(d.layout)) for d in joints.drives]
         by = np.array([self.orders @ layout for layout in layouts])
         per_link = by[:, :, 0] * i[:, None] + by[:, :, 1]
@@ -125,8 +135,8 @@ class LearningCompensation:
         stiffness = _stiffness(task)
         inertia, omega = joints.link_inertia[..., None], self._omega
         spring = stiffness[:, None] + 1j * omega * joints.damping[..., None]
-        # unit harmonics of the link angle, of the motor angle at the output side, and
-        # of the motor speed, which encoders measure half a period late
+        # unit harmonics of the link angle, of the motor angle referred to the output
+        # side, and of the motor speed, which encoders measure half a period late
         self._link = np.exp(1j * self._phase)
         self._motor = (1.0 - omega**2 * inertia / spring) * self._link
         late = np.exp(-0.5j * omega * task.period)
@@ -134,7 +144,7 @@ class LearningCompensation:
         rotor = i[:, None] * joints.rotor_inertia[..., None]
         on_motor = rotor * self._motor + inertia / i[:, None] * self._link
         self._torque = -(omega**2) * on_motor
-        # delayed by the age of the readings
+        # delay them by the age of the readings
         self._link = task.as_read(self._link, "link")
         self._motor = task.as_read(self._motor, "motor")
         self._speed = task.as_read(self._speed, "motor")
@@ -158,7 +168,7 @@ class LearningCompensation:
         self.inner.start(task)
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """Torque of the inner controller plus that of the learned motion [N·m].
+        """Torque of the inner controller plus the torque of the learned motion [N·m].
 
         Args:
             k: Index of the control instant.
@@ -192,7 +202,7 @@ class LearningCompensation:
         self._signal[k] = reading - self._known[k]
 
     def _blocks(self, task: Task) -> frozenset[int]:
-        """Instants at which a block ends; the slowest moving joint sets its length."""
+        """Instants at which blocks end; the slowest moving joint sets their length."""
         ratio = np.abs(task.joints.ratio)
         each = 0.25 * ratio if self.turns is None else np.full(ratio.size, self.turns)
         way = np.abs(task.velocity) * task.period * ratio / (2.0 * np.pi * each)
@@ -205,7 +215,7 @@ class LearningCompensation:
         return frozenset(np.searchsorted(slowest, ends - 1e-9).tolist())
 
     def _learn(self, block: slice) -> None:
-        """One step of the iteration from the readings of a block."""
+        """Update the coefficients from the readings of one block."""
         velocity = self._task.velocity[block]
         steady = np.ptp(velocity, axis=0) <= 1e-9 * np.abs(velocity).max(axis=0)
         moving = steady & (velocity[0] != 0.0)

@@ -1,4 +1,4 @@
-r"""Position control of the motor angle about a plan that is made before the motion.
+r"""Position control of the motor angle along a plan that is made before the motion.
 
 A *plan* contains the reference angle :math:`\theta_r` of the motor and the feed-forward
 torque :math:`\tau_r`; the controller adds feedback,
@@ -6,8 +6,8 @@ torque :math:`\tau_r`; the controller adds feedback,
 .. math:: \tau = \tau_r + k_p e + k_d \dot e + k_i \int e\,dt, \quad e = \theta_r -
     \theta.
 
-A motor reading is compared with the plan at the instant when it was taken; the task
-states the age of the readings.
+A motor reading is compared with the plan at the instant at which the reading was taken;
+the task states the age of the readings.
 
 All plans use the link motion; they differ in the model of the drive:
 :func:`ideal_plan` assumes an ideal gear without torque, :func:`rigid_plan` adds torque
@@ -56,9 +56,9 @@ def rigid_plan(task: Task) -> MotorPlan:
 
     .. math:: \tau_r = T/i + i J_m \ddot q + f(i \dot q, T/i)
 
-    T is the known link torque of the motion, including weight and inertia; MuJoCo or
-    :mod:`swgjoint.control.pinocchio_arm` computes it. f is the friction of the known
-    drives.
+    T is the known link torque of the motion, including weight and inertia, computed by
+    MuJoCo or :mod:`swgjoint.control.pinocchio_arm`; f is the friction torque of the
+    known drives.
     """
     joints, i = task.joints, task.joints.ratio
     plan = ideal_plan(task)
@@ -72,9 +72,10 @@ def known_friction(
 ) -> Array:
     r"""Motor torque that overcomes the sliding friction of the known drives [N·m].
 
-    The friction torque is :math:`F = f\tanh(\nu/\nu_0) + \eta\nu`, where :math:`\nu` is
-    the speed of the wave generator relative to the flexspline, see
-    :mod:`swgjoint.maps.friction`. If the flexspline is the output, F also acts on the
+    The friction torque is :math:`F = f\tanh(\nu/\nu_0) + \eta\nu` with the yield torque
+    f, the viscous coefficient :math:`\eta` and the speed :math:`\nu` of the wave
+    generator relative to the flexspline, see :mod:`swgjoint.maps.friction`.
+    :data:`SLOW` is :math:`\nu_0`. If the flexspline is the output, F also acts on the
     output, and the gear transmits this part back to the motor. The motor torque is
     therefore :math:`F\,d\nu/d\dot\theta` with :math:`\dot\psi = \dot\theta/i`.
 
@@ -101,12 +102,12 @@ def known_friction(
 
 
 class MotorPID:
-    r"""PD or PID control of the motor angle about a plan.
+    r"""PD or PID control of the motor angle along a plan.
 
-    The gains are arguments, or they follow from natural frequency and damping ratio of
-    the joint with a rigid drive, as in scenes: :math:`k_p = J\omega^2` and
-    :math:`k_d = 2\zeta J\omega` with :math:`J = J_m + J_l/i^2`. The integral acts from
-    the next instant on; its torque is limited.
+    The gains are given as arguments or follow from natural frequency and damping ratio
+    of the joint with a rigid drive, as in scenes: :math:`k_p = J\omega^2` and
+    :math:`k_d = 2\zeta J\omega` with :math:`J = J_m + J_l/i^2`. An error changes the
+    integral torque from the next instant on; this torque is limited.
     """
 
     def __init__(
@@ -127,10 +128,10 @@ class MotorPID:
             frequency: Natural frequency of the loop [Hz].
             damping_ratio: Damping ratio of the loop [-].
             stiffness: Position gain k_p [N·m/rad]; None derives it from the frequency.
-            damping: Speed gain k_d [N·m·s/rad]; None derives it from frequency and
-                damping ratio.
+            damping: Speed gain k_d [N·m·s/rad]; None derives it from the frequency and
+                the damping ratio.
             integral_time: Integral time k_p/k_i [s]; None disables the integral.
-            integral_limit: Largest torque of the integral [N·m].
+            integral_limit: Largest magnitude of the integral torque [N·m].
         """
         self.plan = plan
         self._omega = 2.0 * np.pi * np.asarray(frequency, float)
@@ -140,7 +141,7 @@ class MotorPID:
         self._limit = np.asarray(integral_limit, float)
 
     def start(self, task: Task) -> None:
-        """Make the plan, compute the gains and set the integral to zero."""
+        """Make the plan, compute the gains and reset the integral."""
         joints = task.joints
         inertia = joints.rotor_inertia + joints.link_inertia / joints.ratio**2
         kp, kd = self._given
@@ -157,7 +158,7 @@ class MotorPID:
         self._integral: Array = np.zeros(task.position.shape[1:])
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """Motor torques about the plan [N·m]. Shape (..., n_joints).
+        """Motor torques: feed-forward of the plan plus feedback [N·m]. (..., n_joints).
 
         Args:
             k: Index of the control instant.

@@ -1,34 +1,37 @@
-r"""Model-predictive control of flexible joints with limits of motor and drive.
+r"""Model-predictive control of flexible joints with torque limits of motor and drive.
 
 The plan of :func:`swgjoint.control.flexible.flexible_plan` contains the nonlinear map.
-Deviations from the plan follow a linear two-mass model of every joint. With motor
-quantities referred to the output side, the state is :math:`x = (\delta\theta/i,
-\delta\psi)` with its rates, and
+A linear two-mass model of every joint describes deviations from the plan. With motor
+quantities referred to the output side, the state consists of :math:`x =
+(\delta\theta/i, \delta\psi)` and its rates, and
 
 .. math::
     i^2 J_m \ddot x_1 = i\,(u + d_m) - \delta T, \quad
     J_l \ddot x_2 = \delta T + d_l, \quad
     \delta T = k\,(x_1 - x_2) + C\,(\dot x_1 - \dot x_2),
 
-where k is the stiffness of the map at the current point of the plan. A Kalman filter
-estimates the state and the disturbances :math:`d_m, d_l` (friction, load and other
-model errors) from the readings. The set-point compensates the disturbances, so that a
-constant disturbance causes no steady error of the measured quantity. At every instant
+where u is the motor torque in addition to the plan and k is the stiffness of the map at
+the current point of the plan. A Kalman filter estimates the state and the disturbances
+:math:`d_m, d_l` (friction, load and other model errors) from the readings. The
+set-point compensates the disturbances, so that a constant disturbance causes no steady
+error of the measured quantity. At every instant, the controller solves
 
 .. math::
     \min_u \sum_{j<N} \left( \frac{x_{2,j}^2}{e^2} + \frac{u_j^2}{f^2} \right)
     + x_N^T P x_N, \quad |\tau_r + u_j| \le \tau_{max}, \quad
     |T_r + \delta T_j| \le T_{max}
 
-is solved, where P is the terminal cost of the infinite horizon and the weights satisfy
-:math:`|i| f/e = (i^2 J_m + J_l)\,\omega^2`, so that a rigid joint would respond with
-the bandwidth :math:`\omega`. If the unconstrained optimum satisfies all limits within
-the horizon, it is a linear feedback, one matrix product. Otherwise ADMM solves the
-dense quadratic programme of the N torques for all joints and motions at once.
+with :math:`x_1` in place of :math:`x_2` if there is no sensor at the link. P is the
+terminal cost of the infinite horizon, and the weights satisfy :math:`|i| f/e = (i^2 J_m
++ J_l)\,\omega^2`, so that a rigid joint would respond with the bandwidth
+:math:`\omega`. If the unconstrained optimum satisfies all limits within the horizon,
+the controller is a linear feedback, which takes one matrix product. Otherwise ADMM
+solves the dense quadratic programme of the N torques, at once for all joints and
+motions in which a limit is exceeded.
 
-Delayed readings are compared with the plan at the instant when they were taken and
+Delayed readings are compared with the plan at the instant at which they were taken and
 correct the state at that instant. The model then predicts the current state from the
-torques applied since. All readings are treated as old as the oldest one.
+torques applied since then. All readings are delayed to the age of the oldest one.
 
 The plan contains the coupling of the joints of an arm. The controller treats the
 remaining coupling as a disturbance of each joint. A drive then acts on less than the
@@ -73,7 +76,7 @@ smallest and the largest stiffness along the plan."""
 
 
 class PredictiveController:
-    """Model-predictive controller of all joints of a task; see the module docstring."""
+    """Model-predictive controller of all joints of a task, see the module docstring."""
 
     def __init__(
         self,
@@ -91,16 +94,17 @@ class PredictiveController:
             plan: Planner that is called at the start of every task.
             horizon: Prediction horizon N [control instants].
             frequency: Bandwidth with which a rigid joint without limits would respond
-                [Hz]; it determines f/e.
+                [Hz]; it determines the ratio f/e of the weights.
             peak: Torque limit of the drive relative to its momentary peak torque [-].
-            link_inertia: Inertia that every drive accelerates [kg·m²], for an arm
-                :func:`free_inertia`. Shape (n_joints,). None uses the inertia of the
-                task, which assumes that the other joints are locked.
-            drift: Change of a disturbance within one second, relative to rated torque
-                [-].
+            link_inertia: Inertia that every drive accelerates [kg·m²], for example
+                from :func:`free_inertia` for an arm. Shape (n_joints,). None uses the
+                inertia of the task, which assumes that the other joints are locked.
+            drift: Standard deviation of the change of a disturbance within one second,
+                relative to rated torque [-].
 
         Raises:
-            InputError: If an argument is not positive.
+            InputError: If the horizon is less than 1 or another argument is not
+                positive.
         """
         if not (horizon >= 1 and min(frequency, peak, drift) > 0.0):
             raise InputError(
@@ -145,10 +149,10 @@ class PredictiveController:
         self._link = task.as_read(task.position, "link")
         self._drive = task.as_read(task.link_torque, "torque")
         self.limited = 0
-        """Number of joint instants at which a limit was active within the horizon."""
+        """Number of pairs of joint and instant with an active limit in the horizon."""
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """Motor torques about the plan [N·m]. Shape (..., n_joints).
+        """Motor torques: feed-forward of the plan plus feedback [N·m]. (..., n_joints).
 
         Args:
             k: Index of the control instant.
@@ -194,7 +198,7 @@ class PredictiveController:
         return np.asarray(wanted.reshape(task.position.shape[1:]))
 
     def _off_plan(self, k: int, measured: Measured) -> Array:
-        """Deviations from the plan at the newest instant that all sensors cover."""
+        """Deviations of the readings from the plan, at the age of the oldest one."""
         ratio = self._task.joints.ratio
         seen = {"motor": (measured.motor_angle - self._angle[k]) / ratio}
         if measured.link_angle is not None:
@@ -209,7 +213,7 @@ class PredictiveController:
         return np.stack([self._seen[key].popleft() for key in now], axis=-1)
 
     def _begin(self, now: dict[str, Array], measured: Measured) -> None:
-        """Compute the feedback for the available sensors; the joint starts at rest."""
+        """Compute the feedback for the available sensors; joints start at rest."""
         task = self._task
         readings = np.stack(list(now.values()), axis=-1)
         old = {key: task.periods_old(key) for key in now}  # type: ignore[arg-type]
@@ -239,7 +243,7 @@ class PredictiveController:
         )
 
     def _bounds(self, k: int, steady: Array, link: Array) -> tuple[Array, Array]:
-        """Bounds of motor and drive torques about the set-point, scaled. (m, 2 N)."""
+        """Scaled bounds of motor and drive torques minus set-point. Shapes (m, 2 N)."""
         ahead = np.minimum(np.arange(k, k + self.horizon + 1), self._count - 1)
         plan, task = self.planned, self._task
         motor = plan.torque[ahead[:-1]].reshape(self.horizon, -1).T + steady[:, None]
@@ -274,19 +278,22 @@ def free_inertia(model: mujoco.MjModel, position: ArrayLike) -> Array:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
+    """Product of every matrix with its vector. Shape (k, rows)."""
     return np.asarray(np.einsum("kij,kj->ki", matrices, vectors))
 
 
 def _stiffness(drive: DriveMap, theta: Array, psi: Array) -> Array:
     """Stiffness of the map along a plan, at least 0.1 % of its mean [N·m/rad]."""
     along = drive.stiffness(drive.torsion(theta, psi), theta, psi)
-    # within a clearance the stiffness is zero
+    # within a clearance the stiffness of the map is zero
     return np.maximum(along, 1e-3 * drive.mean_stiffness)
 
 
 def _model(
     joints: KnownJoints, j: int, stiffness: float, period: float
 ) -> TwoMassModel:
+    """Two-mass model of joint j at one stiffness [N·m/rad]."""
+
     def known(values: Array) -> float:
         return float(np.reshape(values, (-1, len(joints.names)))[0, j])
 

@@ -2,7 +2,7 @@
 
 Source:
     Doyle, Stein (1979), "Robustness with observers", IEEE Trans. Autom. Control 24,
-    607-611, for the process noise of the filter.
+    607-611, for the process noise of the Kalman filter.
 """
 
 from __future__ import annotations
@@ -21,25 +21,26 @@ ENCODER = 1e-3
 """Assumed standard deviation of the motor encoder, and of the link encoder times the
 ratio [rad].
 
-It exceeds the encoder noise in order to limit the bandwidth of the filter, to about
-60 Hz for a shoulder joint of a cobot. Effects that the model omits (the delay of half a
-period and the kinematic error) then do not make the estimate noisy."""
+It is larger than the encoder noise in order to limit the bandwidth of the filter to
+about 60 Hz for a shoulder joint of a cobot. Effects that the model omits (the delay of
+half a period and the kinematic error) then do not make the estimate noisy."""
 SENSOR = 2e-3
 """Standard deviation of a torque sensor relative to rated torque [-]."""
 DRIFT = 2.0
-"""Change of a disturbance within one second, relative to rated torque [-]."""
+"""Default standard deviation of the change of a disturbance within one second, relative
+to rated torque [-]."""
 DRIFT_ALONE = 0.2
-"""Largest value of :data:`DRIFT` without a sensor at the link [-]; the motor encoder
+"""Upper bound of the drift without a sensor at the link [-], because the motor encoder
 alone cannot distinguish the effect of the torsion from a disturbance."""
 SHAKE = 0.1
 """Standard deviation of the white torque noise on either body, relative to rated torque
-[-]. Input noise above its real level restores stability margins that a filter reduces
-(Doyle, Stein 1979); with 0.1 the loop tolerates stiffness errors of ±20 %."""
+[-]. Input noise above its real level restores the stability margins that a filter
+reduces (Doyle, Stein 1979); with 0.1 the loop tolerates stiffness errors of ±20 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoMassModel:
-    """Linear model of a joint about its plan, with the motor on the output side."""
+    """Linear model of a joint about its plan, see :mod:`swgjoint.control.mpc`."""
 
     ratio: float
     """Signed ratio i [-]."""
@@ -59,9 +60,12 @@ class TwoMassModel:
     def discretise(self) -> tuple[Array, Array]:
         """Discrete-time model of the state (x1, x2, rates, d_m, d_l) over one period.
 
+        Angles are those of motor and link at the output side; d_m acts on the motor and
+        d_l on the link.
+
         Returns:
-            Transition matrix, shape (6, 6), and input column of the motor torque, shape
-            (6,).
+            Transition matrix, shape (6, 6), and change of the state per motor torque,
+            shape (6,).
         """
         i, k, c = self.ratio, self.stiffness, self.damping
         rotor, link = i**2 * self.rotor_inertia, self.link_inertia
@@ -76,41 +80,44 @@ class TwoMassModel:
 
     @property
     def torque_row(self) -> Array:
-        """Row that maps (x1, x2, rates) to the drive torque. Shape (4,)."""
+        """Row that maps (x1, x2, rates) to the drive torque [N·m]. Shape (4,)."""
         k, c = self.stiffness, self.damping
         return np.array([k, -k, c, -c])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PredictionMatrices:
-    """Matrices of the controller; leading axes count joints and stiffness levels.
+    """Matrices of the controller; leading axes are joints and stiffness levels.
 
-    Scaled torques are N motor torques, divided by their unit, followed by N drive
-    torques, divided by rated torque.
+    The state is (x1, x2, rates, d_m, d_l). Scaled torques are N motor torques divided
+    by their unit, followed by N drive torques divided by rated torque. Deviations are
+    those of (x1, x2, rates) from the set-point.
     """
 
     transition: Array
-    """Transition of the state over one period. Shape (6, 6)."""
+    """Matrix that advances the state by one period. Shape (6, 6)."""
     by_torque: Array
-    """Change of the state per motor torque. Shape (6,)."""
+    """Change of the state over one period per motor torque. Shape (6,)."""
     reads: Array
-    """Readings per state. Shape (n_readings, 6)."""
+    """Matrix that maps the state to the readings. Shape (n_readings, 6)."""
     gain: Array
     """Gain of the Kalman filter. Shape (6, n_readings)."""
     target: Array
-    """Set-point of (x1, x2, rates) per disturbance. Shape (4, 2)."""
+    """Matrix that maps the disturbances to the set-point. Shape (4, 2)."""
     steady: Array
-    """Motor torque at the set-point per disturbance. Shape (2,)."""
+    """Motor torque at the set-point per disturbance [-]. Shape (2,)."""
     ahead: Array
-    """Scaled torques of the optimum without limits, per deviation of the state from the
-    set-point. Shape (2 N, 4)."""
+    """Matrix that maps the deviation to the scaled torques of the optimum without
+    limits. Shape (2 N, 4)."""
     rows: Array
-    """Scaled torques per scaled motor torque of the horizon. Shape (2 N, N)."""
+    """Matrix that maps the N scaled motor torques to the scaled torques. Shape
+    (2 N, N)."""
     free: Array
-    """Scaled torques per deviation of the state, without motor torque. Shape
-    (2 N, 4)."""
+    """Matrix that maps the deviation to the scaled torques if the motor torques are
+    zero. Shape (2 N, 4)."""
     slope: Array
-    """Linear term g of the programme per deviation of the state. Shape (N, 4)."""
+    """Matrix that maps the deviation to the linear term g of the programme. Shape
+    (N, 4)."""
     inverse: Array
     """Inverse from :func:`swgjoint.control.mpc_solver.prepare`. Shape (N, N)."""
     weight: Array
@@ -118,7 +125,7 @@ class PredictionMatrices:
 
     @classmethod
     def stack(cls, designs: list[list[PredictionMatrices]]) -> PredictionMatrices:
-        """Stack the matrices of all joints (outer list) and stiffness levels."""
+        """Stack matrices of all joints (outer list) and stiffness levels (inner)."""
         return cls(
             **{
                 f.name: np.array([[getattr(d, f.name) for d in row] for row in designs])
@@ -127,7 +134,7 @@ class PredictionMatrices:
         )
 
     def select(self, index: tuple[NDArray[Any], ...]) -> PredictionMatrices:
-        """Index the leading axes, for instance by joints and stiffness levels."""
+        """Select entries of the leading axes, e.g. by joint and stiffness level."""
         return PredictionMatrices(
             **{f.name: getattr(self, f.name)[index] for f in fields(self)}
         )
@@ -143,19 +150,20 @@ def design(
     reads_link: bool,
     reads_torque: bool,
 ) -> PredictionMatrices:
-    """Compute feedback, filter and quadratic programme.
+    """Compute the matrices of feedback, filter and quadratic programme.
 
-    Without a sensor at the link the cost weights the motor angle instead of the link
+    Without a sensor at the link, the cost weights the motor angle instead of the link
     angle, because kinematic error and hysteresis then make the link angle uncertain.
 
     Args:
         joint: Linear model of the joint.
         horizon: Prediction horizon N [control instants].
-        frequency: Bandwidth of a rigid joint with this feedback [Hz].
-        drift: Change of a disturbance within one second, relative to rated torque [-].
+        frequency: Bandwidth with which a rigid joint without limits would respond [Hz].
+        drift: Standard deviation of the change of a disturbance within one second,
+            relative to rated torque [-].
         unit: Unit f of the motor torques [N·m].
         reads_link: Whether there is a link encoder.
-        reads_torque: Whether there is a torque sensor.
+        reads_torque: Whether there is an output torque sensor.
     """
     whole, push = joint.discretise()
     A, B = whole[:4, :4], push[:4, None]
@@ -214,9 +222,10 @@ def _filter(
     reads_link: bool,
     reads_torque: bool,
 ) -> tuple[Array, Array]:
-    """Rows of the readings, and the stationary gain of the Kalman filter.
+    """Matrix of the readings and steady-state gain of the Kalman filter.
 
-    Without a sensor at the link its disturbance is not observable and is omitted.
+    Without a sensor at the link, the disturbance of the link is not observable and is
+    omitted.
     """
     rated, h, i = joint.rated_torque, joint.period, joint.ratio
     rows, noise = [[1.0, 0, 0, 0, 0, 0]], [ENCODER / i]

@@ -2,14 +2,14 @@ r"""Solve many small quadratic programmes at once by ADMM.
 
 .. math:: \min_z \tfrac12 z^T H z + g^T z, \qquad l \le A z \le u
 
-H and A are known in advance, so that an iteration needs no factorisation,
+H and A are known in advance, so that an iteration needs no factorisation:
 
 .. math::
     z \leftarrow (H + A^T R A)^{-1} (A^T(R w - y) - g), \quad
     w \leftarrow \mathrm{clip}(A z + R^{-1} y, l, u), \quad
     y \leftarrow y + R (A z - w)
 
-If the bounds are infeasible, the result is close to the least violation.
+If no z satisfies the bounds, the result is close to the least violation.
 
 Source:
     Stellato et al. (2020), "OSQP: an operator splitting solver for quadratic programs",
@@ -25,11 +25,11 @@ from swgjoint.typing import Array
 ITERATIONS = 300
 """Largest number of iterations."""
 TOLERANCE = 1e-6
-"""Residual at which the iteration ends, in the unit of the rows."""
+"""Residual below which the iteration ends, in the unit of A z."""
 
 
 def prepare(hessian: Array, rows: Array) -> tuple[Array, Array]:
-    """Compute the inverse and the weights R of programmes in advance.
+    """Compute the parts of the iteration that depend only on H and A.
 
     Args:
         hessian: Hessian H. Shape (..., n, n).

@@ -1,19 +1,20 @@
 r"""Disturbance observer of the motors.
 
 From the momentum :math:`p = J_m \dot\theta` of the rotor, the motor torque
-:math:`\tau` and the drive torque :math:`n`, the observer
+:math:`\tau` and the torque :math:`n` with which the drive loads the rotor, the observer
 
 .. math:: \hat d = L \left( p(t) - p(0) - \int_0^t (\tau - n + \hat d)\,dt \right)
 
-estimates the disturbance d, which is friction and unknown load. It needs no
-accelerations: :math:`\dot{\hat d} = L (d - \hat d)`, a low-pass filter of bandwidth L.
-The estimate is subtracted from the motor torque.
+estimates the disturbance torque d, which consists of friction and unknown load. It
+needs no accelerations. Since :math:`\dot{\hat d} = L (d - \hat d)`, the estimate is d
+after a first-order low-pass filter of bandwidth L. It is subtracted from the motor
+torque.
 
-The drive torque is :math:`n = T/i`, where T is the reading of the torque sensor or,
-without a sensor, the known link torque of the motion. In the second case oscillations
-of the drive torque count as disturbance, so that the bandwidth must stay below the
-joint resonance. Delayed speeds are compared with the torques of the same instant, and
-the estimate has the same delay.
+The drive loads the rotor with :math:`n = T/i`, where T is the reading of the torque
+sensor or, without a sensor, the known link torque of the motion. In the second case
+oscillations of the drive torque count as disturbance, so that the bandwidth must stay
+below the joint resonance. Delayed speeds are compared with the torques of the same
+instant, so that the estimate has the same delay.
 
 Source:
     De Luca, Mattone (2003), "Actuator failure detection and isolation using generalized
@@ -31,22 +32,22 @@ from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.typing import Array
 
 FASTEST = 0.25
-"""Largest product of bandwidth L and period [-]; from 1 on the discrete sum that
-replaces the integral oscillates."""
+"""Largest product of bandwidth L and period [-]. At products above 1 the estimate would
+oscillate, because a sum over the periods replaces the integral."""
 
 
 class DisturbanceObserver:
-    """Controller that subtracts the estimated disturbance from another one's torque."""
+    """Controller that subtracts the estimated disturbances from the motor torques."""
 
     def __init__(
         self, inner: Controller, *, bandwidth: float = 5.0, limit: float = np.inf
     ) -> None:
-        """Observe the motors of a controller.
+        """Extend a controller.
 
         Args:
             inner: Controller that computes the torques without the observer.
             bandwidth: Bandwidth L/(2 pi) [Hz].
-            limit: Largest torque that is subtracted [N·m].
+            limit: Largest magnitude of the subtracted torque [N·m].
         """
         self.inner, self.bandwidth, self.limit = inner, bandwidth, limit
 

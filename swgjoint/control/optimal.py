@@ -1,19 +1,20 @@
 r"""Optimal point-to-point motions of flexible joints, including the drive maps.
 
 The method is direct collocation. In each of N equal intervals the motor torques are
-constant, as with a sampled controller, and angles and rates are polynomials through
-three Gauss-Legendre points. At these points the dynamics are implicit constraints,
+constant, as with a sampled controller, and angles and rates are polynomials through the
+start of the interval and three Gauss-Legendre points. At these points the dynamics are
+implicit constraints,
 
 .. math:: M(q)\,a + h(q, v) = F_{drives}(q, v) + \tau_{motors},
 
 so that the inertia matrix is not inverted. The cost is the winding loss of the motion,
-:math:`\int \sum_j (\tau_j/\tau_{rated,j})^2 dt`, or the duration. The motor torques and
-the elastic torques of the drives are bounded.
+:math:`\int \sum_j (\tau_j/\tau_{rated,j})^2 dt`, or the duration. Bounds apply to the
+motor torques and, at the collocation points, to the elastic torques of the drives.
 
 The drives follow the smooth law of :func:`swgjoint.control.symbolic.smooth_forces`,
-without hysteresis and presliding. Polynomials through three points cannot represent
-harmonics whose phase changes by a large part of a period within an interval; omit them
-from the map (:meth:`~swgjoint.maps.drive_map.DriveMap.with_harmonics`).
+without hysteresis and presliding. Such polynomials cannot represent harmonics whose
+phase changes by a large part of a period within an interval; omit these harmonics from
+the map (:meth:`~swgjoint.maps.drive_map.DriveMap.with_harmonics`).
 
 Source:
     Betts (2010), "Practical methods for optimal control and estimation using nonlinear
@@ -38,14 +39,18 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.typing import Array
 
 DEGREE = 3
-"""Number of collocation points per interval; the order at its end is six."""
+"""Number of collocation points per interval; the error at interval ends is of order six
+in the length of the interval."""
 ITERATIONS = 500
 """Largest number of IPOPT iterations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OptimalMotion:
-    """Motion from rest to rest in n intervals; coordinates in the model's order."""
+    """Motion from rest to rest in n intervals.
+
+    The n_q coordinates are in the order of the model.
+    """
 
     time: Array
     """Times of the interval ends [s]. Shape (n + 1,)."""
@@ -59,7 +64,8 @@ class OptimalMotion:
     """Elastic torques along the torsion at the interval ends [N·m]. Shape (n + 1,
     n_joints)."""
     loss: float
-    """Integral of the squared motor torques, relative to rated motor torque [s]."""
+    """Winding loss: time integral of the sum of squared motor torques, each relative to
+    rated torque over ratio [s]."""
     iterations: int
     """Number of IPOPT iterations."""
 
@@ -81,18 +87,20 @@ def optimal_motion(
     drive_limit: ArrayLike = np.inf,
     intervals: int = 50,
 ) -> OptimalMotion:
-    """Compute motor torques that move an arm from rest to rest.
+    """Compute an optimal motion of an arm from rest to rest.
 
     Args:
         arm: Arm from :func:`~swgjoint.control.symbolic_arm.symbolic_arm`.
         drives: Drives of the arm, in the same order.
         start: Link angles at the start [rad]. Shape (n_joints,).
         end: Link angles at the end [rad]. Shape (n_joints,).
-        duration: Duration of the motion [s]; the initial guess if it is minimised.
+        duration: Duration of the motion [s]. If it is minimised, this is the initial
+            guess, and durations from 0.05 to 20 times the guess are allowed.
         minimise: ``loss`` or ``time``.
-        torque_limit: Torque limits of the motors [N·m]. Shape (n_joints,).
+        torque_limit: Torque limits of the motors [N·m], finite to minimise the time.
+            Shape (n_joints,) or scalar.
         drive_limit: Limits of the elastic torques of the drives [N·m]. Shape
-            (n_joints,).
+            (n_joints,) or scalar.
         intervals: Number of intervals N.
 
     Raises:
@@ -150,7 +158,7 @@ def optimal_motion(
     if minimise == "time":
         problem.subject_to(problem.bounded(0.05 * duration, total, 20.0 * duration))
         problem.set_initial(total, duration)
-        # a small weight on the loss makes torques that do not affect the time small
+        # a small weight on the loss keeps torques small that do not affect the time
         problem.minimize(total + 1e-3 * loss)
     else:
         problem.minimize(loss)
@@ -192,7 +200,7 @@ def optimal_motion(
 def rest_at(
     arm: SymbolicArm, drives: list[JointDrive], psi: Array
 ) -> tuple[Array, Array]:
-    """Rest of an arm at given link angles.
+    """Equilibrium of an arm at given link angles.
 
     Args:
         arm: Arm from :func:`~swgjoint.control.symbolic_arm.symbolic_arm`.
@@ -200,8 +208,8 @@ def rest_at(
         psi: Link angles [rad]. Shape (n_joints,).
 
     Returns:
-        Angles of rotors and links [rad], shape (n_q,), and motor torques that hold them
-        [N·m], shape (n_joints,).
+        Angles of rotors and links [rad], shape (n_q,), and motor torques that hold the
+        arm there [N·m], shape (n_joints,).
     """
     size = arm.inverse_dynamics.size1_in(0)
     q, still = np.zeros(size), np.zeros(size)
@@ -227,9 +235,9 @@ def replay(
     """Simulate a motion open-loop in MuJoCo.
 
     Args:
-        model: Compiled arm; its integrator is used, its time step is overwritten.
+        model: Compiled arm. Its integrator is used, and its time step is overwritten.
         arm: Symbolic arm of the same model.
-        motion: Motion whose motor torques are applied.
+        motion: Motion whose start state and motor torques are used.
         parts: Number of simulation steps per interval.
 
     Returns:
@@ -249,7 +257,9 @@ def replay(
 def _dynamics(arm: SymbolicArm, unit: Array, rated: Array, of_motor: Array) -> Any:
     """Function ``(z, w, a, share) -> (residual of the dynamics, drive torques)``.
 
-    All quantities are scaled: ``share`` is the motor torque relative to rated torque.
+    All quantities are scaled: angles, speeds and accelerations refer to the output
+    side, ``share`` is the motor torque relative to rated torque over ratio, and drive
+    torques are relative to rated torque.
     """
     ca = casadi()
     size, n = len(unit), len(rated)
@@ -274,7 +284,7 @@ def _guess(
     holding: tuple[Array, Array],
     duration: float,
 ) -> None:
-    """Initial guess: a quintic from rest to rest with interpolated holding torques."""
+    """Set the initial guess: a quintic motion and interpolated holding torques."""
     count = ends.size2() - 1
     low, high = (x[:, None] for x in between)
     for variable, t in (
@@ -292,5 +302,6 @@ def _guess(
 
 
 def _elastic(drive: JointDrive, theta: Array, psi: Array) -> Array:
+    """Elastic torque along the torsion [N·m]."""
     law = drive.drive
     return law.torque(law.torsion(theta, psi), theta, psi)

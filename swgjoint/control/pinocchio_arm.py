@@ -1,11 +1,12 @@
-"""Rigid arm in Pinocchio, as model for the feed-forward of a controller.
+"""Rigid arm in Pinocchio, as the model for the feed-forward of a controller.
 
-Pass it to :func:`swgjoint.run_scene` as ``known_arm``. It then computes the link
-torques (weight and inertia) from which every plan starts, instead of MuJoCo's inverse
-dynamics. A compiled MuJoCo model is converted value by value, because MuJoCo writes
-MJCF with only six digits. A Pinocchio model, for instance from a URDF file or an
-identification, is used unchanged. The joints may have viscous damping, dry friction
-and, in a MuJoCo model, linear springs; polynomial springs and damping are rejected.
+Pass a :class:`PinocchioArm` to :func:`swgjoint.run_scene` as ``known_arm``. It then
+computes the link torques (weight and inertia) on which every plan is based, instead of
+MuJoCo's inverse dynamics. A compiled MuJoCo model is converted value by value, because
+MuJoCo writes MJCF with only six digits. A Pinocchio model, for instance from a URDF
+file or an identification, is used unchanged. The joints may have viscous damping, dry
+friction and, in a MuJoCo model, linear springs. MuJoCo models with polynomial springs
+or damping are rejected.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ class PinocchioArm:
     """
 
     def __init__(self, model: Any) -> None:
-        """Copy tree, inertias, gravity, armature, damping, friction and springs.
+        """Convert a MuJoCo model or use a Pinocchio model.
+
+        A conversion copies the tree with its inertias, gravity, armature, damping, dry
+        friction and springs.
 
         Args:
             model: MuJoCo model, for instance
@@ -82,12 +86,12 @@ class PinocchioArm:
         return np.asarray(out + self._damping * velocity + dry + spring)
 
     def inertia(self, position: Array) -> Array:
-        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
+        """Inertia about every joint with the others locked [kg·m²]. (n_joints,)."""
         full = self._pin.crba(self.model, self._data, self._place(position))
         return np.diag(full).copy()
 
     def _place(self, angles: Array) -> Array:
-        """Configuration vector; it has cosine and sine of joints without limits."""
+        """Configuration vector, with cosine and sine for joints without limits."""
         return np.asarray(self._pin.integrate(self.model, self._zero, angles))
 
 
@@ -141,6 +145,7 @@ def _springs(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Arr
 
 
 def _pose(pin: Any, position: Array, quaternion: Array) -> Any:
+    """Pose from a position [m] and a quaternion (w, x, y, z)."""
     w, x, y, z = quaternion
     return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
 

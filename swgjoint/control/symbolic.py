@@ -1,9 +1,12 @@
 r"""Joint with its drive map as CasADi expressions, for optimal control.
 
-Only the energy is programmed. CasADi differentiates it, so that the forces, their
-tangents and the Hessians of Newton-type solvers derive from one potential:
+Only the potential V is written as an expression. CasADi differentiates it, so that the
+forces, their tangents and the Hessians of Newton-type solvers derive from V:
 
 .. math:: F = -\nabla_{(\theta,\psi)} V(\Delta, \alpha, \beta) - C\,(g\cdot v)\,g
+
+with the gradient g of the torsion :math:`\Delta` and the rates v of :math:`(\theta,
+\psi)`.
 
 Each coefficient of V is a polynomial of degree four on each torsion interval and a
 parabola beyond the knots. Comparisons, whose derivative is zero, select the interval. V
@@ -11,8 +14,9 @@ is therefore twice continuously differentiable wherever the map is, and its deri
 are those of the selected polynomial.
 
 Hysteresis and friction have the same states as in the plugin: the torsion at which each
-hysteresis element is relaxed, and the angle beta at which the friction bristle is
-relaxed. :func:`joint_forces` takes them as input and :func:`joint_history` updates them
+hysteresis element is relaxed, and the rotation of the wave generator relative to the
+flexspline at which the friction bristle is relaxed. These states are the history of the
+joint. :func:`joint_forces` takes them as input, and :func:`joint_history` updates them
 after a step. Both functions have kinks where an element begins to slip.
 
 :func:`smooth_forces` has neither kinks nor states. Its friction depends smoothly on the
@@ -45,10 +49,10 @@ _NO_LOAD = 1e-3  # fraction of rated torque below which the smooth law rounds |T
 
 
 def casadi() -> Any:
-    """The CasADi module.
+    """Import the CasADi module.
 
     Raises:
-        MissingExtraError: If it is not installed.
+        MissingExtraError: If CasADi is not installed.
     """
     try:
         return import_module("casadi")
@@ -85,7 +89,7 @@ def potential(drive: DriveMap, x: Any, theta: Any, psi: Any) -> Any:
     waves = ca.vertcat(*_waves(drive, theta, psi))
     origins, table = _pieces(drive)
     above = [x >= knot for knot in drive.torsion_knots]
-    # one for the interval that contains the torsion, zero for all others
+    # 1 for the interval that contains the torsion, 0 for all others
     here = ca.vertcat(1 - above[0], *(a - b for a, b in pairwise(above)), above[-1])
     d = x - ca.dot(origins, here)
     pieces = ca.reshape(ca.mtimes(ca.DM(table), waves), 5, len(origins))
@@ -94,7 +98,7 @@ def potential(drive: DriveMap, x: Any, theta: Any, psi: Any) -> Any:
 
 
 def joint_forces(drive: DriveMap, *, damping: float) -> Any:
-    """Function of all drive torques, including those that depend on the history.
+    """Function for all drive torques, including those that depend on the history.
 
     Args:
         drive: Drive map.
@@ -102,9 +106,10 @@ def joint_forces(drive: DriveMap, *, damping: float) -> Any:
 
     Returns:
         ``forces(q, v, history) -> (force, torsion)`` with q = (theta, psi) [rad], its
-        rate v [rad/s] and the torques (on the rotor, on the link) [N·m]. The history
-        contains the relaxed torsions of the hysteresis elements [rad] and, for a drive
-        with friction, the angle beta at which the bristle is relaxed [rad].
+        rate v [rad/s], the torques ``force`` on rotor and link [N·m] and the torsion
+        [rad]. The history contains the relaxed torsions of the hysteresis elements
+        [rad] and, for a drive with friction, the rotation of the wave generator
+        relative to the flexspline at which the bristle is relaxed [rad].
     """
     ca = casadi()
     q, v, past = _symbols(drive)
@@ -129,7 +134,10 @@ def joint_forces(drive: DriveMap, *, damping: float) -> Any:
 
 
 def joint_history(drive: DriveMap) -> Any:
-    """Function ``history(q, v, history) -> next`` that updates the history [rad]."""
+    """Function ``history(q, v, history) -> next`` that updates the history [rad].
+
+    Its arguments are those of the function from :func:`joint_forces`.
+    """
     ca = casadi()
     q, v, past = _symbols(drive)
     x, _, elastic, _ = _conservative(drive, q)
@@ -146,7 +154,7 @@ def joint_history(drive: DriveMap) -> Any:
 
 
 def relaxed_history(drive: DriveMap, theta: float, psi: float) -> Array:
-    """Initial history: hysteresis relaxed at zero torsion, bristle at these angles.
+    """Initial history: hysteresis relaxed at zero torsion, bristle at given angles.
 
     Args:
         drive: Drive map.
@@ -169,7 +177,7 @@ def joint_step(
     link_inertia: float,
     timestep: float,
 ) -> Any:
-    """One step of the classical Runge-Kutta method, as MuJoCo's RK4.
+    """Function for one step of the classical Runge-Kutta method, like MuJoCo's RK4.
 
     The history is constant during the step and is updated at its end.
 
@@ -211,14 +219,14 @@ def joint_step(
 def smooth_forces(drive: DriveMap, *, damping: float, creep_speed: float = 0.1) -> Any:
     """Function ``forces(q, v) -> (force, torsion)`` without kinks or history.
 
-    The friction torque is f tanh(nu/nu_0) + eta nu. Under load, a joint that would
-    stick creeps at a fraction of nu_0.
+    The friction torque is f tanh(nu/nu_0) + eta nu, with the yield torque f, the
+    viscous coefficient eta and the speed nu of the wave generator relative to the
+    flexspline. Under load, a joint that would stick creeps at a fraction of nu_0.
 
     Args:
         drive: Drive map; its hysteresis is omitted.
         damping: Damping C along the torsion [N·m·s/rad].
-        creep_speed: Speed nu_0 of the wave generator relative to the flexspline
-            [rad/s].
+        creep_speed: Speed nu_0 over which the friction torque changes sign [rad/s].
     """
     ca = casadi()
     q, v, _ = _symbols(drive)
@@ -249,7 +257,10 @@ def _symbols(drive: DriveMap) -> tuple[Any, Any, Any]:
 
 
 def _conservative(drive: DriveMap, q: Any) -> tuple[Any, Any, Any, Any]:
-    """Torsion, its gradient (1, 2), torque along it at fixed angles, -dV/dq (2, 1)."""
+    """Torsion, its gradient (1, 2), torque along it at fixed angles, and -dV/dq (2, 1).
+
+    The gradient and dV/dq are those with respect to q = (theta, psi).
+    """
     ca = casadi()
     x, held = torsion(drive, q[0], q[1]), type(q).sym("x")
     energy = potential(drive, held, q[0], q[1])
@@ -270,6 +281,7 @@ def _reach(drive: DriveMap, speed: Any, along: Any) -> Any:
 
 
 def _clip(value: Any, reach: Any) -> Any:
+    """Value limited to +/-reach."""
     ca = casadi()
     return ca.fmin(ca.fmax(value, -reach), reach)
 

@@ -1,16 +1,19 @@
 r"""Dynamics of a tree of hinges as CasADi expressions, with parameters of an MjModel.
 
 The recursive Newton-Euler algorithm in the world frame computes the motion of every
-body from the base outwards, and the joint torques from the tips inwards,
+body from the base outwards, and then the joint torques from the tips inwards,
 
 .. math::
     \tau_j = z_j \cdot \sum_{b \succeq j} \left[ I_b\dot\omega_b
         + \omega_b \times I_b\omega_b + (c_b - p_j) \times m_b (\ddot c_b - g) \right]
         + a_j\,\ddot q_j,
 
-where :math:`a_j` is the armature. Rotors of attached drives are ordinary bodies of the
-tree. Joint damping is included. Contacts, joint limits, friction loss, springs and
-tendons are omitted; the symbolic law replaces the tendons of the drives.
+where :math:`z_j`, :math:`p_j` and :math:`a_j` are axis, anchor and armature of joint j,
+the sum is over all bodies b that the joint moves, and :math:`m_b`, :math:`c_b`,
+:math:`I_b` and :math:`\omega_b` are mass, centre of mass, inertia tensor and angular
+velocity of a body. Rotors of attached drives are ordinary bodies of the tree. Joint
+damping is included. Contacts, joint limits, friction loss, springs and tendons are
+omitted; the symbolic law replaces the tendons of the drives.
 
 Source:
     Luh, Walker, Paul (1980), "On-line computational scheme for mechanical
@@ -36,10 +39,15 @@ _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SymbolicArm:
-    """CasADi functions of an arm with drives; q, v and a are in the model's order."""
+    """CasADi functions of an arm with drives.
+
+    Angles q [rad], speeds v [rad/s] and accelerations a [rad/s²] are in the order of
+    the model.
+    """
 
     inverse_dynamics: Any
-    """``(q, v, a) -> tau``: inertia, gyroscopic, weight and damping torques [N·m]."""
+    """``(q, v, a) -> tau``: torques [N·m] that inertia, gyroscopic effects, weight and
+    joint damping require."""
     drive_forces: Any
     """``(q, v) -> (tau, torsion)``: torques of all drives on the joints of the model
     [N·m] and torsions [rad], without kinks or history."""
@@ -110,7 +118,7 @@ def symbolic_arm(
 
 
 def inverse_dynamics(model: mujoco.MjModel) -> Any:
-    """Function ``(q, v, a) -> tau`` of a tree of hinges, without its drives [N·m].
+    """Function ``(q, v, a) -> tau`` for a tree of hinges without its drives [N·m].
 
     Raises:
         InputError: If a joint is not a hinge.
@@ -162,7 +170,7 @@ def inverse_dynamics(model: mujoco.MjModel) -> Any:
 
 
 def inertia_of(dynamics: Any) -> Any:
-    """Function ``q -> M`` of the joint inertia, including armature [kg·m²].
+    """Function ``q -> M`` for the joint inertia matrix with armature [kg·m²].
 
     Args:
         dynamics: Function from :func:`inverse_dynamics`.
@@ -195,7 +203,7 @@ class _Body:
         return cls(place=zero, turn=ca.SX.eye(3), rate=zero, spin=zero, push=zero)
 
     def at(self, arm: Any) -> Any:
-        """Acceleration of the point at ``arm`` from the origin of the frame."""
+        """Acceleration of the point at a vector ``arm`` from the origin [m/s²]."""
         ca = casadi()
         return (
             self.push
@@ -204,7 +212,7 @@ class _Body:
         )
 
     def carried(self, position: Any, rotation: Any) -> _Body:
-        """Frame that is fixed in this one."""
+        """Body frame at a fixed position and rotation in this one."""
         arm = self.turn @ casadi().DM(position)
         return _Body(
             place=self.place + arm,
@@ -217,7 +225,7 @@ class _Body:
     def turned(
         self, axis: Any, anchor: Any, angle: Any, speed: Any, acceleration: Any
     ) -> tuple[_Body, Any, Any]:
-        """Frame behind a hinge, and axis and anchor of the hinge in the world."""
+        """Frame behind a hinge, and world axis and anchor of the hinge."""
         ca = casadi()
         z, arm = self.turn @ ca.DM(axis), self.turn @ ca.DM(anchor)
         pivot, push = self.place + arm, self.at(arm)
