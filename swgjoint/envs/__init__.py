@@ -1,6 +1,6 @@
 """Gymnasium environments of joints with strain wave gears, single and batched.
 
-Importing this package registers them:
+Importing this package registers them. Both calls below import it first:
 ``gymnasium.make("swgjoint.envs:swgjoint/JointTracking-v0", drive="CSG-25-100")`` or
 ``gymnasium.make_vec("swgjoint.envs:swgjoint/JointTracking-v0", num_envs=256)``.
 """
@@ -21,7 +21,7 @@ ENVIRONMENTS = {
     "swgjoint/RippleSuppression-v0": "ripple_suppression:RippleSuppression",
     "swgjoint/ArmTracking-v0": "arm_tracking:ArmTracking",
 }
-"""Module and common prefix of the class names, by environment id."""
+"""Module and common prefix of its two class names for each environment id."""
 
 for _name, _place in ENVIRONMENTS.items():
     if _name not in registry:

@@ -24,7 +24,7 @@ from swgjoint.typing import Array
 def _check_began(began: bool) -> None:
     """Reject a call that needs an episode before the first reset."""
     if not began:
-        raise InputError("no episode has begun; accepted: after reset()")
+        raise InputError("no episode has begun; call reset() first")
 
 
 def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
@@ -37,6 +37,7 @@ def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
 
 
 def _box(entries: tuple[Entry, ...]) -> Any:
+    """Space of all values of the entries within their bounds."""
     low, high = bounds(entries)
     return Box(low, high, dtype=np.float64)
 
@@ -50,8 +51,9 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     }
 
     core_of: ClassVar[type[Any]]
-    """Class of the episodes, called with their number, engine threads and settings."""
+    """Class of the episodes, called with number of episodes, threads and settings."""
     settings_type: ClassVar[type[Any]]
+    """Class of the settings, called with the arguments of the environment."""
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """Make one environment; the class docstring lists the arguments.
@@ -65,8 +67,8 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
-                f"render_mode {render_mode!r}; accepted: None, 'rgb_array'; for the"
-                " rerun viewer swgjoint.envs.recording.EpisodeRecorder"
+                f"render_mode {render_mode!r}; accepted: None, 'rgb_array' (for the"
+                " rerun viewer use swgjoint.envs.recording.EpisodeRecorder)"
             )
         settings = settings_of(self.settings_type, arguments)
         core: Core = self.core_of(1, 1, settings)
@@ -87,6 +89,9 @@ class SingleEnv(gymnasium.Env[Array, Array]):
 
         Returns:
             Observation and info.
+
+        Raises:
+            InputError: If an option is given.
         """
         _check_options(options or {}, ())
         super().reset(seed=seed)
@@ -95,7 +100,15 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         return self.core.observation()[0], self._info(0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Apply a constant action over one control period."""
+        """Apply a constant action over one control period.
+
+        Returns:
+            Observation, reward, whether a limit was exceeded, whether the episode has
+            its full length, and info.
+
+        Raises:
+            InputError: If no episode has begun, or if the action is not accepted.
+        """
         _check_began(self._began)
         core = self.core
         core.step(np.asarray(action)[None], None)
@@ -109,7 +122,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         )
 
     def render(self) -> Any:
-        """Picture if ``render_mode`` is ``rgb_array``. Shape (480, 640, 3), uint8."""
+        """Picture, shape (480, 640, 3), uint8; None without a render mode."""
         if self.render_mode is None:
             return None
         plant = self.core.plant
@@ -132,7 +145,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
 
     @property
     def task(self) -> Task:
-        """The commanded motion of the episode, known after its reset."""
+        """Commanded motion of the episode, known after its reset."""
         task = self.core.task
         return Task(
             period=task.period,
@@ -145,21 +158,22 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         )
 
     def read_measurements(self, observation: Array) -> Measured:
-        """Measured values in an observation, for controllers. Shapes (n_joints,)."""
+        """Sensor readings in an observation, for controllers. Shapes (n_joints,)."""
         return self.core.read_measurements(observation)
 
 
 class BatchEnv(VectorEnv[Array, Array, Array]):
     """Many episodes on the threads of the engine.
 
-    ``autoreset_mode`` sets when an ended episode restarts. With ``NextStep`` it
+    ``autoreset_mode`` determines when an ended episode restarts. With ``NextStep`` it
     restarts in the next step, whose action is ignored. With ``SameStep`` it restarts
-    immediately, and ``info["final_obs"]`` has its last observation. With ``Disabled``
-    it restarts when ``reset`` is called with a ``reset_mask``. The results are
-    bit-identical to those of gymnasium's own vector environments.
+    immediately, and ``info["final_obs"]`` contains its last observation. With
+    ``Disabled`` it restarts when ``reset`` is called with a ``reset_mask``. The results
+    are bit-identical to those of gymnasium's own vector environments.
     """
 
     single: ClassVar[type[SingleEnv]]
+    """Class of the single environment."""
 
     def __init__(
         self,
@@ -219,7 +233,8 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
             Observations and info.
 
         Raises:
-            InputError: If a seed is missing or an option is not accepted.
+            InputError: If the number of seeds is wrong, or if an option is not
+                accepted.
         """
         options, n = dict(options or {}), self.num_envs
         _check_options(options, ("reset_mask",))
@@ -240,7 +255,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         return self.core.observation(), _of(chosen, info)
 
     def _chosen(self, mask: Any) -> NDArray[np.bool_]:
-        """Episodes that a reset restarts."""
+        """Whether a reset restarts each episode. Shape (n,)."""
         if mask is None:
             return self._all
         n = self.num_envs
@@ -252,21 +267,28 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
             )
         if not self._rngs:
             raise InputError(
-                "reset_mask before any episode has begun; accepted: after reset()"
+                "reset_mask before any episode has begun; call reset() without it first"
             )
         return np.array(mask)
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Apply constant actions over one control period. Shapes (n, ...)."""
+        """Apply constant actions over one control period. Shapes (n, ...).
+
+        Returns:
+            As those of :meth:`SingleEnv.step`, with the episodes as first axis.
+
+        Raises:
+            InputError: If no episode has begun, if an ended episode was not reset with
+                ``Disabled``, or if the actions are not accepted.
+        """
         _check_began(bool(self._rngs))
         core, ended = self.core, self._ended
         some = bool(ended.any())
         if some and self._mode is AutoresetMode.DISABLED:
             rows = ", ".join(map(str, np.flatnonzero(ended)[:8]))
             raise InputError(
-                f"step of episodes that have ended ({rows}); accepted: after"
-                " reset(options={'reset_mask': ...}), which autoreset_mode Disabled"
-                " leaves to the caller"
+                f"step of episodes that have ended ({rows}); with autoreset_mode"
+                " Disabled, call reset(options={'reset_mask': ...}) first"
             )
         core.step(actions, ~ended if some else None)
         reward, broken, over = core.reward(), core.broken(), core.over
@@ -307,16 +329,16 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
 
     @property
     def task(self) -> Task:
-        """The commanded motions; the axis of episodes precedes that of joints."""
+        """Commanded motions; the axis of episodes precedes that of joints."""
         return self.core.task
 
     def read_measurements(self, observation: Array) -> Measured:
-        """Measured values in observations, for controllers. Shapes (n, n_joints)."""
+        """Sensor readings in observations, for controllers. Shapes (n, n_joints)."""
         return self.core.read_measurements(observation)
 
 
 def _of(rows: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:
-    """Info of some episodes in gymnasium's format, zero and False for the others."""
+    """Info of the marked episodes in gymnasium's format; zero or False for others."""
     if rows.all():
         return info
     among = {

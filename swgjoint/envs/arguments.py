@@ -17,7 +17,7 @@ def is_number(value: Any) -> bool:
 
 
 def is_whole(value: Any) -> bool:
-    """Whether a value is an integer of any numeric type."""
+    """Whether a value is a finite number without a fractional part."""
     return is_number(value) and int(value) == value
 
 
@@ -27,14 +27,17 @@ def is_flag(value: Any) -> bool:
 
 
 def format_value(value: Any) -> str:
-    """Value as text in a message: plain numbers, otherwise a shortened repr."""
+    """Format a value for a message: numpy scalars as numbers, others as their repr.
+
+    Texts of more than 60 characters are shortened.
+    """
     plain = isinstance(value, np.generic)
     text = str(value) if plain else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:
-    """Reject a value that is not a positive number.
+    """Reject a value that is not a positive number, or zero where this is accepted.
 
     Args:
         key: Name of the argument.
@@ -69,7 +72,7 @@ def check_count(key: str, value: Any, least: int) -> None:
 
 
 def check_flag(key: str, value: Any) -> None:
-    """Reject a value that is not a bool.
+    """Reject a value that is neither a bool nor 0 or 1.
 
     Args:
         key: Name of the argument.

@@ -37,11 +37,12 @@ ACTIONS = ("torque", "setpoint")
 
 
 ANGLE_MARGIN = 0.3
-"""Margin beyond the range of the path at which an episode ends [rad]."""
+"""Deviation of a link from the range of its path at which an episode ends [rad]."""
 
 
 SPEED_MARGIN = 20.0
-"""Margin beyond twice the fastest motor speed at which an episode ends [rad/s]."""
+"""Excess of a motor speed over twice the largest motor speed of the path at which an
+episode ends [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,32 +199,31 @@ class ArmCore(Core):
             ]
         ).max(axis=0)
 
-        def each(what: str, unit: str, top: float) -> Entry:
+        def each(meaning: str, unit: str, top: float) -> Entry:
             top = ceiling(top)
-            return Entry(
-                meaning=f"{what} of every joint", unit=unit, low=-top, high=top, count=n
-            )
+            return Entry(meaning=meaning, unit=unit, low=-top, high=top, count=n)
 
         link_speed = max(float(np.abs(self._path[:, 1]).max()), 0.01)
         torque = max(float(np.abs(self._path[:, 4]).max()), 0.1)
         further = []
         if self.sensors.link_encoder:
-            further.append(each("link angle, read,", "rad", 1.01 * float(reach.max())))
+            top = 1.01 * float(reach.max())
+            further.append(each("measured link angle of every joint", "rad", top))
         if self.sensors.torque_sensor:
             top = 1.1 * float(limits.momentary_peak.max())
-            further.append(each("output torque, read,", "N·m", top))
+            further.append(each("measured output torque of every joint", "N·m", top))
         what = {
-            "torque": "added motor torque, of its authority,",
-            "setpoint": "shift of the set-point, of its largest,",
+            "torque": "added motor torque of every joint relative to authority",
+            "setpoint": "set-point shift of every joint relative to largest shift",
         }[s.action]
         return (
-            each("motor angle, read,", "rad", 1.01 * angle),
-            each("motor speed, change of the reading,", "rad/s", speed),
-            each("motor angle, ratio * reference - read,", "rad", float(off[0])),
-            each("motor speed, ratio * reference - read,", "rad/s", float(off[1])),
-            each("reference speed of the link", "rad/s", link_speed),
-            each("known torque of the link", "N·m", torque),
-            each("last action", "1", 1.0),
+            each("measured motor angle of every joint", "rad", 1.01 * angle),
+            each("measured motor speed of every joint", "rad/s", speed),
+            each("motor angle error of every joint", "rad", float(off[0])),
+            each("motor speed error of every joint", "rad/s", float(off[1])),
+            each("reference speed of every link", "rad/s", link_speed),
+            each("known torque of every link", "N·m", torque),
+            each("last action for every joint", "1", 1.0),
             *further,
         ), (each(what, "1", 1.0),)
 
@@ -236,11 +236,11 @@ class ArmCore(Core):
         """
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """The path of the scene."""
+        """Plan of every episode: the path of the scene."""
         return self._path
 
     def command(self, action: Array) -> Array:
-        """Input of the scene's motor loops including the action [N·m]."""
+        """Input of the scene's motor loops with the action [N·m]. (n, n_joints)."""
         s, plan = self.settings, self.next_plan()
         here = np.minimum(self.instant + 1, self.steps)
         if s.action == "torque":
@@ -256,7 +256,7 @@ class ArmCore(Core):
         return self._start
 
     def columns(self) -> list[Array]:
-        """See the table of :class:`ArmTrackingEnv`."""
+        """Parts of the observation in the order of its table."""
         read, ratio, now = self._readout, self.joints.ratio, self.now
         angle, speed = read.value[:, : ratio.size], read.motor_speed
         return [
@@ -271,7 +271,7 @@ class ArmCore(Core):
         ]
 
     def judge(self) -> None:
-        """Set the errors of links [rad] and tool [m]."""
+        """Set the errors of links [rad] and tool [m] from the current state."""
         super().judge()
         slopes = self._by_joint[self._here]  # (n, 3, n_joints)
         # sum joint by joint: the order must not depend on the number of episodes
@@ -283,7 +283,7 @@ class ArmCore(Core):
         self.tool_error = np.sqrt(x * x + y * y + z * z)
 
     def reward(self) -> Array:
-        """See :class:`ArmTrackingEnv`."""
+        """Reward as :class:`~swgjoint.envs.arm_tracking.ArmTrackingEnv` defines it."""
         s, effort = self.settings, np.zeros(len(self.action))
         for share in self.action.T:
             effort = effort + share * share
@@ -326,7 +326,7 @@ def _drives(scene: Scene) -> dict[str, DriveMap]:
 
 
 def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
-    """Reject disturbances, an arm without a tool, and a motion that starts moving."""
+    """Reject disturbances, an arm without a tool, and a start that is not at rest."""
     where = f"scene {scene.name!r}"
     if scene.disturbance:
         raise InputError(f"{where} has disturbances; accepted: none")
@@ -345,8 +345,8 @@ def _check(scene: Scene, assembly: Assembly) -> None:
     where, loops = f"scene {scene.name!r}", assembly.loops
     if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
         raise InputError(
-            f"{where}: controller {scene.controller.kind!r} with its sensors, period or"
-            " motor lines; accepted: kind pd in the engine's step, without them"
+            f"{where}: controller {scene.controller.kind!r}; accepted: kind pd within"
+            " the engine's step, without sensors, control period or motor lines"
         )
     if scene.simulation.integrator != "discrete":
         raise InputError(

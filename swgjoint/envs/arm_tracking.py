@@ -1,4 +1,4 @@
-"""An arm tracks the path of a scene; actions add torques or set-points to its loops."""
+"""An arm tracks the path of a scene; actions add torques or shift its set-points."""
 
 from __future__ import annotations
 
@@ -10,70 +10,73 @@ class ArmTrackingEnv(SingleEnv):
     """An arm with a drive in every joint tracks the path of a scene.
 
     The scene is assembled as by ``swgjoint run``: arm, drives, payload, path (joint or
-    Cartesian), step and controller. The controller is PD with feed-forward on every
-    motor angle within the engine's step, and the action is added to it. Catalogue
+    Cartesian), step and controller. The controller is PD control of every motor angle
+    with feed-forward within the engine's step, and the action is added to it. Catalogue
     drives get the kinematic error that their catalogue states.
 
     The action is constant over one control period. It is a torque of up to
-    ``authority_of_rated`` times rated torque over ratio or, with ``action="setpoint"``,
-    a shift of the link set-points of up to ``shift_arcmin``:
+    ``authority_of_rated`` times rated torque over ratio (the authority) or, with
+    ``action="setpoint"``, a shift of the link set-points of up to ``shift_arcmin``:
 
-    =====  ====================================================  ====  =======
-    index  meaning                                               unit  range
-    =====  ====================================================  ====  =======
-    0-5    added motor torque, of its authority, of every joint  1     -1 to 1
-    =====  ====================================================  ====  =======
+    =====  =======================================================  ====  =======
+    index  meaning                                                  unit  range
+    =====  =======================================================  ====  =======
+    0-5    added motor torque of every joint relative to authority  1     -1 to 1
+    =====  =======================================================  ====  =======
 
     Observation for scene ``ur5e-circle``; the last two entries exist only with
     ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
-    =====  =====================================================  =====  =============
-    index  meaning                                                unit   range
-    =====  =====================================================  =====  =============
-    0-5    motor angle, read, of every joint                      rad    -230 to 230
-    6-11   motor speed, change of the reading, of every joint     rad/s  -240 to 240
-    12-17  motor angle, ratio * reference - read, of every joint  rad    -1.6 to 1.6
-    18-23  motor speed, ratio * reference - read, of every joint  rad/s  -15 to 15
-    24-29  reference speed of the link of every joint             rad/s  -0.69 to 0.69
-    30-35  known torque of the link of every joint                N·m    -30 to 30
-    36-41  last action of every joint                             1      -1 to 1
-    42-47  link angle, read, of every joint                       rad    -2.3 to 2.3
-    48-53  output torque, read, of every joint                    N·m    -410 to 410
-    =====  =====================================================  =====  =============
+    =====  =====================================  =====  =============
+    index  meaning                                unit   range
+    =====  =====================================  =====  =============
+    0-5    measured motor angle of every joint    rad    -230 to 230
+    6-11   measured motor speed of every joint    rad/s  -240 to 240
+    12-17  motor angle error of every joint       rad    -1.6 to 1.6
+    18-23  motor speed error of every joint       rad/s  -15 to 15
+    24-29  reference speed of every link          rad/s  -0.69 to 0.69
+    30-35  known torque of every link             N·m    -30 to 30
+    36-41  last action for every joint            1      -1 to 1
+    42-47  measured link angle of every joint     rad    -2.3 to 2.3
+    48-53  measured output torque of every joint  N·m    -410 to 410
+    =====  =====================================  =====  =============
 
-    The ranges of the tracking errors are defined as in
-    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
+    Measured speeds, errors and their ranges are defined as in
+    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`. The known torque is that of
+    inertia, weight and load on the path.
 
-    Reward of a step, with the distance d of the tool from its reference (linearised
-    about the reference) and the actions a:
+    The reward of a step depends on the distance d of the tool from its reference
+    (linearised about the reference) and on the actions a:
 
         1/(1 + (d/error_scale)^2) - effort_weight mean(a^2)
 
-    An episode starts at rest at the start of the scene, with the drives carrying weight
-    and load. It is ``truncated`` after ``episode_s`` or the scene's duration, and
-    ``terminated`` when a limit is exceeded (``info["broken_limit"]``, see
+    An episode starts at rest at the start of the scene, and the drives carry weight and
+    load. It is ``truncated`` after ``episode_s`` or the scene's duration, whichever is
+    shorter, and ``terminated`` when a limit is exceeded (``info["broken_limit"]``, see
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`): a link 0.3 rad beyond the
-    range of the path, a motor 20 rad/s beyond twice the fastest speed of the path, or a
+    range of the path, a motor 20 rad/s beyond twice the largest speed of the path, or a
     drive above its momentary peak or ratcheting torque. ``info`` is the same as there,
     with arrays over the joints and with ``tool_error_mm`` in addition.
 
     Args (all by keyword):
-        scene: Name or path of a scene that starts at rest, or of an arm, which then
-            sweeps its joints; ``ur5e-circle``.
-        level: ``full`` or ``linear``; ``full``.
-        friction: Whether drives have the friction of their maps; overrides the scene;
-            True.
-        kinematic_error_arcmin: As in ``JointTracking-v0``; overrides the scene; the
-            phases of the joints differ.
-        action: ``torque`` or ``setpoint``; ``torque``.
-        authority_of_rated: Largest added motor torque, see above [-]; 0.2.
-        shift_arcmin: Largest shift of the set-points [arcmin]; 10.
-        episode_s: Duration of an episode [s]; 2.
+        scene: Name or path of a scene that starts at rest, or of an arm, whose joints
+            are then swept. Default: ``ur5e-circle``.
+        level: ``full`` or ``linear``. Default: ``full``.
+        friction: Whether drives have the friction of their maps; overrides the scene.
+            Default: True.
+        kinematic_error_arcmin: As in ``JointTracking-v0``; overrides the scene. The
+            phases differ between joints.
+        action: ``torque`` or ``setpoint``. Default: ``torque``.
+        authority_of_rated: Largest added motor torque relative to rated torque over
+            ratio [-]. Default: 0.2.
+        shift_arcmin: Largest shift of the set-points [arcmin]. Default: 10.
+        episode_s: Duration of an episode [s]. Default: 2.
         sensors: As in ``JointTracking-v0``.
         randomise: As in ``JointTracking-v0``, but ``load_inertia`` has no effect
-            because the scene sets the payload; at ``linear``, True draws nothing.
-        error_scale_mm: Error scale of the reward [mm]; 1.
-        effort_weight: Effort weight of the reward [-]; 0.1.
+            because the scene sets the payload. With level ``linear``, True therefore
+            varies nothing.
+        error_scale_mm: Error scale of the reward [mm]. Default: 1.
+        effort_weight: Effort weight of the reward [-]. Default: 0.1.
 
     Version: v0.
     """

@@ -33,12 +33,13 @@ from swgjoint.typing import Array
 LEVELS = ("full", "linear")
 """Levels of the drive that environments accept."""
 MAX_SUB_STEPS = 16
-"""Largest number of simulation steps per control period."""
+"""Largest number of simulation steps in a control period."""
 MAX_PERIOD = 0.05
-"""Largest control period; longer periods do not resolve the references [s]."""
+"""Largest control period [s]; longer periods do not resolve the references."""
 JOINT, BODY = "joint", "load"
+"""Names of the joint and of the load body in the model."""
 REACH = 0.5
-"""Length of the bench's bar, which carries the payload at its end [m]."""
+"""Length of the bar of the bench, which carries the payload at its end [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,8 +134,8 @@ class BenchCore(Core):
             count: Number of episodes.
             threads: Number of engine threads; 0: one per core.
             settings: Arguments of the environment.
-            loop_Hz: Natural frequency of the motor loop [Hz]; None: no loop.
-            loop_damping_ratio: Damping ratio of that loop [-].
+            loop_Hz: Natural frequency of the motor loop [Hz]; None: no motor loop.
+            loop_damping_ratio: Damping ratio of the motor loop [-].
         """
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise, s.level)
@@ -217,7 +218,7 @@ class BenchCore(Core):
 
         Args:
             index: Index of the simulation.
-            shares: Relative change of the inertia [-]. Shape (1,).
+            shares: Change of the inertia relative to its nominal value [-]. Shape (1,).
         """
         if self._inertia is not None:
             inertia = (1.0 + float(shares[0])) * self.settings.link_inertia
@@ -229,20 +230,15 @@ class BenchCore(Core):
         angle = ceiling(1.01 * ratio * float(limits.angle[0]))
         speed = ceiling(1.5 * float(limits.motor_speed[0]))
         return (
-            Entry(meaning="motor angle, read", unit="rad", low=-angle, high=angle),
-            Entry(
-                meaning="motor speed, change of the reading",
-                unit="rad/s",
-                low=-speed,
-                high=speed,
-            ),
+            Entry(meaning="measured motor angle", unit="rad", low=-angle, high=angle),
+            Entry(meaning="measured motor speed", unit="rad/s", low=-speed, high=speed),
         )
 
     def error_entries(self, acceleration: float) -> tuple[Entry, ...]:
         """Entries of the measured tracking errors of motor angle and speed.
 
         Args:
-            acceleration: Largest acceleration of references at the link [rad/s²].
+            acceleration: Largest acceleration of the reference at the link [rad/s²].
         """
         angle, speed = error_bounds(
             self.joint.ratio,
@@ -252,32 +248,22 @@ class BenchCore(Core):
             period=self.period,
         )
         return (
-            Entry(
-                meaning="motor angle, ratio * reference - read",
-                unit="rad",
-                low=-angle,
-                high=angle,
-            ),
-            Entry(
-                meaning="motor speed, ratio * reference - read",
-                unit="rad/s",
-                low=-speed,
-                high=speed,
-            ),
+            Entry(meaning="motor angle error", unit="rad", low=-angle, high=angle),
+            Entry(meaning="motor speed error", unit="rad/s", low=-speed, high=speed),
         )
 
     def sensor_entries(self) -> tuple[Entry, ...]:
-        """Entries of link encoder and torque sensor, if present."""
+        """Entries of the link encoder and the torque sensor, if present."""
         limits, entries = self.limits, []
         if self.sensors.link_encoder:
             angle = ceiling(1.01 * float(limits.angle[0]))
             entries.append(
-                Entry(meaning="link angle, read", unit="rad", low=-angle, high=angle)
+                Entry(meaning="measured link angle", unit="rad", low=-angle, high=angle)
             )
         if self.sensors.torque_sensor:
             top = ceiling(1.1 * float(limits.momentary_peak[0]))
             entries.append(
-                Entry(meaning="output torque, read", unit="N·m", low=-top, high=top)
+                Entry(meaning="measured output torque", unit="N·m", low=-top, high=top)
             )
         return tuple(entries)
 
@@ -285,7 +271,7 @@ class BenchCore(Core):
 def _bench(
     settings: BenchSettings, drive: DriveMap, *, variable: bool, top_speed: float
 ) -> tuple[mujoco.MjSpec, JointDrive]:
-    """Model of the bench with load and drive, without a motor."""
+    """Model of the bench with load and drive but without a motor, and the drive."""
     s, spec = settings, RigidArm("bench").spec()
     spec.option.timestep = s.period_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
@@ -307,14 +293,14 @@ def _bench(
 
 
 def settings_of(kind: type[Any], arguments: dict[str, Any]) -> Any:
-    """Settings from keyword arguments.
+    """Settings from the keyword arguments of an environment.
 
     Args:
         kind: Class of the settings.
         arguments: Keyword arguments of the environment.
 
     Raises:
-        InputError: If an argument is unknown.
+        InputError: If an argument is unknown or its value is not accepted.
     """
     known = kind.__dataclass_fields__
     if unknown := sorted(set(arguments) - set(known)):

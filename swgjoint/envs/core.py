@@ -1,7 +1,7 @@
 """Base of all environments: n parallel episodes of driven joints.
 
-All numbers are computed here, with episodes as first axis, so that one environment and
-a batch are bit-identical. :mod:`swgjoint.envs.api` has the gymnasium interfaces.
+All values are computed here with episodes as first axis, so that one environment and a
+batch are bit-identical. :mod:`swgjoint.envs.api` has the gymnasium interfaces.
 """
 
 from __future__ import annotations
@@ -29,11 +29,10 @@ from swgjoint.units import arcmin
 Rows = NDArray[np.intp]
 
 TRACKED = 50.0 * arcmin
-"""Largest observed link error [rad], twenty times the error of a rigid plan. A much
-larger bound hides relevant errors from agents. Larger errors are clipped."""
+"""Largest observed link error [rad], twenty times the error of a rigid plan; relevant
+errors would be a tiny fraction of a much wider range. Larger errors are clipped."""
 REGAINED = 0.1
-"""Time in which the largest observed speed error builds up that link error [s]."""
-
+"""Time in which the largest observed speed error accumulates to that error [s]."""
 LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
 """Names of the limits by their number in ``info["broken_limit"]``."""
 
@@ -43,15 +42,17 @@ class Entry:
     """One quantity of an observation or an action, with its unit and bounds."""
 
     meaning: str
+    """Name of the quantity for tables."""
     unit: str
     low: float
     high: float
+    """Upper bound in this unit; ``low`` is the lower bound."""
     count: int = 1
     """Number of values of this quantity, e.g. one per joint."""
 
 
 def table(entries: Sequence[Entry]) -> str:
-    """Table of the entries for a docstring."""
+    """Table of the entries as text for a docstring."""
     rows, first = [("index", "meaning", "unit", "range")], 0
     for e in entries:
         index = str(first) if e.count == 1 else f"{first}-{first + e.count - 1}"
@@ -72,7 +73,7 @@ def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
 def error_bounds(
     ratio: float, *, speed: float, acceleration: float, age: float, period: float
 ) -> tuple[float, float]:
-    """Bounds of observed errors of motor angle [rad] and motor speed [rad/s].
+    """Bounds of the observed errors of motor angle [rad] and motor speed [rad/s].
 
     A reading is compared with the current reference, so the bounds include the change
     of the reference during the age of the reading.
@@ -82,7 +83,7 @@ def error_bounds(
         speed: Largest speed of the reference at the link [rad/s].
         acceleration: Largest acceleration of the reference at the link [rad/s²].
         age: Age of the readings [s].
-        period: Control period, over which speeds are angle differences [s].
+        period: Control period, over which speeds are measured [s].
     """
     i = abs(ratio)
     return (
@@ -92,14 +93,14 @@ def error_bounds(
 
 
 def ceiling(value: float) -> float:
-    """Value rounded up to two digits, for bounds in a table."""
+    """Value > 0 rounded up to two significant digits, for bounds in a table."""
     digit = 10.0 ** (floor(log10(value)) - 1)
     return max(value, float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EpisodeLimits:
-    """Limits that end an episode, as arrays of shape (n_joints,)."""
+    """Limits of the joints. Arrays have shape (n_joints,)."""
 
     angle: Array
     """Largest deviation of the link angle from ``centre`` [rad]."""
@@ -110,9 +111,9 @@ class EpisodeLimits:
     momentary_peak: Array
     """Momentary peak torque of the drives [N·m]."""
     ratcheting: Array
-    """Ratcheting torque of the drives, inf if unknown [N·m]."""
+    """Ratcheting torque of the drives [N·m], inf if unknown."""
     motor_torque: Array
-    """Largest motor torque; motors saturate there and the episode continues [N·m]."""
+    """Largest motor torque [N·m]; motors saturate there, and the episode continues."""
 
 
 class Core(ABC):
@@ -136,13 +137,13 @@ class Core(ABC):
         Args:
             plant: The simulations.
             joints: Nominal data of the joints, for the task.
-            loop: Motor loops in the engine.
+            loop: Motor control loops in the engine.
             limits: Limits of angle, speed and torque.
             sensors: Sensors of every joint.
             tolerances: Tolerances of the drives; None: all drives are nominal.
             period: Control period [s].
             steps: Number of control periods of an episode.
-            shared: Whether all episodes have the same plan.
+            shared: Whether all episodes follow the same plan.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
@@ -158,7 +159,7 @@ class Core(ABC):
         self._rows = np.arange(count)
         self.instant = np.zeros(count, dtype=np.intp)
         """Number of control periods since the start. Shape (n,)."""
-        # position, velocity, acceleration, load, known torque of the links
+        # position, velocity, acceleration, load torque and known torque of the links
         own = np.arange(1 if shared else count)
         self._plan = np.zeros((own.size, steps + 1, 5, n))
         self._planned = np.broadcast_to(own, count) if shared else own
@@ -168,11 +169,11 @@ class Core(ABC):
         """Deviations of every simulation's drives from the nominal ones."""
         self.observation_entries, self.action_entries = self.entries()
         self.action = np.zeros((count, sum(e.count for e in self.action_entries)))
-        """Last action after limiting [-]."""
+        """Last action, clipped to -1 to 1 [-]. Shape (n, n_actions)."""
         self.motor_torque = np.zeros((count, n))
-        """Last motor torque [N·m]."""
+        """Last motor torque [N·m]. Shape (n, n_joints)."""
         self.output_torque = np.zeros((count, n))
-        """Output torque of the drives [N·m]."""
+        """Output torque of the drives [N·m]. Shape (n, n_joints)."""
         self._low, self._high = bounds(self.observation_entries)
 
     @abstractmethod
@@ -183,19 +184,19 @@ class Core(ABC):
     def draw(self, rng: np.random.Generator) -> Array:
         """Draw the plan of one episode. Shape (steps + 1, 5, n_joints).
 
-        It has position, velocity, acceleration, load torque and known torque of the
-        links, the latter including inertia.
+        It consists of position, velocity, acceleration, load torque and known torque of
+        the links. The known torque is that of load, inertia and weight.
         """
 
     @abstractmethod
     def command(self, action: Array) -> Array:
-        """Motor input for a limited action [N·m]. Shape (n, n_joints)."""
+        """Motor input for a clipped action [N·m]. Shape (n, n_joints)."""
 
     def start(self, plan: Array) -> tuple[Array, Array]:
-        """Motor angles on the reference [rad] and drive torques [N·m] at the start.
+        """Motor angles [rad] and drive torques [N·m] at the start. Shapes (n_joints,).
 
         Args:
-            plan: Plan of the episode.
+            plan: Plan of the episode. Shape (steps + 1, 5, n_joints).
         """
         return self.joints.ratio * plan[0, 0], plan[0, 4]
 
@@ -216,7 +217,7 @@ class Core(ABC):
 
         Args:
             index: Index of the simulation.
-            shares: Relative changes of the inertia [-]. Shape (n_joints,).
+            shares: Changes relative to the nominal inertia [-]. Shape (n_joints,).
         """
 
     def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
@@ -226,7 +227,7 @@ class Core(ABC):
             rows: Indices of the simulations.
             rngs: Random generators, one for each of them.
         """
-        # new arrays, because arrays returned by the last step must not change
+        # new arrays, because the arrays that the last step returned must not change
         torque = self.output_torque.copy()
         for k, rng in zip(rows, rngs, strict=True):
             maps: tuple[DriveMap, ...] = tuple(d.drive for d in self.plant.drives)
@@ -258,8 +259,8 @@ class Core(ABC):
         """Take one control period.
 
         Args:
-            action: Actions, limited to -1 to 1 [-]. Shape (n, n_actions).
-            active: Whether episodes continue; None: all. Shape (n,).
+            action: Actions [-], which are clipped to -1 to 1. Shape (n, n_actions).
+            active: Whether each episode continues; None: all do. Shape (n,).
 
         Raises:
             InputError: If the action has another shape or is not finite.
@@ -317,16 +318,16 @@ class Core(ABC):
         return np.concatenate(parts, axis=1)
 
     def observation(self) -> Array:
-        """Sensor readings and known quantities, limited. Shape (n, n_entries)."""
+        """Readings and known quantities, clipped to bounds. Shape (n, n_values)."""
         return np.clip(np.concatenate(self.columns(), axis=1), self._low, self._high)
 
     def readings(self) -> list[Array]:
-        """Readings of link encoder and torque sensor, if present. (n, n_joints)."""
+        """Readings of link encoder and torque sensor that exist. (n, n_joints)."""
         n, value = len(self.joints.names), self._readout.value
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
     def broken(self) -> NDArray[np.int64]:
-        """Number of the exceeded limit, see :data:`LIMITS`. Shape (n,)."""
+        """Number of the exceeded limit in :data:`LIMITS`, or 0. Shape (n,)."""
         limits, torque = self.limits, np.abs(self.output_torque)
         numbers = np.zeros(len(torque), dtype=np.int64)
         # NaN exceeds every limit; the last exceeded limit is reported
@@ -341,11 +342,11 @@ class Core(ABC):
 
     @property
     def over(self) -> NDArray[np.bool_]:
-        """Whether episodes have reached their full length. Shape (n,)."""
+        """Whether each episode has reached its full length. Shape (n,)."""
         return self.instant >= self.steps
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """True values without sensor errors, per joint if there are several joints."""
+        """True values without sensor errors. Shapes (n,), or (n, n_joints) for arms."""
         error = self.link_angle - self.motor_angle / self.plant.ratio
         values: dict[str, NDArray[Any]] = {
             "link_error_arcmin": self.link_error / arcmin,
@@ -364,7 +365,7 @@ class Core(ABC):
     def task(self) -> Task:
         """Motions of all episodes; the axis of episodes precedes that of joints."""
         if self._task is None:
-            # (5, steps + 1, n, n_joints); a copy, so that the next episodes keep it
+            # (5, steps + 1, n, n_joints); copied, as the next episodes overwrite it
             plan = self._plan[self._planned].transpose(2, 1, 0, 3).copy()
             age = self.sensors.delay_periods * self.period
             self._task = Task(
@@ -379,7 +380,7 @@ class Core(ABC):
         return self._task
 
     def read_measurements(self, observation: Array) -> Measured:
-        """Measured values in observations with any leading axes, for controllers."""
+        """Sensor readings in observations with any leading axes, for controllers."""
         n, last = len(self.joints.names), observation.shape[-1]
         torque = last - n if self.sensors.torque_sensor else None
         link = (torque or last) - n if self.sensors.link_encoder else None

@@ -20,8 +20,8 @@ LOAD_RAMP = 0.3
 MOTION_START = 0.1
 """Rest before the motion [s]."""
 SHORTEST = 0.012
-"""Ratio of the largest speed to the largest acceleration of references [s]. Only
-point-to-point moves in episodes shorter than 0.7 s would exceed this acceleration."""
+"""Ratio of the largest speed to the largest acceleration of references [s]. This
+acceleration limits only point-to-point moves in episodes shorter than 0.6 s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class TrackingSettings(BenchSettings):
     """Arguments of ``JointTracking-v0``, see :class:`JointTrackingEnv`."""
 
     reference: str | tuple[str, ...] = tuple(KINDS)
-    """One or several names of :data:`~swgjoint.envs.references.KINDS`."""
+    """One or several names in :data:`~swgjoint.envs.references.KINDS`."""
     error_scale_arcmin: float = 3.0
     """Error scale of the reward [arcmin]."""
     effort_weight: float = 0.1
@@ -50,7 +50,7 @@ class TrackingSettings(BenchSettings):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of references from which an episode draws one."""
+        """Kinds of references, of which each episode draws one."""
         names = self.reference
         return (names,) if isinstance(names, str) else tuple(names)
 
@@ -75,7 +75,7 @@ class TrackingCore(BenchCore):
         def known(what: str, unit: str, top: float) -> Entry:
             return Entry(meaning=what, unit=unit, low=-top, high=top)
 
-        share = known("motor torque, of its limit", "1", 1.0)
+        share = known("motor torque relative to its limit", "1", 1.0)
         return (
             angle,
             speed,
@@ -109,11 +109,11 @@ class TrackingCore(BenchCore):
         return np.stack([*motion, load, known], axis=1)[:, :, None]
 
     def command(self, action: Array) -> Array:
-        """Motor torque, the action times the torque limit [N·m]."""
+        """Motor torques: the action times the torque limit [N·m]. Shape (n, 1)."""
         return np.asarray(action * self.limits.motor_torque)
 
     def columns(self) -> list[Array]:
-        """See the table of :class:`JointTrackingEnv`."""
+        """Parts of the observation in the order of its table."""
         read, ratio, now = self._readout, self.joint.ratio, self.now
         angle, speed = read.value[:, :1], read.motor_speed
         return [
@@ -130,7 +130,7 @@ class TrackingCore(BenchCore):
         ]
 
     def reward(self) -> Array:
-        """See :class:`JointTrackingEnv`."""
+        """Reward as :class:`JointTrackingEnv` defines it."""
         s = self.settings
         error = self.link_error[:, 0] / (s.error_scale_arcmin * arcmin)
         effort = self.motor_torque[:, 0] / self.limits.motor_torque[0]
@@ -142,91 +142,96 @@ class TrackingCore(BenchCore):
 class JointTrackingEnv(SingleEnv):
     """A joint with a strain wave gear follows a smooth reference under load.
 
-    The joint consists of motor and wave generator, the drive and a load that turns
-    about a vertical axis. The stiffness of the drive grows with torque, and its
-    kinematic error has 2 and 4 cycles per turn of the wave generator. Hysteresis and
-    friction are those of its map. The reference is known from the start of an episode
-    as ``task``.
+    The joint consists of a motor, a drive and a load that turns about a vertical axis.
+    The stiffness of the drive increases with torque, and its kinematic error has 2 and
+    4 cycles per turn of the wave generator. Hysteresis and friction are those of its
+    map. The whole reference is known from the start of an episode as ``task``.
 
     The action is constant over one control period:
 
-    =====  ==========================  ====  =======
-    index  meaning                     unit  range
-    =====  ==========================  ====  =======
-    0      motor torque, of its limit  1     -1 to 1
-    =====  ==========================  ====  =======
+    =====  ==================================  ====  =======
+    index  meaning                             unit  range
+    =====  ==================================  ====  =======
+    0      motor torque relative to its limit  1     -1 to 1
+    =====  ==================================  ====  =======
 
     Observation with the default arguments; the last two entries exist only with
     ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
-    =====  =====================================  =======  ===========
-    index  meaning                                unit     range
-    =====  =====================================  =======  ===========
-    0      motor angle, read                      rad      -310 to 310
-    1      motor speed, change of the reading     rad/s    -180 to 180
-    2      motor angle, ratio * reference - read  rad      -1.6 to 1.6
-    3      motor speed, ratio * reference - read  rad/s    -23 to 23
-    4      reference angle of the link            rad      -1 to 1
-    5      reference speed of the link            rad/s    -0.6 to 0.6
-    6      reference acceleration of the link     rad/s^2  -50 to 50
-    7      load torque against the link           N·m      -44 to 44
-    8      last action                            1        -1 to 1
-    9      link angle, read                       rad      -3.1 to 3.1
-    10     output torque, read                    N·m      -410 to 410
-    =====  =====================================  =======  ===========
+    =====  ==================================  =======  ===========
+    index  meaning                             unit     range
+    =====  ==================================  =======  ===========
+    0      measured motor angle                rad      -310 to 310
+    1      measured motor speed                rad/s    -180 to 180
+    2      motor angle error                   rad      -1.6 to 1.6
+    3      motor speed error                   rad/s    -23 to 23
+    4      reference angle of the link         rad      -1 to 1
+    5      reference speed of the link         rad/s    -0.6 to 0.6
+    6      reference acceleration of the link  rad/s^2  -50 to 50
+    7      load torque against the link        N·m      -44 to 44
+    8      last action                         1        -1 to 1
+    9      measured link angle                 rad      -3.1 to 3.1
+    10     measured output torque              N·m      -410 to 410
+    =====  ==================================  =======  ===========
 
-    The ranges of the tracking errors 2 and 3 correspond to a link error of 50 arcmin
-    and to a change of 50 arcmin in 0.1 s, plus the change of the reference during the
-    age of a reading. Larger errors are clipped. Readings have resolution, noise and
-    delay, see :class:`swgjoint.envs.sensors.Sensors`.
+    The measured speed is the change of the angle reading over the last control period
+    divided by that period. The errors 2 and 3 are ratio times reference of the link
+    minus measured value. Their ranges correspond to a link error of 50 arcmin and to a
+    change of 50 arcmin in 0.1 s, plus the change of the reference during the age of a
+    reading. Larger errors are clipped. Readings have resolution, noise and delay, see
+    :class:`swgjoint.envs.sensors.Sensors`.
 
-    Reward of a step, with the error e of the true link angle at its end and the motor
-    torque u relative to its limit:
+    The reward of a step depends on the error e of the true link angle at its end and on
+    the motor torque u relative to its limit:
 
         1/(1 + (e/error_scale)^2) - effort_weight u^2
 
     An episode starts with the motor at rest at angle 0 and without load. The load grows
-    over 0.3 s, and the motion begins at 0.1 s. The episode is ``truncated`` after
-    ``episode_s`` and ``terminated`` when a limit is exceeded. ``info["broken_limit"]``
-    is then the number of the limit in :data:`swgjoint.envs.core.LIMITS`: link angle
-    (1 + 2 max_angle), motor speed (twice that of the fastest reference), or drive
-    torque (momentary peak torque or ratcheting torque).
+    during the first 0.3 s, and the motion begins at 0.1 s. The episode is ``truncated``
+    after ``episode_s`` and ``terminated`` when a limit is exceeded.
+    ``info["broken_limit"]`` is then the number of the limit in
+    :data:`swgjoint.envs.core.LIMITS`: link angle
+    (1 rad + 2 ``max_angle_rad``), motor speed (twice that of the fastest reference), or
+    drive torque (momentary peak torque or ratcheting torque).
 
     ``info`` contains true values: ``link_error_arcmin``, ``transmission_error_arcmin``
     (output minus input/ratio), ``output_torque_Nm`` (of the drive on the link, mean
     over the last simulation step), ``motor_torque_Nm``, ``load_torque_Nm``,
     ``link_angle_rad``, ``motor_angle_rad``, ``time_s`` and ``broken_limit``.
 
-    Args (all by keyword, with their defaults):
-        drive: Catalogue name, map file, design or DriveMap; ``CSG-25-100``.
-        level: ``full``, or ``linear`` for one constant spring; ``full``.
-        rotor_inertia_kgm2: Inertia of motor rotor and wave generator [kg·m²]; 1e-4.
-        load_inertia_kgm2: Inertia of the load about the joint [kg·m²]; 1.0.
-        payload_kg: Payload at the end of the 0.5 m bar [kg]; 0.
-        friction: Whether the drive has the friction of its map; True.
+    Args (all by keyword):
+        drive: Catalogue name, map file, design or DriveMap. Default: ``CSG-25-100``.
+        level: ``full``, or ``linear`` for one constant spring. Default: ``full``.
+        rotor_inertia_kgm2: Inertia of motor rotor and wave generator about the motor
+            axis [kg·m²]. Default: 1e-4.
+        load_inertia_kgm2: Inertia of the load about the joint [kg·m²]. Default: 1.0.
+        payload_kg: Payload at the end of the 0.5 m bar [kg]. Default: 0.
+        friction: Whether the drive has the friction of its map. Default: True.
         kinematic_error_arcmin: Peak-to-peak kinematic error over one output turn
-            [arcmin], for a drive whose map has none. None uses the transmission
-            accuracy of the catalogue for a catalogue name and leaves other drives
-            unchanged; None.
-        torque_limit_Nm: Torque limit of the motor [N·m]; None uses the repeated peak
-            torque over the ratio; None.
-        max_speed_rad_s: Largest link speed of references [rad/s]; 0.6. Their largest
-            acceleration is this speed divided by 12 ms.
-        max_angle_rad: Largest link angle of references [rad]; 1.0.
-        period_s: Control period [s], up to 0.05; 1e-3. The simulation step is the
-            control period, or an integer fraction of it if the drive is too stiff.
-        episode_s: Duration of an episode [s]; 2.0.
-        load_of_rated: Largest load torque relative to rated torque [-]; 0.5.
-        sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`; None.
+            [arcmin], for a drive whose map has none. Default: None, which uses the
+            transmission accuracy of the catalogue for a catalogue name and leaves other
+            drives unchanged.
+        torque_limit_Nm: Torque limit of the motor [N·m]. Default: None, which uses the
+            repeated peak torque over the ratio.
+        max_speed_rad_s: Largest link speed of references [rad/s]. Their largest
+            acceleration is this speed divided by 12 ms. Default: 0.6.
+        max_angle_rad: Largest link angle of references [rad]. Default: 1.0.
+        period_s: Control period [s], up to 0.05. The simulation step is the control
+            period, or an integer fraction of it if the drive is too stiff for such a
+            step. Default: 1e-3.
+        episode_s: Duration of an episode [s]. Default: 2.0.
+        load_of_rated: Largest load torque relative to rated torque [-]. Default: 0.5.
+        sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
+            Default: None, which uses the defaults of these fields.
         randomise: True, or a mapping with fields of
             :class:`~swgjoint.envs.specimen.SpecimenTolerances`, draws a new drive and
-            load for every episode, while ``task`` keeps the nominal ones. At
-            ``linear``, True draws only the load inertia, and tolerances of the drive
-            are rejected; False.
-        reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``;
-            all three.
-        error_scale_arcmin: Error scale of the reward [arcmin]; 3.
-        effort_weight: Effort weight of the reward [-]; 0.1.
+            load inertia for every episode, while ``task`` keeps the nominal ones. With
+            level ``linear``, True varies only the load inertia, and tolerances of the
+            drive are rejected. Default: False.
+        reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
+            Default: all three.
+        error_scale_arcmin: Error scale of the reward [arcmin]. Default: 3.
+        effort_weight: Effort weight of the reward [-]. Default: 0.1.
 
     Version: v0.
     """
@@ -238,7 +243,7 @@ class JointTrackingEnv(SingleEnv):
 class JointTrackingVectorEnv(BatchEnv):
     """Many episodes of :class:`JointTrackingEnv` on the threads of the engine.
 
-    ``gymnasium.make_vec("swgjoint/JointTracking-v0", num_envs=256)`` makes it. The
+    ``gymnasium.make_vec("swgjoint/JointTracking-v0", num_envs=256)`` creates it. The
     argument ``threads`` is the number of engine threads; 0 uses one per core.
     """
 

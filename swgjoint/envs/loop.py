@@ -19,8 +19,8 @@ class MotorLoop:
         c = k_p\,i\,q_d + k_d\,i\,\dot q_d + u_\mathrm{ff}
 
     It represents the internal loop of a servo drive, which runs many times per control
-    period on the motor encoder, without the resolution, noise and delay of the sensors.
-    Arrays have shape (n_joints,).
+    period with the motor encoder. The resolution, noise and delay of the sensors do not
+    affect it. Arrays have shape (n_joints,).
     """
 
     stiffness: Array
@@ -32,14 +32,14 @@ class MotorLoop:
 
     @classmethod
     def none(cls, ratio: Array) -> Self:
-        """No control loop: the motors apply the commanded torques."""
+        """Zero gains: the motors apply the commanded torques."""
         return cls(stiffness=0.0 * ratio, damping=0.0 * ratio, ratio=ratio)
 
     @classmethod
     def from_frequency(
         cls, joints: KnownJoints, *, frequency: float, damping_ratio: float
     ) -> Self:
-        """Gains for the total inertia of motor and link on a rigid drive.
+        """Gains for the total inertia of motor and link with a rigid drive.
 
         Args:
             joints: Nominal data of the joints.

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 
 SIZE = (480, 640)
-"""Height and width [px], the default maximum of a model."""
+"""Height and width [px], which are MuJoCo's default for off-screen buffers."""
 
 
 class Picture:
     """Renderer of one model with MuJoCo's free camera.
 
-    ``MUJOCO_GL`` selects the OpenGL context as elsewhere in MuJoCo. If it is not set,
-    Linux uses EGL, which needs no display.
+    The environment variable ``MUJOCO_GL`` selects the OpenGL context, as elsewhere in
+    MuJoCo. If it is not set, EGL is used on Linux, which needs no display.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -42,7 +42,7 @@ class Plant:
 
         Args:
             model: Compiled model, where actuator j applies the motor torque of joint j.
-            drives: Drives of the joints at ``linear`` or ``full``.
+            drives: Drives of the joints, of level ``linear`` or ``full``.
             count: Number of simulations.
             sub_steps: Number of engine steps per control period.
             threads: Number of engine threads; 0: one per core.
@@ -99,9 +99,10 @@ class Plant:
     def output_torque(self) -> Array:
         """Torque of every drive on its link [N·m]. Shape (n, n_joints).
 
-        At ``full`` this is the mean over the engine's last step, computed from the link
-        acceleration minus that by all other forces, which the plugin stores. At
-        ``linear`` it is the torque of spring and damper at the current state.
+        At level ``full`` this is the mean over the engine's last step. It is computed
+        from the link acceleration minus the acceleration due to all other forces, which
+        the plugin stores. At level ``linear`` it is the torque of spring and damper at
+        the current state.
         """
         if self._others is not None:
             state, index = self._others
@@ -120,9 +121,11 @@ class Plant:
         """Advance by one control period.
 
         Args:
-            torque: Motor torques [N·m]. Shape (n, n_joints).
-            load: Load torques against the links [N·m]. Same shape.
-            active: Whether simulations advance; None: all. Shape (n,).
+            torque: Inputs of the motors: their torques or, with motor loops, the
+                commands of the loops [N·m]. Shape (n, n_joints).
+            load: Load torques that act against positive rotation of the links [N·m].
+                Same shape.
+            active: Whether each simulation advances; None: all do. Shape (n,).
         """
         self._ctrl[:, : torque.shape[1]] = torque
         self._load[:, self._link_v] = -load
@@ -135,13 +138,13 @@ class Plant:
         torque: Array,
         maps: Sequence[DriveMap],
     ) -> None:
-        """Set one simulation to rest with the drives under given torques.
+        """Set one simulation to a state of rest with given drive torques.
 
         Args:
             index: Index of the simulation.
             motor_angle: Motor angles [rad]. Shape (n_joints,).
             torque: Torques of the drives on the links [N·m]. Same shape.
-            maps: Maps of the joints.
+            maps: Drive maps of the joints, with the deviations of this simulation.
         """
         batch, links = self.batch, np.empty(len(maps))
         forces = np.zeros((len(maps), 2))
@@ -156,8 +159,8 @@ class Plant:
         self._qpos[index, self._rotor_q] = motor_angle
         if self._others is None:
             return
-        # initialise the plugin state as in equilibrium: accelerations by all other
-        # forces cancel those by the drive, and hysteresis is relaxed at this torsion
+        # initialise the plugin state as in equilibrium: the accelerations due to all
+        # other forces cancel those due to the drive, and hysteresis is relaxed
         batch.forward([index])
         state, others = self._others
         factor, inverse = (part[index] for part in self._factor)
@@ -180,15 +183,13 @@ class Plant:
             InputError: If the plant was made with ``variable=False``.
         """
         if self._user is None:
-            raise InputError(
-                "variations of a plant with variable=False; accepted: True"
-            )
+            raise InputError("variations of drives need a plant with variable=True")
         for tendon, variation in zip(self._tendons, variations, strict=True):
             self._user[index, tendon, :SIZE] = variation.numbers
 
 
 def specimen(attached: JointDrive, variation: Variation) -> JointDrive:
-    """Drive of a joint with the map of one specimen.
+    """Copy the drive of a joint with the map of one specimen.
 
     Args:
         attached: Nominal drive of the joint.
@@ -202,6 +203,7 @@ def specimen(attached: JointDrive, variation: Variation) -> JointDrive:
 
 
 def _addresses(joints: Sequence[object]) -> tuple[Index, Index]:
+    """Addresses of joints in qpos and qvel."""
     return (
         np.array([int(j.qposadr[0]) for j in joints]),  # type: ignore[attr-defined]
         np.array([int(j.dofadr[0]) for j in joints]),  # type: ignore[attr-defined]
@@ -211,7 +213,7 @@ def _addresses(joints: Sequence[object]) -> tuple[Index, Index]:
 def _balance(
     drive: DriveMap, theta: float, torque: float
 ) -> tuple[float, tuple[float, float]]:
-    """Link angle [rad] at which the potential gives a torque, and its forces [N·m]."""
+    """Link angle [rad] for an output torque, and torques on input and output [N·m]."""
     psi = theta / drive.ratio
     for _ in range(50):
         on_input, on_output = (float(f) for f in drive.forces(theta, psi))

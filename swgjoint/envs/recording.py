@@ -30,8 +30,8 @@ SHOWN = (
     "output_torque_Nm",
     "motor_torque_Nm",
 )
-"""Quantities that are plotted when a recording is opened; it contains all others as
-well."""
+"""Quantities that are plotted when a recording is opened. The recording contains all
+others as well."""
 POSE_RATE = 50.0
 """Rate of the recorded poses [Hz]."""
 
@@ -44,7 +44,7 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         env = EpisodeRecorder(gymnasium.make("swgjoint/JointTracking-v0"), "episodes")
 
     A file is written when the episode ends, or when the environment is reset or closed.
-    ``files`` lists the files that were written. The numbers continue those in the
+    ``files`` lists the written files. The numbers continue those of the files in the
     folder, so that existing files are kept.
     """
 
@@ -53,7 +53,7 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
 
         Args:
             env: Single environment of ``swgjoint.envs``.
-            folder: Folder of the recordings; it is created.
+            folder: Folder of the recordings; it is created if it does not exist.
 
         Raises:
             InputError: If the environment is not one of ``swgjoint.envs``.
@@ -79,7 +79,7 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Take a step and record the state that follows."""
+        """Take a step and record the resulting state."""
         result = super().step(action)
         self._take(float(result[1]), result[-1])
         if result[2] or result[3]:
@@ -129,11 +129,11 @@ def write_episode(
     """Write one recording; the file is either complete or absent.
 
     Args:
-        path: File.
+        path: File to write.
         model: Model of the simulation.
         time: Times of the steps [s]. Shape (n,).
-        positions: Positions qpos of the model. Shape (n, nq).
-        figures: Curves by entity path. Shapes (n,).
+        positions: Positions qpos of the model at these times. Shape (n, nq).
+        figures: Values at these times by entity path. Shapes (n,).
     """
     import rerun as rr
     import rerun.blueprint as rrb

@@ -6,6 +6,10 @@ flexible joint requires (Spong 1987). They are built from the smooth step
 .. math:: s(x) = x^5\,(126 - 420 x + 540 x^2 - 315 x^3 + 70 x^4), \quad 0 \le x \le 1,
 
 whose first four derivatives vanish at both ends.
+
+Source:
+    Spong (1987), "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
+    Control 109, 310-319.
 """
 
 from __future__ import annotations
@@ -33,7 +37,7 @@ _STEP_1, _STEP_2 = _STEP.deriv(), _STEP.deriv(2)
 
 
 def smooth_step(time: Array, duration: float) -> Motion:
-    """Smooth step from 0 to 1 that starts at time 0, with two derivatives.
+    """Smooth step from 0 to 1 that starts at time 0, and its first two derivatives.
 
     Args:
         time: Times [s]. Shape (n,).
@@ -51,7 +55,7 @@ def _oscillation(time: Array, frequency: Array, phase: Array, weight: Array) -> 
     omega = 2.0 * np.pi * frequency
     angle = omega * time[:, None] + phase
     sin, cos = weight * np.sin(angle), weight * np.cos(angle)
-    # the offset makes y start at 0, in addition to the zeros of the smooth step
+    # the offset makes y itself start at 0, in addition to the factor w
     y = sin.sum(axis=1) - sin[0].sum()
     y_1, y_2 = (omega * cos).sum(axis=1), (-(omega**2) * sin).sum(axis=1)
     w, w_1, w_2 = smooth_step(time, RAMP)
@@ -70,7 +74,7 @@ def sinusoid(time: Array, rng: np.random.Generator) -> Motion:
 
 
 def multisine(time: Array, rng: np.random.Generator) -> Motion:
-    """Draw a sum of oscillations with random frequencies and phases and equal speeds.
+    """Draw a sum of oscillations of equal speed with random frequencies and phases.
 
     Args:
         time: Times from 0 on [s]. Shape (n,).
@@ -83,7 +87,7 @@ def multisine(time: Array, rng: np.random.Generator) -> Motion:
 
 
 def point_to_point(time: Array, rng: np.random.Generator) -> Motion:
-    """Draw a move and a return by half its distance, with rests around both.
+    """Draw a move and a return over half its distance, with a rest around each.
 
     Args:
         time: Times from 0 on [s]. Shape (n,).
@@ -113,7 +117,7 @@ def draw_motion(
     max_angle: float,
     max_acceleration: float,
 ) -> Motion:
-    """Draw a motion whose amplitude is 40 to 100 % of the largest within the limits.
+    """Draw a motion with 40 to 100 % of the largest amplitude that the limits allow.
 
     Args:
         time: Times from 0 on [s]. Shape (n,).

@@ -1,4 +1,4 @@
-"""Constant speed under load: a torque added to the motor loop removes the ripple."""
+"""One joint turns at constant speed under load; the action removes the ripple."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ STEEPEST = 2.5
 """Ratio of the largest to the mean slope of
 :func:`~swgjoint.envs.references.smooth_step`, 2.46, rounded up [-]."""
 SETTLE = 1.0
-"""Settling time after the ramp, before the reward counts [s]."""
+"""Settling time between the ramp and the first step with a reward [s]."""
 MEMORY = 0.15
-"""Time constant of the running mean that is subtracted from errors [s]."""
+"""Time constant of the running means that are subtracted from the errors [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class RippleSettings(BenchSettings):
             self._check(key, unit, zero=False)
         self._check("effort_weight", "", zero=True)
         if self.slowest > 1.0:
-            raise InputError(f"slowest {self.slowest}; accepted: > 0 to 1")
+            raise InputError(f"slowest {self.slowest}; accepted: > 0 and <= 1")
         if self.episode_s <= RAMP + SETTLE:
             raise InputError(
                 f"episode_s {self.episode_s} s; accepted: > {RAMP + SETTLE:g} s, the"
@@ -111,16 +111,16 @@ class RippleCore(BenchCore):
             angle,
             speed,
             *self.error_entries(STEEPEST * s.max_speed_rad_s / RAMP),
-            known("sine of the wave generator's angle, read", "1", 1.0),
-            known("cosine of the wave generator's angle, read", "1", 1.0),
+            known("sine of the measured wave-generator angle", "1", 1.0),
+            known("cosine of the measured wave-generator angle", "1", 1.0),
             known("reference speed of the link", "rad/s", ceiling(s.max_speed_rad_s)),
             known("load torque against the link", "N·m", load),
             known("last action", "1", 1.0),
             *self.sensor_entries(),
-        ), (known("added motor torque, of its authority", "1", 1.0),)
+        ), (known("added motor torque relative to authority", "1", 1.0),)
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Draw speed and load of either sign that grow and then stay constant."""
+        """Draw speed and load, of random signs, that grow and then stay constant."""
         s = self.settings
         time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
         share = rng.uniform(s.slowest, 1.0) * rng.choice([-1.0, 1.0])
@@ -140,7 +140,7 @@ class RippleCore(BenchCore):
         return plan[:, :, None]
 
     def command(self, action: Array) -> Array:
-        """Input of the motor loop: reference, feed-forward and added torque [N·m]."""
+        """Input of the motor loop [N·m]: reference, feed-forward and added torque."""
         plan, ratio = self.next_plan(), self.joint.ratio
         rotor = self.settings.rotor_inertia_kgm2
         known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
@@ -148,7 +148,7 @@ class RippleCore(BenchCore):
         return np.asarray(loop + known + action * self._authority)
 
     def columns(self) -> list[Array]:
-        """See the table of :class:`RippleSuppressionEnv`."""
+        """Parts of the observation in the order of its table."""
         read, ratio, now = self._readout, self.joint.ratio, self.now
         angle, speed = read.value[:, :1].copy(), read.motor_speed
         by_theta, by_psi = self._alpha
@@ -167,7 +167,7 @@ class RippleCore(BenchCore):
         ]
 
     def judge(self) -> None:
-        """Set the torque ripple [N·m] and the errors before their mean is removed."""
+        """Set the torque ripple [N·m] and the errors [rad] including their means."""
         super().judge()
         now, inertia = self.now[:, :, 0], self.settings.link_inertia
         self.ripple = self.output_torque[:, 0] - now[:, 3] - inertia * now[:, 2]
@@ -188,7 +188,7 @@ class RippleCore(BenchCore):
         self.link_ripple, self.error_ripple = self._errors - self._mean
 
     def reward(self) -> Array:
-        """See :class:`RippleSuppressionEnv`."""
+        """Reward as :class:`RippleSuppressionEnv` defines it."""
         s = self.settings
         a = self.ripple / self._ripple_scale
         b = self.link_ripple / (s.error_scale_arcmin * arcmin)
@@ -210,45 +210,45 @@ class RippleSuppressionEnv(SingleEnv):
     """A joint turns at constant speed under load; the action adds a motor torque.
 
     The motor loop of the servo drive (:class:`swgjoint.envs.loop.MotorLoop`) is PD
-    control of the motor angle with feed-forward of load and acceleration. ``loop_Hz``
-    and ``loop_damping_ratio`` describe it for motor and link on a rigid drive.
-    Kinematic error and the torque ripple that it causes have even orders of the
-    wave-generator angle, whose sine and cosine are observed.
+    control of the motor angle with feed-forward of load and acceleration. Its natural
+    frequency ``loop_Hz`` and damping ratio ``loop_damping_ratio`` apply to a joint with
+    a rigid drive. The kinematic error and the torque ripple that it causes have even
+    orders of the wave-generator angle, whose sine and cosine are observed.
 
     The action is constant over one control period. The authority is
     ``authority_of_rated`` times rated torque over ratio:
 
-    =====  ====================================  ====  =======
-    index  meaning                               unit  range
-    =====  ====================================  ====  =======
-    0      added motor torque, of its authority  1     -1 to 1
-    =====  ====================================  ====  =======
+    =====  ========================================  ====  =======
+    index  meaning                                   unit  range
+    =====  ========================================  ====  =======
+    0      added motor torque relative to authority  1     -1 to 1
+    =====  ========================================  ====  =======
 
     Observation with the default arguments; the last two entries exist only with
     ``sensors={"link_encoder": True, "torque_sensor": True}``:
 
-    =====  ==========================================  =====  ===========
-    index  meaning                                     unit   range
-    =====  ==========================================  =====  ===========
-    0      motor angle, read                           rad    -710 to 710
-    1      motor speed, change of the reading          rad/s  -180 to 180
-    2      motor angle, ratio * reference - read       rad    -1.6 to 1.6
-    3      motor speed, ratio * reference - read       rad/s  -15 to 15
-    4      sine of the wave generator's angle, read    1      -1 to 1
-    5      cosine of the wave generator's angle, read  1      -1 to 1
-    6      reference speed of the link                 rad/s  -0.6 to 0.6
-    7      load torque against the link                N·m    -44 to 44
-    8      last action                                 1      -1 to 1
-    9      link angle, read                            rad    -7.1 to 7.1
-    10     output torque, read                         N·m    -410 to 410
-    =====  ==========================================  =====  ===========
+    =====  ===========================================  =====  ===========
+    index  meaning                                      unit   range
+    =====  ===========================================  =====  ===========
+    0      measured motor angle                         rad    -710 to 710
+    1      measured motor speed                         rad/s  -180 to 180
+    2      motor angle error                            rad    -1.6 to 1.6
+    3      motor speed error                            rad/s  -15 to 15
+    4      sine of the measured wave-generator angle    1      -1 to 1
+    5      cosine of the measured wave-generator angle  1      -1 to 1
+    6      reference speed of the link                  rad/s  -0.6 to 0.6
+    7      load torque against the link                 N·m    -44 to 44
+    8      last action                                  1      -1 to 1
+    9      measured link angle                          rad    -7.1 to 7.1
+    10     measured output torque                       N·m    -410 to 410
+    =====  ===========================================  =====  ===========
 
-    The ranges of the tracking errors are defined as in
+    Measured speeds, errors and their ranges are defined as in
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
-    Reward of a step from 1.5 s on; before that it is zero. r is the torque ripple, the
-    drive torque minus the load and inertia torques of the reference. e is the link
-    error minus its running mean (time constant 0.15 s), and a is the action:
+    The reward of a step is zero up to 1.5 s. After that it depends on the torque ripple
+    r (drive torque minus load and inertia torques of the reference), on the link error
+    e minus its running mean (time constant 0.15 s) and on the action a:
 
         1/(1 + (r/ripple_scale)^2 + (e/error_scale)^2) - effort_weight a^2
 
@@ -262,22 +262,23 @@ class RippleSuppressionEnv(SingleEnv):
     (whether the reward counts) in addition. The two error ripples are errors minus
     their running means. They are equal while the motor speed is constant. An added
     torque that makes the link speed constant removes the ripple of the link error but
-    not that of the transmission error, because the motor then moves against the
-    kinematic error.
+    not that of the transmission error, because the motor then moves so as to compensate
+    the kinematic error.
 
-    Args (all by keyword, with their defaults): those of ``JointTracking-v0`` for bench,
-    drive, sensors and ``randomise``, and
+    Args (all by keyword): those of ``JointTracking-v0`` for bench, drive, sensors and
+    ``randomise``, and
         max_angle_rad: Largest link angle of references [rad], at least
-            ``max_speed_rad_s`` times ``episode_s``; 3.
-        episode_s: Duration of an episode [s]; 4.
-        slowest: Smallest speed relative to ``max_speed_rad_s`` [-]; 0.3.
-        authority_of_rated: Largest added motor torque, see above [-]; 0.2.
-        loop_Hz: Natural frequency of the motor loop [Hz]; 8.
-        loop_damping_ratio: Damping ratio of the motor loop [-]; 1.
-        ripple_scale_of_rated: Ripple scale of the reward relative to rated torque [-];
-            0.01.
-        error_scale_arcmin: Error scale of the reward [arcmin]; 0.1.
-        effort_weight: Effort weight of the reward [-]; 0.1.
+            ``max_speed_rad_s`` times ``episode_s``. Default: 3.
+        episode_s: Duration of an episode [s]. Default: 4.
+        slowest: Smallest speed relative to ``max_speed_rad_s`` [-]. Default: 0.3.
+        authority_of_rated: Largest added motor torque relative to rated torque over
+            ratio [-]. Default: 0.2.
+        loop_Hz: Natural frequency of the motor loop [Hz]. Default: 8.
+        loop_damping_ratio: Damping ratio of the motor loop [-]. Default: 1.
+        ripple_scale_of_rated: Ripple scale of the reward relative to rated torque [-].
+            Default: 0.01.
+        error_scale_arcmin: Error scale of the reward [arcmin]. Default: 0.1.
+        effort_weight: Effort weight of the reward [-]. Default: 0.1.
 
     Version: v0.
     """

@@ -18,18 +18,18 @@ from swgjoint.units import arcsec
 class Sensors:
     """Sensors of every joint; the motor encoder is always present.
 
-    The defaults have the order of magnitude of servo drives in general, not of one
-    product.
+    The defaults have the order of magnitude that is typical of servo drives; they do
+    not describe one product.
     """
 
     motor_counts: int = 2**17
-    """Counts of the motor encoder per turn; 0 means an exact angle."""
+    """Counts of the motor encoder per turn; 0 means no rounding to counts."""
     motor_noise_rad: float = 2e-5
     """Standard deviation of the motor angle before it is rounded to counts [rad]."""
     link_encoder: bool = False
     """Whether there is a link encoder."""
     link_counts: int = 2**20
-    """Counts of the link encoder per turn; 0 means an exact angle."""
+    """Counts of the link encoder per turn; 0 means no rounding to counts."""
     link_noise_rad: float = arcsec
     """Standard deviation of the link angle before it is rounded to counts [rad]."""
     torque_sensor: bool = False
@@ -62,7 +62,8 @@ class Sensors:
         None means the defaults.
 
         Raises:
-            InputError: If the argument has another type or an unknown key.
+            InputError: If the argument has another type or an unknown key, or if a
+                value is not accepted.
         """
         if argument is None or isinstance(argument, Sensors):
             return argument or cls()
@@ -127,6 +128,7 @@ class Readout:
         (n, n_joints)."""
 
     def _sense(self, true: Array, normal: Array) -> Array:
+        """Readings with noise and resolution but without delay."""
         reading = true + self._noise * normal
         reading[:, self._coarse] = (
             np.floor(reading[:, self._coarse] / self._rounds) * self._rounds
@@ -134,12 +136,12 @@ class Readout:
         return reading
 
     def start(self, rows: NDArray[np.intp], true: Array, normal: Array) -> None:
-        """Restart some simulations, with rest during the delay before the start.
+        """Restart some simulations, whose joints were at rest before the start.
 
         Args:
             rows: Indices of the simulations. Shape (m,).
-            true: True values of the channels. Shape (m, channels).
-            normal: Standard normal numbers. Same shape.
+            true: True values of the channels at the start. Shape (m, channels).
+            normal: Standard normal random numbers for the noise. Same shape.
         """
         reading = self._sense(true, normal)
         self._ring[:, rows] = reading
@@ -148,11 +150,11 @@ class Readout:
         self.motor_speed[rows] = 0.0
 
     def read(self, true: Array, normal: Array) -> None:
-        """Take the readings of one instant of all simulations.
+        """Take the readings of all simulations at one instant.
 
         Args:
             true: True values of the channels. Shape (n, channels).
-            normal: Standard normal numbers. Same shape.
+            normal: Standard normal random numbers for the noise. Same shape.
         """
         self._ring[self._now] = self._sense(true, normal)
         self._now = (self._now + 1) % self._ages
@@ -163,5 +165,5 @@ class Readout:
 
 
 def _count(counts: int) -> float:
-    """Angle of one count [rad]; 0 for an exact reading."""
+    """Angle of one count [rad]; 0 if readings are not rounded."""
     return 2.0 * np.pi / counts if counts else 0.0

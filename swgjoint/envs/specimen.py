@@ -24,8 +24,8 @@ def load_drive_once(
 ) -> DriveMap:
     """Load a drive map once for many environments.
 
-    The map is kept in memory as long as the content of its file does not change, even
-    if the working folder of the process does.
+    The map is kept in memory and is loaded again only if the content of its file
+    changes.
 
     Args:
         reference: See :func:`swgjoint.drives.references.load_drive`.
@@ -58,8 +58,8 @@ def _load_once(
 class SpecimenTolerances:
     """Relative tolerances of a drive and its load: largest deviations of either sign.
 
-    At level ``linear`` a drive is one constant spring. All tolerances except
-    ``load_inertia`` must then be zero.
+    A drive of level ``linear`` is one constant spring; all its tolerances except
+    ``load_inertia`` must be zero.
     """
 
     stiffness: float = 0.15
@@ -71,7 +71,8 @@ class SpecimenTolerances:
     load_inertia: float = 0.2
     """Tolerance of the load inertia [-]."""
     phase: bool = True
-    """Whether the periodic functions of the angles have a random phase."""
+    """Whether the angles at which kinematic error and stiffness vary are shifted at
+    random."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -85,7 +86,7 @@ class SpecimenTolerances:
                 )
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:
-        """Draw a specimen of the drive and a relative load-inertia deviation [-]."""
+        """Draw a specimen of the drive and a relative deviation of load inertia [-]."""
         share, turn = rng.uniform(-1.0, 1.0, 4), rng.uniform(0.0, 2.0 * np.pi, 2)
         variation = Variation(
             stiffness=float(self.stiffness * share[0]),
@@ -146,8 +147,8 @@ def tolerances_of(
     for key in sorted(absent):
         if value := getattr(tolerances, key):
             raise InputError(
-                f"tolerance {key} {value} at level linear, where all drives are equal;"
-                " accepted: load_inertia only, or level full"
+                f"tolerance {key} {value} at level linear; accepted: load_inertia only,"
+                " or level full"
             )
     return tolerances
 
@@ -156,14 +157,14 @@ def drive_of_environment(drive: str | DriveMap, error: float | None) -> DriveMap
     """Drive map with the kinematic error that the arguments of an environment state.
 
     Args:
-        drive: Reference of a drive, or its map.
+        drive: Catalogue name or file of a drive, or its map.
         error: Peak-to-peak value of an assumed kinematic error [arcmin], for a drive
             without one. None uses the transmission accuracy of the catalogue for a
             catalogue name and leaves other drives unchanged.
 
     Raises:
-        InputError: If the drive does not exist, or if it has a kinematic error and
-            ``error`` states another one.
+        InputError: If the drive does not exist, or if it already has a kinematic error
+            and ``error`` is greater than zero.
     """
     if isinstance(drive, str):
         return load_drive_once(drive, kinematic_error_arcmin=error)
