@@ -39,14 +39,13 @@ LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One quantity of an observation or an action, with its unit and bounds."""
+    """One quantity of an observation or an action, with its unit and its bounds."""
 
     meaning: str
     """Name of the quantity for tables."""
     unit: str
     low: float
     high: float
-    """Upper bound in this unit; ``low`` is the lower bound."""
     count: int = 1
     """Number of values of this quantity, e.g. one per joint."""
 
