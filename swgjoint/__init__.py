@@ -65,7 +65,7 @@ def __dir__() -> list[str]:
 
 
 if _sys.modules.get("mujoco") is not None:
-    # if MuJoCo was imported first, register now, so that saved models with drives load
+    # MuJoCo was imported before: register now, so that saved models with drives load
     from swgjoint.engine import register as _register
 
     _register()

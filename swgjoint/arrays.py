@@ -13,13 +13,14 @@ def frozen_array(
     ndim: int | None = None,
     shape: tuple[int | None, ...] | None = None,
 ) -> NDArray[np.float64]:
-    """Copy ``values`` to a finite read-only float64 array of the given shape.
+    """Copy ``values`` to a read-only float64 array and check shape and finiteness.
 
     Args:
         values: Anything that numpy converts to float64.
         what: Name and unit of the quantity, for the error message.
-        ndim: Required number of axes; None accepts any.
-        shape: Required shape; None for an axis accepts any length.
+        ndim: Required number of axes; None accepts any number.
+        shape: Required shape, where None for an axis accepts any length; None accepts
+            any shape.
 
     Raises:
         ValueError: If the shape is wrong or a value is not finite.

@@ -1,4 +1,4 @@
-"""Hash of the source code for cache keys; docstrings do not change it."""
+"""Hash of the source code for cache keys."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ _CODE = (".py", ".cc", ".h")
 
 @lru_cache
 def code_hash(*parts: str) -> str:
-    """Hash the code of some parts of the package, ignoring comments and docstrings.
+    """Hash the code of some parts of the package.
 
-    Python files enter as their syntax tree without docstrings, other sources byte by
+    Of Python files, the syntax tree without docstrings is hashed, so that comments,
+    docstrings and formatting do not affect the result. C++ files are hashed byte by
     byte. The hash of unchanged files is kept in the cache folder, because parsing them
     takes most of a second.
 
     Args:
-        parts: Files and folders relative to the package: ``"gear"``, ``"units.py"``.
+        parts: Files and folders relative to the package, e.g. ``"gear"`` or
+            ``"units.py"``.
 
     Returns:
         64 hexadecimal digits.
@@ -52,7 +54,7 @@ def code_hash(*parts: str) -> str:
 
 
 def code_files(*parts: str) -> list[Path]:
-    """Sorted source files of the given parts; a missing file fails when it is read."""
+    """Sorted source files of the given parts, including files that do not exist."""
     found: set[Path] = set()
     for part in parts:
         path = PACKAGE / part

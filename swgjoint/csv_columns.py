@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 
 MAX_BYTES = 200_000_000
-"""Largest accepted file [B]: several million samples, far more than a record of one
-turn or one loop needs."""
+"""Largest accepted file size [B], sufficient for several million samples, far more than
+a record of one turn or one hysteresis loop has."""
 
 
 LARGEST = 1e12
 """Largest accepted magnitude in SI units. No quantity measured on a test bench is
-larger, not even a time stamp, and powers of this value do not overflow."""
+larger, not even a time stamp, and low powers of this value do not overflow."""
 HEAD_LINES = 10_000
-"""Number of leading lines, comments included, that are searched for the header."""
+"""Number of leading lines, including comments, that are searched for the header."""
 SEPARATORS = {",": "','", ";": "';'", "\t": "a tab"}
-"""Accepted cell separators, with their names in messages. The header line decides
+"""Accepted cell separators, with their names in messages. The header line determines
 which one a file uses."""
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
@@ -49,21 +49,21 @@ def read_columns(
     """Read columns of numbers and convert them to SI units.
 
     Commas, semicolons or tabs separate the cells. Lines that begin with ``#`` are
-    comments; the last one before the numbers may be the header, as written by
+    comments; the last comment before the numbers may be the header, as written by
     ``numpy.savetxt``.
 
     Args:
         path: File with one header line.
-        quantities: Accepted column names of each quantity, with the factor that
-            converts the column to SI.
+        quantities: For each quantity its accepted column names, with the factors that
+            convert these columns to SI units.
 
     Returns:
-        One array per quantity, all of the same length.
+        One array per quantity, all of the same length, in SI units.
 
     Raises:
         InputError: If the file cannot be read, if a column is missing or occurs twice,
-            or if a cell is not a finite number of at most :data:`LARGEST`. The message
-            names the file and the line.
+            or if a cell is not a finite number of magnitude up to :data:`LARGEST`. The
+            message names the file and, for a cell, the line.
     """
     path = Path(path)
     sheet = _sheet(path, _wanted(quantities))
@@ -182,6 +182,7 @@ def _column(
     name: str,
     quantities: Mapping[str, Mapping[str, float]],
 ) -> tuple[int, float]:
+    """Index of the column of a quantity, and its factor to SI units."""
     units, header = quantities[name], sheet.header
     indices = [k for k, cell in enumerate(header) if cell in units]
     if len(indices) == 1:
@@ -191,11 +192,11 @@ def _column(
             f"{path}: {name} occurs in {len(indices)} columns; accepted: one"
         )
     near = [m for key in units for m in get_close_matches(key, header, n=1)]
-    hint = f" (has {near[0][:40]!r})" if near else ""
+    hint = f" (did you mean {near[0][:40]!r}?)" if near else ""
     read = ", ".join(repr(cell[:24]) for cell in header[:6])
     more = f" and {len(header) - 6} more" if len(header) > 6 else ""
     raise InputError(
-        f"{path}: no column {' or '.join(units)}{hint}; read as header, separated by"
+        f"{path}: no column {' or '.join(units)}{hint}; columns found, separated by"
         f" {SEPARATORS[sheet.separator]}: {read}{more}"
     )
 

@@ -9,7 +9,7 @@ from typing import Any
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    r"""Format rows as CSV with a header line and the columns of all rows.
+    r"""Format rows as CSV with a header line that names the columns of all rows.
 
     A cell without a value is empty. A mapping of counts by name fills one cell.
 

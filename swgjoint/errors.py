@@ -9,15 +9,15 @@ from enum import Enum
 
 
 class SwgError(Exception):
-    """Root of all errors raised by swgjoint on purpose."""
+    """Base class of all exceptions that swgjoint raises deliberately."""
 
 
 class InputError(SwgError, ValueError):
-    """A file, key, name or value that cannot be used (exit status 2)."""
+    """A file, key, name or value that cannot be used; the exit status is 2."""
 
 
 class DesignError(InputError):
-    """A design that is inconsistent or cannot be built; one line per fault."""
+    """A design that is inconsistent or cannot be built, with one line per fault."""
 
 
 class MapFileError(InputError):
@@ -29,7 +29,7 @@ class MissingExtraError(SwgError, ImportError):
 
 
 class ComputationError(SwgError, RuntimeError):
-    """A failed computation; the message includes advice (exit status 1)."""
+    """A failed computation, with advice in the message; the exit status is 1."""
 
 
 class OutputWarning(UserWarning):
@@ -37,12 +37,12 @@ class OutputWarning(UserWarning):
 
 
 def out_of_memory(error: Exception) -> bool:
-    """Whether an error means that memory ran out, including errors of MuJoCo."""
+    """Whether an error of Python or MuJoCo means that memory ran out."""
     return isinstance(error, MemoryError) or "could not allocate" in str(error).lower()
 
 
 class Outcome(Enum):
-    """Outcome of a solve; the value is the advice that a user sees."""
+    """Outcome of a solve; the value of a failure is the text that a user sees."""
 
     CONVERGED = "converged"
     MAX_ITERATIONS = (

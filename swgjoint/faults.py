@@ -1,6 +1,6 @@
 """Validation of input files: all faults at once, one line each with path and value.
 
-All TOML files of the package use it: designs, scenes, sweeps.
+It applies to all TOML files of the package, such as designs, scenes and sweeps.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from swgjoint.errors import InputError
 
 CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-"""Control characters that can disturb a terminal; tab and newline are not included."""
+"""Control characters that can disturb a terminal, which tab and newline do not."""
 
 # units by the last part of a key, as written in messages
 _UNITS = {
@@ -88,7 +88,11 @@ class Section(BaseModel):
 
 
 class Fault(ValueError):
-    """Faults that concern several keys, as pairs (path below the table, message)."""
+    """Faults that concern several keys of a table.
+
+    Args:
+        lines: Pairs of key path below the table and message.
+    """
 
     def __init__(self, *lines: tuple[str, str]) -> None:
         super().__init__("; ".join(f"{path}: {text}" for path, text in lines))
@@ -96,7 +100,7 @@ class Fault(ValueError):
 
 
 def split_unit(key: str) -> tuple[str, str]:
-    """Split a key into its name and the unit in its last part.
+    """Split a key into its name and the unit that its last part states.
 
     >>> split_unit("face_width_mm")
     ('face_width', 'mm')
@@ -108,7 +112,7 @@ def split_unit(key: str) -> tuple[str, str]:
 
 
 def unit_of(key: str) -> str:
-    """Unit in the last part of a key, or the empty string.
+    """Unit that the last part of a key states, or the empty string.
 
     >>> unit_of("flexspline.rim_mm"), unit_of("torque_Nm")
     ('mm', 'N·m')
@@ -137,17 +141,17 @@ def validate(
     where: str,
     error: type[InputError] = InputError,
 ) -> Model:
-    """Build a model from plain data.
+    """Build a model from plain data and report all faults at once.
 
     Args:
-        model: The class of the table.
+        model: Class of the model, which describes one table.
         data: Keys and values as read from the file.
         where: Name of the file, for messages.
         error: Exception class to raise.
 
     Raises:
-        InputError: With one line per fault: file, key path, value with unit, and what
-            is accepted.
+        InputError: If the data are invalid. The message has one line per fault, with
+            file, key path, value with unit, and what is accepted.
     """
     try:
         return model.model_validate(dict(data))
@@ -170,7 +174,7 @@ def _follows(detail: ErrorDetails, others: list[ErrorDetails]) -> bool:
 
 
 def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
-    """Message of one pydantic error, without the file name."""
+    """Message lines for one pydantic error, without the file name."""
     path, owner, info = _walk(model, detail["loc"])
     key = path.rpartition(".")[2].partition("[")[0]
     kind, ctx = detail["type"], detail.get("ctx", {})
@@ -224,7 +228,7 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
 def _walk(
     model: type[BaseModel], loc: tuple[int | str, ...]
 ) -> tuple[str, type[BaseModel] | None, Any]:
-    """Dotted path, owning model and field of a location.
+    """Dotted key path, owning model and field of a location in the input.
 
     pydantic includes the tag of a discriminated union in the location. The tag is not
     part of the path in the file and is omitted.
@@ -258,6 +262,7 @@ def _walk(
 
 
 def _tag(model: type[BaseModel]) -> str:
+    """Value of the key ``kind`` that selects a model."""
     return str(model.model_fields["kind"].default)
 
 

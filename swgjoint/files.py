@@ -18,18 +18,19 @@ from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
 from swgjoint.json_text import json_text
 
 DEEPEST = 100
-"""Largest depth of the path of an output, because folders are created recursively."""
+"""Largest number of parts in the path of an output; folders are created recursively."""
 LONGEST_NAME = 60
 """Largest number of characters that a name from an input file contributes to a file
-name; at most 240 bytes in UTF-8."""
+name. They are at most 240 bytes in UTF-8."""
 
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Write a temporary file that replaces the target if nothing fails.
+    """Provide a temporary file that replaces the target if the block does not fail.
 
-    The temporary file is in the folder of the target; its name contains the host and
-    the process. Temporary files left by killed processes of this host are removed.
+    The temporary file is in the folder of the target, and its name identifies host and
+    process. Temporary files left by processes of this host that were killed are
+    removed.
     """
     host = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
     start = f".{path.name[:40]}.{host}-"
@@ -72,8 +73,12 @@ def write_whole(path: str | Path, data: bytes | str) -> Path:
         path: The target.
         data: Content; text is encoded as UTF-8.
 
+    Returns:
+        The target as a path.
+
     Raises:
-        InputError: If the folder does not exist or cannot be written.
+        InputError: If the file cannot be written, e.g. because its folder does not
+            exist.
     """
     path = Path(path)
     try:
@@ -94,8 +99,8 @@ def attempt_output(
 
     Args:
         path: The file.
-        unless: Called after a failure; returns True if the content rather than the
-            file is at fault, in which case the exception is raised.
+        unless: Function that is called after a failure. It returns True if the content
+            rather than the file is at fault; the exception is then raised.
     """
     try:
         yield
@@ -111,7 +116,7 @@ def attempt_output(
 
 
 class Outputs:
-    """The output files of one result; a file that fails only causes a warning.
+    """The output files of one result; a failure to write one only causes a warning.
 
     Args:
         folder: Output folder, created when the first file is written.
@@ -127,7 +132,7 @@ class Outputs:
 
         Args:
             name: File name in the folder.
-            make: Returns the content, or None to write nothing.
+            make: Function that returns the content, or None to write nothing.
         """
         path = self._folder / name
         with attempt_output(path):
@@ -144,7 +149,7 @@ class Outputs:
 
         Args:
             name: File name in the folder.
-            result: The result; its key ``files`` is set.
+            result: The result, whose key ``files`` is set.
         """
         path = str(self._folder / name)
         content = result | {"files": [path, *self.files]}
@@ -159,7 +164,7 @@ class Outputs:
 
         Args:
             name: File name in the folder.
-            write: Called with the path of the file.
+            write: Function that writes the file at the path it receives.
         """
         path = self._folder / name
         with attempt_output(path):
@@ -186,6 +191,9 @@ def check_output_file(path: str | Path, suffix: str) -> Path:
         path: The file.
         suffix: Required suffix, including the dot.
 
+    Returns:
+        The file as a path.
+
     Raises:
         InputError: If the suffix is wrong, if the folder is missing or read-only, or if
             the path is a folder.
@@ -206,12 +214,16 @@ def check_output_file(path: str | Path, suffix: str) -> Path:
 
 
 def output_folder(path: str | Path) -> Path:
-    """Reject a folder that cannot be written, before a long computation starts.
+    """Reject an output folder that cannot be written, before a long computation starts.
 
     The folder is not created.
 
+    Returns:
+        The folder as a path.
+
     Raises:
-        InputError: If the path or one of its parents is a file or is not writable.
+        InputError: If the path or one of its parents is a file, or if the folder cannot
+            be created or written.
     """
     path = Path(path)
     _check_length(path)
@@ -242,8 +254,9 @@ def file_name(text: str) -> str:
     """Make a safe file name from a name in an input file.
 
     Letters, digits, ``.``, ``_`` and ``-`` are kept, so that the names of drives do not
-    change; other characters, slashes included, become ``-``. The result is not unique:
-    names that differ only in replaced characters or beyond the 60th become equal.
+    change; other characters, including slashes, become ``-``. The result is not unique:
+    names that differ only in replaced characters or after the 60th character become
+    equal.
 
     >>> file_name("../CSG 25/100")
     '-CSG-25-100'

@@ -1,4 +1,4 @@
-"""Results as JSON: numpy types are converted, non-finite numbers become null."""
+"""Results as JSON; numpy types are converted and non-finite numbers become null."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ from typing import Any
 
 def plain(value: Any) -> Any:
     """Convert a value to dicts, lists, strings, finite numbers, booleans and None.
+
+    Members of an enumeration become their names in lower case, dataclasses become dicts
+    of their fields, and numbers that are not finite become None.
+
+    Raises:
+        TypeError: If a value has another type.
 
     >>> plain({"torque_Nm": (1.5, float("nan"))})
     {'torque_Nm': [1.5, None]}
@@ -44,7 +50,7 @@ def json_text(value: Any, *, indent: int | None = 2, ascii_only: bool = False) -
 
     Args:
         value: Anything that :func:`plain` converts.
-        indent: Indentation [spaces]; None writes one line.
+        indent: Indentation [spaces]; None writes everything on one line.
         ascii_only: Whether characters outside ASCII are escaped.
     """
     return json.dumps(

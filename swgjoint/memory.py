@@ -35,7 +35,7 @@ def require_memory(what: str, required: float, *, less: str) -> None:
     Args:
         what: Name of the computation, for the message.
         required: Estimated peak memory [B].
-        less: Suggestion that reduces the memory, for the message.
+        less: Suggestion that reduces the required memory, for the message.
 
     Raises:
         ComputationError: If less than ``required`` is free.

@@ -16,26 +16,27 @@ KINDS = {
     "sweeps": (".toml", "a sweep"),
     "optimisations": (".toml", "an optimisation"),
 }
-"""Folders below ``models/`` whose files a command accepts by name, with their suffix
-and the noun for one such file in messages."""
+"""Folders in ``models/`` whose files commands accept by name, with the suffix of the
+files and the noun for one such file in messages."""
 MAX_NAME, MAX_PATH = 255, 4096
 """Largest length of a file name and of a path on Linux [B]; the limits of other systems
 are not larger."""
 ECHOED = 120
-"""Longest reference that a message quotes in full [characters]."""
+"""Largest length of a reference that a message quotes in full [characters]."""
 SHOWN = 12
 """Largest number of bundled names in a message."""
 _SHOWN_AS = {"drives": "designs"}
 """Names of kinds in messages and commands, where they differ from the folder."""
 TOGETHER = {"scenes": ("arms",)}
-"""Other kinds whose names are accepted instead of a kind."""
+"""Other kinds whose names are accepted where a kind is expected: an arm where a scene
+is."""
 
 
 def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
-    """Names that an unknown name may have meant, the most likely first.
+    """Known names that an unknown name may stand for, the most likely first.
 
     Names that begin with the text come first, then names that contain all its parts,
-    then similar spellings: ``size-25`` suggests ``size-25-100`` rather than
+    then names with similar spelling: ``size-25`` suggests ``size-25-100`` rather than
     ``size-32-50``, and ``tool_rms`` suggests ``tool_path_rms`` rather than ``tool_rp``.
 
     Args:
@@ -56,7 +57,7 @@ def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
 
 
 def is_file(reference: str | Path) -> bool:
-    """Whether the file exists; False for a name that is not a valid path."""
+    """Whether the file exists; False if the name is not a valid path."""
     try:
         return Path(reference).is_file()
     except (OSError, ValueError):  # too long, or with a null character
@@ -64,6 +65,7 @@ def is_file(reference: str | Path) -> bool:
 
 
 def _parts(name: str) -> set[str]:
+    """Words and numbers in a name."""
     return set(re.findall(r"[^\W_]+", name))
 
 
@@ -84,7 +86,7 @@ def bundled_names(kind: str, suffix: str) -> list[str]:
     """Names of the bundled files of one kind.
 
     Args:
-        kind: Folder below ``models/``: ``drives``, ``scenes``, ...
+        kind: Folder in ``models/``, e.g. ``drives`` or ``scenes``.
         suffix: Suffix of the files, including the dot.
 
     >>> bundled_names("scenes", ".toml")[:2]
@@ -101,12 +103,13 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
 
     Args:
         reference: Path or bundled name.
-        kind: Folder below ``models/``.
-        suffix: Suffix of the bundled files, with its dot.
+        kind: Folder in ``models/``.
+        suffix: Suffix of the bundled files, including the dot.
         what: Name of the kind in messages, e.g. ``design``.
 
     Raises:
-        InputError: If neither exists; the message lists bundled names.
+        InputError: If the reference is neither a file nor a bundled name; the message
+            lists bundled names.
     """
     path = Path(reference)
     text = str(reference)
@@ -150,9 +153,10 @@ def _listed(kind: str, suffix: str) -> str:
 
 
 def named_kind(name: str) -> str | None:
-    """Folder below ``models/`` with a file of this name; None if there is none."""
+    """Folder in ``models/`` with a file of this name; None if there is none."""
     return next((k for k in KINDS if name in bundled_names(k, KINDS[k][0])), None)
 
 
 def _names(kind: str, suffix: str) -> list[str]:
+    """Names of one kind; ``suffix`` is for kinds that are not in :data:`KINDS`."""
     return bundled_names(kind, KINDS.get(kind, (suffix,))[0])

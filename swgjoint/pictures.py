@@ -8,7 +8,7 @@ import unicodedata
 from typing import IO, Any
 
 LONGEST_WORD = 80
-"""Longest word in a picture [characters]; longer words are shortened."""
+"""Largest length of a word in a picture [characters]; longer words are shortened."""
 _UNSEEN = {"Cc", "Cs", "Cf", "Co", "Cn"}
 """Categories of invisible characters (Unicode Standard, table 4-4)."""
 
@@ -18,7 +18,7 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
 
     Args:
         figure: The figure; ``$`` in its text is drawn literally, not as mathematics.
-        out: Stream that receives the bytes.
+        out: Binary stream that receives the file.
         dpi: Resolution [pixels per inch].
     """
     from matplotlib.text import Text
@@ -26,8 +26,8 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
 
     for text in figure.findobj(Text):
         text.set_text(plain_text(text.get_text()))
-    # matplotlib sets tick labels when it draws them; on a logarithmic axis they are
-    # mathematical text that must be parsed
+    # matplotlib sets tick labels when it draws them; those of a logarithmic axis are
+    # mathematical text and must still be parsed
     literal = (FixedFormatter, FuncFormatter)
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):

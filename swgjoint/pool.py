@@ -26,14 +26,14 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Lost:
-    """Result of a task whose process died at every attempt."""
+    """Placeholder for the result of a task whose process died at both attempts."""
 
     reason: str
     """Explanation for messages."""
 
 
 class Executor(Protocol):
-    """Computes tasks in parallel."""
+    """Object that runs tasks in parallel."""
 
     @property
     def workers(self) -> int:
@@ -54,9 +54,9 @@ class Executor(Protocol):
 class LocalPool:
     """Processes of this machine (joblib, loky); a single worker is this process itself.
 
-    A process may be killed by the kernel when memory runs out, or by a user. The tasks
-    that were running then are repeated one at a time, which identifies the task that
-    caused it.
+    The kernel may kill a process when memory runs out, and so may a user. The tasks
+    that were running at that time are repeated one at a time, which identifies the task
+    that caused the failure.
     """
 
     workers: int
@@ -73,7 +73,7 @@ class LocalPool:
         """
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        waiting: dict[int, Task] = {}  # drawn tasks without result, in drawing order
+        waiting: dict[int, Task] = {}  # tasks without a result, in the order drawn
         left: Iterator[tuple[int, Task]] = enumerate(tasks)
 
         def drawn() -> Iterator[tuple[int, Task]]:
@@ -94,7 +94,8 @@ class LocalPool:
                     warnings.simplefilter("ignore")
                     results.close()
                 raise
-            # tasks start in drawing order, so the first waiting ones were running
+            # tasks start in the order in which they were drawn, so that the first ones
+            # without a result were running
             suspects = list(waiting.items())[: self.workers]
             left = chain(list(waiting.items())[self.workers :], left)
             waiting.clear()
@@ -120,7 +121,7 @@ def _parallel(
 ) -> Generator[tuple[int, Found], None, None]:
     from joblib import Parallel, delayed, parallel_config
 
-    # small dense products do not gain from several threads that compete for CPUs
+    # several threads that compete for CPUs do not speed up small dense products
     with parallel_config(
         backend="loky",
         n_jobs=jobs,
@@ -143,7 +144,7 @@ def _parallel(
 def _numbered(
     function: Callable[[Task], Found], number: int, task: Task, cache: str | None
 ) -> tuple[int, Found]:
-    # a process kept from an earlier run may still have an old cache folder
+    # a process that is reused from an earlier run may still have its cache folder
     if cache is None:
         os.environ.pop(CACHE, None)
     else:
@@ -154,7 +155,7 @@ def _numbered(
 def _end_with(parent: int) -> None:
     """End this process soon after its parent has ended.
 
-    No process is left to receive the result; intermediate results are already stored.
+    No process would receive the result, and intermediate results are already stored.
     """
 
     def watch() -> None:
@@ -176,8 +177,8 @@ def run_all(
     """Run all tasks and return their results in the order of the tasks.
 
     Args:
-        function: Picklable function of one task; called in a worker process unless
-            ``jobs`` is 1.
+        function: Picklable function of one task, called in a worker process unless
+            there is only one job or one task.
         tasks: Tasks, started in this order; put long ones first.
         jobs: Number of processes.
         stage: Name of the stage for the progress.

@@ -21,20 +21,20 @@ def silent(stage: str, done: int, total: int) -> None:
 
 
 LONGEST = 100
-"""Longest stage that is shown in full [characters]; it may contain a name from a
-file."""
+"""Largest length of the name of a stage [characters], which may contain text from a
+file; longer names are cut off."""
 
 
 class StderrProgress:
-    """Print one line per stage on stderr.
+    """Print the progress of every stage on stderr.
 
-    In a terminal the line is rewritten at most every 0.1 s; in a log a line is added at
-    most every 5 s. The remaining time is estimated only from items completed since the
-    first call of the stage, because items of an interrupted earlier run do not indicate
-    the speed of this one.
+    In a terminal, one line per stage is rewritten at most every 0.1 s; in a log, a line
+    is added at most every 5 s. The remaining time is estimated only from items that
+    were completed since the first call of the stage, because items of an interrupted
+    earlier run do not indicate the speed of this one.
 
     Args:
-        verbose: Whether to print a line for every step, with the time since the stage
+        verbose: Whether to print a line at every call, with the time since the stage
             began.
     """
 

@@ -23,8 +23,8 @@ def provenance(*, seed: int | None = None) -> dict[str, Any]:
         seed: Seed of the random numbers; None if there are no random numbers.
 
     Returns:
-        A table for JSON. Its ``commit`` is None outside a checkout and ends with ``+``
-        if files of the package have been changed since that commit.
+        A mapping for JSON. Its ``commit`` is None outside a checkout and ends with
+        ``+`` if files of the package have changed since that commit.
     """
     versions: dict[str, str | None] = {
         "swgjoint": __version__,

@@ -1,8 +1,8 @@
 """Cache files: results that one run writes and a later run reads.
 
-Each file contains the SHA-256 of its content, which is checked before the content is
-parsed. The parsed content must have the type that the caller names. Any other file
-counts as damaged, and its content is computed again.
+Each file contains the SHA-256 hash of its content, which is checked before the content
+is parsed. The parsed content must have the type that the caller states. A file that
+fails a check is treated as damaged, and its content is computed again.
 """
 
 from __future__ import annotations
@@ -38,14 +38,15 @@ _TAIL = len(_COMMENT) + 64
 
 
 class DamagedError(InputError):
-    """A cache file whose content differs from what was written."""
+    """A cache file whose checksum or types are wrong."""
 
 
 def cache_folder() -> Path | None:
     """Folder of the cache; None if the cache is off.
 
     The environment variable ``SWGJOINT_CACHE`` names the folder; if it is empty, the
-    cache is off. Without the variable the cache folder of the platform is used.
+    cache is off. Without the variable, the folder is in the user's cache folder of the
+    platform, and the cache is off if there is no home folder.
     """
     named = os.environ.get("SWGJOINT_CACHE")
     if named is not None:
@@ -84,7 +85,7 @@ def json_content(data: bytes, kind: type[T]) -> T:
         kind: A dataclass or a type such as ``dict[str, Any]``.
 
     Raises:
-        DamagedError: If the checksum or a type is wrong.
+        DamagedError: If the checksum is missing or wrong, or if a type is wrong.
     """
     head = _HEAD_READ.match(data)
     body = b"{" + data[head.end() :] if head else data
@@ -112,10 +113,13 @@ def arrays_file(arrays: Mapping[str, Any]) -> bytes:
 
 
 def arrays_content(data: bytes) -> dict[str, Any]:
-    """Decode the arrays of :func:`arrays_file`, by name.
+    """Decode the arrays of :func:`arrays_file`.
+
+    Returns:
+        The arrays by name.
 
     Raises:
-        DamagedError: If the checksum is wrong.
+        DamagedError: If the checksum is missing or wrong.
     """
     tail = _TAIL_READ.search(data, max(0, len(data) - _TAIL))
     _check(data[:-_TAIL] + _NO_COMMENT if tail else data, tail)
@@ -139,7 +143,8 @@ def read_kept(path: Path, take: Callable[[bytes], T]) -> T | None:
 
     Args:
         path: The file.
-        take: Converts the bytes to the result; any exception means a damaged file.
+        take: Function that converts the bytes to the result; any exception means that
+            the file is damaged.
     """
     try:
         return take(read_regular(path))
@@ -161,17 +166,17 @@ def warn_ignored(where: Path | str, why: Exception) -> None:
 
 
 def one_line(error: Exception) -> str:
-    """First line of the message of an error, or the name of its class."""
+    """First line of an error message, or the class name if there is no message."""
     lines = str(error).splitlines() or [type(error).__name__]
     return lines[0]
 
 
 def keep(path: Path, data: bytes) -> None:
-    """Write a cache file; a failure such as a full disk is only logged.
+    """Write a cache file; a failure, for instance a full disk, is only logged.
 
     Args:
-        path: The file; its folder is created.
-        data: Its content.
+        path: The file; its folder is created if necessary.
+        data: Content of the file.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

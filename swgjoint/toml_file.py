@@ -12,7 +12,7 @@ from swgjoint.errors import InputError
 from swgjoint.faults import CONTROL_CHARACTERS, shorten
 
 MAX_BYTES = 2_000_000
-"""Largest accepted file [B]."""
+"""Largest accepted file size [B]."""
 
 
 MAX_DEPTH = 16
@@ -20,14 +20,14 @@ MAX_DEPTH = 16
 
 
 MAX_KEY = 200
-"""Longest accepted key [characters]."""
+"""Largest accepted length of a key [characters]."""
 
 
 _INTEGERS = range(-(2**63), 2**63)
 """Range of integers in TOML 1.0.0, section "Integer"."""
 
 
-# a dotted key of more than MAX_DEPTH parts; parsing it takes quadratic time
+# a dotted key of more than MAX_DEPTH parts; the time for parsing it is quadratic
 _LONG_KEY = re.compile(
     r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++)"
     rf"{{{MAX_DEPTH}}}"
@@ -69,8 +69,8 @@ def read_toml(
         error: Exception class to raise.
 
     Raises:
-        InputError: If the file is missing, too long, not UTF-8, not TOML, or of another
-            kind than ``what``.
+        InputError: If the file is missing, too large, not UTF-8, not valid TOML or not
+            of the kind ``what``.
     """
     try:
         size = path.stat().st_size
@@ -94,7 +94,7 @@ def read_toml(
 
 
 def kind_of_file(data: Mapping[str, Any]) -> str | None:
-    """Kind of file that the tables belong to; None if it is ambiguous."""
+    """Kind of file that its tables and keys identify; None if they do not."""
     if set(data) == {"spec"}:
         return "spec"
     for kind in ("optimisation", "sweep"):
@@ -105,6 +105,7 @@ def kind_of_file(data: Mapping[str, Any]) -> str | None:
 
 
 def _a(noun: str) -> str:
+    """Noun with its indefinite article."""
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
@@ -113,7 +114,7 @@ def parse_toml(
 ) -> dict[str, Any]:
     """Parse untrusted TOML text.
 
-    All TOML input passes through this function. It guarantees a depth of at most
+    All TOML files are parsed by this function. It guarantees a depth of at most
     :data:`MAX_DEPTH`, 64-bit integers, short keys and strings without control
     characters, so that later code can rely on these properties.
 
@@ -123,7 +124,8 @@ def parse_toml(
         error: Exception class to raise.
 
     Raises:
-        InputError: With one line about the first fault.
+        InputError: If the text is not valid; the message has one line about the first
+            fault.
     """
     if _LONG_KEY.search(text):
         raise error(f"{where}: {_LONG}")
@@ -140,7 +142,7 @@ def parse_toml(
 
 
 def parse_value(text: str, *, where: str) -> Any:
-    """Parse one untrusted TOML value; a bare word becomes a string.
+    """Parse one untrusted TOML value; text that is not TOML becomes a string.
 
     Args:
         text: The value, as written in a TOML file.
@@ -173,7 +175,7 @@ def _too_deep() -> str:
 
 
 def _first_fault(data: dict[str, Any]) -> str | None:
-    """First fault of the parsed data, found without recursion; None if valid."""
+    """First fault of the parsed data; None if they are valid. No recursion is used."""
     todo: list[tuple[str, Any, int]] = [("", data, 0)]
     while todo:
         path, value, depth = todo.pop()

@@ -45,7 +45,7 @@ def _value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
-        # a JSON string is a TOML basic string; TOML alone forbids a bare DEL
+        # JSON strings are TOML basic strings, but TOML forbids an unescaped DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
         return f"{{{', '.join(_pairs(value))}}}"

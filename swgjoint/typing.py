@@ -1,4 +1,4 @@
-"""Type aliases of the arrays that functions take and return."""
+"""Type aliases for the arrays that functions take and return."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Conversion factors for inputs and outputs; the package itself computes in SI units.
 
-Multiply by a factor to convert to SI and divide by it to convert from SI:
+Multiply a value by its factor to convert it to SI units, and divide by the factor to
+convert from SI units:
 
 >>> 120 * mm
 0.12
