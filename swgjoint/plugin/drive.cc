@@ -19,30 +19,33 @@ constexpr const char* kAttributes[] = {
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
     "friction",        "contact_damping"};
 constexpr int kAccelerations = 2;  // number of states before those of the hysteresis
-constexpr int kBristle = 2;        // states: angle where it is relaxed, whether known
+constexpr int kBristle = 2;  // states: rotation where it is relaxed, 1 once it is known
 constexpr size_t kMaxElements = 64;
-constexpr int kDeviations = 5;           // number of user values of the tendon
+constexpr int kDeviations = 5;           // number of user values of a tendon
 constexpr mjtNum kLeastLosses = 1e-6;    // keeps the bristle stiffness above zero
-// Largest cubic coefficient of the friction tendon, which a small value identifies. The
-// value is so small that the spring force vanishes, because the length of this tendon is
-// a rotation of many turns and not a torsion. Models are written with 1e-19, since XML
-// keeps nothing below 1e-20; older models have 1e-30.
+// Largest cubic coefficient of the friction tendon, which is identified by so small a
+// value. The length of this tendon is a rotation of many turns, not a torsion; its
+// spring force must nevertheless be negligible. Models are written with 1e-19, because
+// MuJoCo writes smaller numbers than 1e-20 to XML as 0; older models have 1e-30.
 constexpr mjtNum kFrictionCubic = 1e-18;
 // Torque that triggers mjWARN_BADQACC at inertias up to 1e10 kg m^2.
 constexpr mjtNum kDiverged = mjMAXVAL * mjMAXVAL;
 // Custom numeric with the bounds of the integration region, see joint/watch.py.
 constexpr char kRegion[] = "swgjoint_region";
 
+// Drive of an instance.
 Drive* Get(const mjData* d, int instance) {
   return reinterpret_cast<Drive*>(d->plugin_data[instance]);
 }
 
+// Warns that an instance is invalid, and returns null.
 std::unique_ptr<Drive> Refuse(const mjModel* m, int instance, const std::string& why) {
   const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
   mju_warning("%s instance '%s': %s", kName, name ? name : "", why.c_str());
   return nullptr;
 }
 
+// Reads an attribute of one number in low..high; returns false if it is invalid.
 bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum high,
             mjtNum* out) {
   std::vector<double> list;
@@ -52,7 +55,8 @@ bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum 
   return true;
 }
 
-// Stiffness and yield torque of every Jenkin element; none if the attribute is absent.
+// Reads stiffness and yield torque of every Jenkin element; the list is empty without
+// the attribute. Returns false if the attribute is invalid.
 bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
   const char* text = mj_getPluginConfig(m, instance, "hysteresis");
   list->clear();
@@ -64,6 +68,7 @@ bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
   return std::all_of(list->begin(), list->end(), [](double x) { return x > 0; });
 }
 
+// Number of states of an instance in plugin_state.
 int CountStates(const mjModel* m, int instance) {
   std::vector<double> list;
   // Create rejects an invalid attribute
@@ -73,9 +78,9 @@ int CountStates(const mjModel* m, int instance) {
          (friction && *friction ? kBristle : 0);
 }
 
-// Sets the length of a tendon such that its cubic spring has tangent stiffness p. The
-// engine would omit a stiffness of 0 from its metric. Returns the stiffness after
-// rounding.
+// Sets the length of a tendon such that its cubic spring has the tangent stiffness p.
+// The length is never 0, because the engine would omit a stiffness of 0 from its
+// metric. Returns the tangent stiffness after rounding.
 mjtNum SetTangent(const mjModel* m, mjData* d, int tendon, mjtNum p) {
   const mjtNum a = m->tendon_stiffness[tendon];
   const mjtNum c = m->tendon_stiffnesspoly[mjNPOLY * tendon + 1];
@@ -84,14 +89,14 @@ mjtNum SetTangent(const mjModel* m, mjData* d, int tendon, mjtNum p) {
   return a + 3 * c * length * length;
 }
 
-// Force that the engine applied for a tendon's cubic spring.
+// Force of a tendon's cubic spring, which the engine has applied.
 mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
   const mjtNum x = d->ten_length[tendon];
   return x * (m->tendon_stiffness[tendon] +
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
-// Whether this is the first warning for a model signature, step and bound.
+// Whether this is the first warning about a bound for a model signature and step size.
 bool First(uint64_t model, mjtNum step, int bound) {
   static std::mutex mutex;
   static std::set<std::tuple<uint64_t, mjtNum, int>> warned;
@@ -105,7 +110,7 @@ Drive::Region Drive::Region::Find(const mjModel* m) {
   Region found;
   for (int n = 0; n < m->nnumeric; ++n) {
     const char* name = mj_id2name(m, mjOBJ_NUMERIC, n);
-    // attaching may have added a prefix to the name
+    // the attachment of the model may have added a prefix to the name
     if (!name || !std::strstr(name, kRegion) || m->numeric_size[n] != 4) continue;
     const mjtNum* bound = m->numeric_data + m->numeric_adr[n];
     for (int k = 0; k < 3; ++k) {
@@ -181,8 +186,8 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   }
   drive->stretch_.assign(drive->reach_.size(), 0.0);
 
-  // When a model is attached, names get a prefix and config strings do not. The tendon
-  // therefore has the same name as the instance.
+  // When a model is attached, names get a prefix but config strings do not. The tendon
+  // is therefore found by the name of the instance, which it shares.
   const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
   const int t = name ? mj_name2id(m, mjOBJ_TENDON, name) : -1;
   if (t < 0) return Refuse(m, instance, "no tendon has the name of the instance");
@@ -192,7 +197,7 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance, "its tendon does not join a rotor and a link joint");
   }
   const int rotor = m->wrap_objid[wrap], link = m->wrap_objid[wrap + 1];
-  // XML keeps six digits of a coefficient, so it is only compared and not used further
+  // XML keeps only six digits of a coefficient, so that it is compared but not used
   if (m->jnt_type[rotor] != mjJNT_HINGE || m->jnt_type[link] != mjJNT_HINGE ||
       std::fabs(m->wrap_prm[wrap] * drive->map_.ratio() - 1) > 1e-5 ||
       m->wrap_prm[wrap + 1] != -1) {
@@ -259,14 +264,15 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
   return friction_.has_value();
 }
 
-// Rotation or speed of the wave generator relative to the flexspline, from positions or
-// velocities of rotor and link.
+// Rotation (or speed) of the wave generator relative to the flexspline, from positions
+// (or velocities) of rotor and link.
 mjtNum Drive::Rotation(const mjtNum* q) const {
   return friction_->b_theta() * q[0] + friction_->b_psi() * q[1];
 }
 
-// Applies the deviations of this drive from its map. Zeros or no user data mean no
-// deviation. They are read in every step, so that simulations of one batch may differ.
+// Applies the deviations of this drive from its map, which are user data of its tendon.
+// Zeros, or no user data, mean no deviation. The data are read in every step, so that
+// the simulations of a batch may differ.
 void Drive::Vary(const mjModel* m) {
   if (m->nuser_tendon < kDeviations) return;
   const mjtNum* by = m->tendon_user + tendon_ * m->nuser_tendon;
@@ -291,7 +297,7 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
     d->qfrc_passive[v_link_] += rubbed * friction_->b_psi();
   }
 
-  // PGS ignores the tendon term of the metric
+  // the solver PGS ignores the tendon term of the metric
   if (m->opt.integrator == mjINT_DISCRETE && m->opt.solver != mjSOL_PGS) {
     Watch(m, d, instance, 0);
     AddScheme(m, d, instance);
@@ -301,17 +307,17 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   }
 }
 
-// Sets the stretch of every element at the begin torsion; an element slips if the
-// torsion exceeds its reach.
+// Sets the stretch of every hysteresis element at the torsion at the start of the step;
+// `rest` are the torsions at which they are relaxed. An element beyond its reach slips.
 void Drive::Place(const mjtNum* rest) {
   for (size_t j = 0; j < reach_.size(); ++j) {
     stretch_[j] = std::clamp(map_.torsion() - rest[j], -reach_[j], reach_[j]);
   }
 }
 
-// Adds the elements over a change of the torsion: their mean torque along it, so that
-// their work is exact, and the derivative of that mean by the change. An element sticks
-// over the fraction f of the change.
+// Adds the contribution of the hysteresis elements over a change of the torsion: their
+// mean torque, so that their work is exact, and the derivative of this mean with
+// respect to the change. An element sticks over the fraction f of the change.
 void Drive::Slip(mjtNum change, DriveValue* value) const {
   for (size_t j = 0; j < reach_.size(); ++j) {
     const mjtNum k = losses_ * stiffness_[j], begin = stretch_[j];
@@ -325,11 +331,11 @@ void Drive::Slip(mjtNum change, DriveValue* value) const {
   }
 }
 
-// Whether a torque or stiffness of a step is not finite or excessively large, because
-// the user data or the state are. The engine's solver would treat it as zero force and
-// the whole model would coast without a warning. The rotor therefore gets a torque at
-// which the engine reports divergence and resets, as after any other divergence. The
-// step does not change the history of the drive.
+// Whether a torque or stiffness of a step is not finite or is excessively large, which
+// invalid user data or an invalid state may cause. The engine's solver would treat such
+// a force as zero, and the whole model would coast without a warning. The rotor
+// therefore gets a torque at which the engine reports divergence and resets, as it does
+// after any other divergence. The step does not change the history of the drive.
 bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
   const auto bounded = [](mjtNum x) { return std::fabs(x) <= kDiverged; };  // not NaN
   if (std::all_of(numbers.begin(), numbers.end(), bounded)) return false;
@@ -338,9 +344,9 @@ bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
   return true;
 }
 
-// Acceleration of a dof under a unit torque on it, with all other dofs free. This is an
-// entry of the diagonal of M^-1. With M = L' D L it is the sum of (L^-T e)^2/D over the
-// ancestors of the dof.
+// Acceleration of a dof due to a unit torque on it, with all other dofs free. This is
+// the entry of the dof on the diagonal of M^-1. With M = L' D L and the unit vector e
+// of the dof, it is the sum of (L^-T e)^2/D over the dof and its ancestors.
 mjtNum Drive::Response(const mjModel* m, const mjData* d, int dof) {
   const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
   std::fill_n(column_.begin(), last, 0.0);
@@ -356,6 +362,8 @@ mjtNum Drive::Response(const mjModel* m, const mjData* d, int dof) {
   return sum;
 }
 
+// Adds the torques at the current state: gradient of the potential, hysteresis, damping
+// and friction.
 void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   DriveValue value;
   map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
@@ -388,9 +396,10 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   step_.gradient = true;
 }
 
-// Torque per torsion rate in a step of the scheme. The engine moves a link out of a
-// contact or a limit along a prescribed path, regardless of the torque. This feeds
-// energy into the torsion of a drive without losses; contact_damping dissipates it.
+// Damping along the torsion in a step of the scheme [N m s/rad]. The engine moves a
+// link out of a contact or a joint limit along a prescribed path, regardless of the
+// torque. This adds energy to the torsion of a drive without losses; contact_damping
+// dissipates that energy.
 mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
   const mjtNum own = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
   // the engine makes the constraint rows of the step before the passive stage
@@ -399,9 +408,9 @@ mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
 }
 
 // Predicts the step of rotor and link and evaluates the discrete gradient over it. The
-// engine adds the part that is linear in the velocity change. After this stage it builds
-// its metric M + h^2 p g g' from ten_J (the direction g) and from the tangent of the
-// tendon's cubic spring at ten_length (the stiffness p).
+// engine adds the part that is linear in the velocity change through its metric
+// M + h^2 p g g'. It builds this metric after this stage, from ten_J (the direction g)
+// and from the tangent stiffness of the tendon's cubic spring at ten_length (p).
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
   const mjtNum vm = d->qvel[v_rotor_], vl = d->qvel[v_link_];
@@ -409,7 +418,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   const mjtNum damping = Damping(m, d);
 
-  // the scheme is a midpoint rule for positions that are half a step earlier
+  // the scheme is a midpoint rule for the positions of half a step earlier
   map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);
   Place(state + kAccelerations);
   DriveValue& g = step_.value;
@@ -449,7 +458,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     dm = h * (am - wm * g.g_theta * f);
     dl = h * (al - wl * g.g_psi * f);
     if (friction_) {
-      // (M + h^2 p g g')^-1 b: response of rotor and link to friction
+      // response of rotor and link to friction, (M + h^2 p g g')^-1 b
       const mjtNum bm = friction_->b_theta(), bl = friction_->b_psi();
       const mjtNum along = h * h * p * (wm * bm * g.g_theta + wl * bl * g.g_psi) /
                            (1 + h * h * w * p);
@@ -475,7 +484,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   d->qfrc_passive[v_rotor_] -= (force - shift) * g.g_theta + g.e_theta;
   d->qfrc_passive[v_link_] -= (force - shift) * g.g_psi + g.e_psi;
   if (friction_) {
-    // the same along b, as second term of the metric
+    // the same for friction along b, through the second term of the metric
     rub.metric = SetTangent(m, d, friction_tendon_, rub.metric);
     const mjtNum rubs = rub.force - h * rub.metric * d->ten_velocity[friction_tendon_];
     d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
@@ -493,7 +502,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
 }
 
 void Drive::Advance(const mjModel* m, mjData* d, int instance) {
-  Vary(m);  // a copied mjData may end a step that it has not begun
+  Vary(m);  // a copied mjData may complete a step that it has not begun
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   AdvanceState(m, d, state);
   std::replace_if(
@@ -503,9 +512,9 @@ void Drive::Advance(const mjModel* m, mjData* d, int instance) {
 
 void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
   state[0] = state[1] = 0;
-  // The torsion at the end of a step determines where each element is relaxed. The end
-  // of a step of the scheme is the beginning of the next one and is evaluated there;
-  // intermediate stages of other integrators are ignored.
+  // The torsion at the end of a step determines where each element is relaxed. In the
+  // scheme, the end of a step is the start of the next step and is evaluated there.
+  // With other integrators, intermediate stages are ignored.
   if (!reach_.empty() && (step_.scheme || step_.gradient)) {
     if (step_.gradient) {
       map_.Begin(d->qpos[q_rotor_], d->qpos[q_link_]);
@@ -571,7 +580,7 @@ void Drive::RegisterPlugin() {
     d->plugin_data[instance] = 0;
   };
   plugin.copy = +[](mjData* dest, const mjModel* m, const mjData* src, int instance) {
-    // a copy between Compute and Advance must contain the data that Advance needs
+    // a copy made between Compute and Advance must have the data that Advance needs
     const Drive* from = Get(src, instance);
     if (dest == src || !from) return;
     if (!Get(dest, instance) || Get(dest, instance) == from) {

@@ -16,8 +16,8 @@ namespace swgjoint {
 
 class Drive {
  public:
-  // Reads the attributes of an instance. If one is invalid, warns with mju_warning and
-  // returns null.
+  // Reads the attributes of an instance. If one of them is invalid, calls mju_warning
+  // and returns null.
   static std::unique_ptr<Drive> Create(const mjModel* m, int instance);
 
   // Adds the torques of the drive and, for the integrator discrete, passes their
@@ -25,15 +25,16 @@ class Drive {
   void Compute(const mjModel* m, mjData* d, int instance);
 
   // After the step: stores the acceleration due to all other forces, and where the
-  // hysteresis elements and the friction bristle are relaxed. A state that is not finite
-  // becomes 0.
+  // hysteresis elements and the friction bristle are relaxed. A state that is not
+  // finite becomes 0.
   void Advance(const mjModel* m, mjData* d, int instance);
 
+  // Discards the data of a step that has begun.
   void Forget() { step_ = Step(); }
 
-  // Copies the data that Advance needs for a step that the drive of another mjData has
-  // begun. That drive may belong to another model, so that its map, addresses and
-  // parameters are not copied.
+  // Copies the data that Advance needs to complete a step that the drive of another
+  // mjData has begun. That drive may belong to another model; its map, addresses and
+  // parameters are therefore not copied.
   void Continue(const Drive& other) { step_ = other.step_; }
 
   static void RegisterPlugin();
@@ -42,18 +43,18 @@ class Drive {
   // Results of Compute that Advance needs, within one step.
   struct Step {
     bool scheme = false, gradient = false;
-    mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // velocity, 1/inertia
-    mjtNum force = 0, metric = 0;                             // lam, p
-    mjtNum torsion = 0, rotation = 0;                         // at begin of step
+    mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // speeds, Response
+    mjtNum force = 0, metric = 0;                             // along g, and p
+    mjtNum torsion = 0, rotation = 0;                         // at the start of step
     DriveValue value;
     FrictionStep friction;
   };
 
-  // Bounds within which the integration was tested, if the model states them; 0 means
-  // unbounded.
+  // Bounds of the region in which the integration was tested, if the model states them;
+  // 0 means no bound.
   struct Region {
     mjtNum step[3] = {0, 0, 0};  // discrete, RK4, other integrators
-    mjtNum phase = 0;            // phase change of the highest order in a step
+    mjtNum phase = 0;            // phase change of the highest order per step
     static Region Find(const mjModel* m);
   };
 
@@ -72,15 +73,16 @@ class Drive {
 
   DriveMap map_;
   mjtNum damping_ = 0, contact_damping_ = 0, numerical_damping_ = 0;
-  int passes_ = 0;
+  int passes_ = 0;  // evaluations of the map per step
   int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, indices in ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
-  // Jenkin elements: stiffness, yield torsion, current torsion from the relaxed state
+  // Jenkin elements: stiffness, yield torsion, and torsion relative to the relaxed
+  // state
   std::vector<mjtNum> stiffness_, reach_, stretch_;
-  std::vector<mjtNum> column_;  // workspace of Response, a column of L^-T
+  std::vector<mjtNum> column_;  // workspace of Response: a column of L^-T
   mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
-  int friction_tendon_ = -1;  // tendon of the friction term in the metric
+  int friction_tendon_ = -1;  // tendon of the friction term of the metric
   Region region_;
   Step step_;
 };

@@ -47,7 +47,7 @@ SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
 SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
   std::memcpy(to, &x, sizeof(Lanes));
 }
-// Sums of the lanes of each of four vectors.
+// Sum of the lanes of each of the four vectors.
 SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
                           const Lanes& d, double out[4]) {
 #if defined(__GNUC__) && !defined(__clang__)
@@ -67,6 +67,7 @@ SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
 #endif
 }
 
+// Polynomial with coefficients w, and its first two derivatives.
 double Value(const double w[5], double d) {
   return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
 }
@@ -76,21 +77,24 @@ double Slope(const double w[5], double d) {
 double Curvature(const double w[5], double d) {
   return 2 * w[2] + d * (6 * w[3] + d * 12 * w[4]);
 }
-// (w(b) - w(a))/(b - a) without a difference, so that it is exact even if b == a.
+// (w(b) - w(a))/(b - a), computed without these differences, so that it is accurate for
+// small b - a and equals the derivative if b == a.
 double Divided(const double w[5], double a, double b) {
   const double ab = a * a + a * b + b * b;
   return w[1] + w[2] * (a + b) + w[3] * ab + w[4] * (a + b) * (a * a + b * b);
 }
-// Derivative of Divided by b.
+// Derivative of Divided with respect to b.
 double DividedSlope(const double w[5], double a, double b) {
   return w[2] + w[3] * (a + 2 * b) + w[4] * (a * a + 2 * a * b + 3 * b * b);
 }
 
+// Sets an error message about an attribute, and returns false.
 bool Fail(std::string* error, const char* attribute, const std::string& why) {
   *error = std::string("attribute '") + attribute + "' " + why;
   return false;
 }
 
+// Reads an attribute of `count` numbers, or of any number of them if `count` is 0.
 bool Numbers(const char* text, const char* attribute, size_t count,
              std::vector<double>* out, std::string* error) {
   if (!ParseNumbers(text, out)) {
@@ -180,7 +184,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   n_theta_ = n_theta;
   n_psi_ = n_psi;
 
-  // one table for the intervals and the parabolas about the end knots beyond them
+  // one table for the intervals and for the parabolas beyond the first and last knot
   segments_ = m + 2;
   base_.resize(segments_);
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
@@ -219,9 +223,9 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   return true;
 }
 
-// Harmonics whose orders are the sum or difference of earlier ones need no call of sin
-// and cos. The first suitable pair is used, in the order of its later and then of its
-// earlier member.
+// Finds harmonics whose orders are the sum or difference of those of two earlier ones;
+// these harmonics need no call of sin and cos. Of several pairs, the one whose later
+// member comes first is used, then the one whose earlier member comes first.
 void DriveMap::FindRecipes() {
   const int count = n_ - 1;
   const auto key = [](double theta, double psi) {
@@ -246,6 +250,7 @@ void DriveMap::FindRecipes() {
   }
 }
 
+// Segment that contains a torsion; 0 and segments_ - 1 are the end parabolas.
 int DriveMap::Segment(double torsion) const {
   if (torsion < knots_.front()) return 0;
   if (torsion == knots_.back()) return segments_ - 2;
@@ -253,11 +258,13 @@ int DriveMap::Segment(double torsion) const {
                           knots_.begin());
 }
 
-// The same with a guess, because the torsion rarely leaves its segment within a step.
+// The same, but tests a guess first, because the torsion rarely leaves its segment
+// within a step.
 int DriveMap::SegmentNear(int guess, double torsion) const {
   return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
 }
 
+// Computes cos and sin of all phases at the given angles.
 void DriveMap::Rotate(double theta, double psi) {
   double* c = c_.data();
   double* s = s_.data();
@@ -289,7 +296,7 @@ void DriveMap::Begin(double theta, double psi) {
   d0_ = torsion_ - base_[j0_];
 }
 
-// sin(eta)/eta and cos(eta) of half the phase change eta of every harmonic.
+// Computes sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic.
 void DriveMap::HalfStep(double dtheta, double dpsi) {
   for (int k = 0; k < n_ - 1; ++k) {
     const double x = 0.5 * (n_theta_[k] * dtheta + n_psi_[k] * dpsi);
@@ -298,8 +305,8 @@ void DriveMap::HalfStep(double dtheta, double dpsi) {
   }
 }
 
-// Adds the polynomial coefficients of a weighted sum over the harmonics in one segment;
-// `weight` points to the weights of A and B in the first block.
+// Adds to `out` the polynomial coefficients of a weighted sum over the harmonics in one
+// segment; `weight` points to the weights of A and B in the first block.
 void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   Lanes sum[5] = {};
   // data() is used because a map without harmonics has an empty table
@@ -321,10 +328,10 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   out[4] += high[0];
 }
 
-// Computes the weights of all A and B, the weighted sums in the segment of the begin
-// state, and g, in one pass over the table. The processor determines how many lanes are
-// processed at once; the result does not depend on it in any bit. kSmall means that no
-// phase changes by more than 0.5 rad.
+// Computes, in one pass over the table, the weights of all A and B, the weighted sums
+// in the segment of the start state, and g. The processor determines how many lanes are
+// processed at once; the result is bit for bit the same. kPsi means that a harmonic
+// depends on psi, and kSmall that no phase changes by more than 0.5 rad.
 template <bool kPsi, bool kSmall>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
   const double* __restrict row =
@@ -425,8 +432,8 @@ __attribute__((target("avx2"))) void DriveMap::WeighAvx2(double dtheta, double d
 }
 #endif
 
-// Mean torque across knots, summed piece by piece to avoid a difference of two large
-// energies.
+// Computes the mean torque of a step that crosses knots. The work is summed piece by
+// piece, which avoids the difference of two large energies.
 void DriveMap::Work(int j1, double x1, DriveValue* out) const {
   double w[5], work = 0, torque_end = 0;
   const int step = j1 > j0_ ? 1 : -1;
@@ -453,10 +460,10 @@ void DriveMap::Work(int j1, double x1, DriveValue* out) const {
 }
 
 void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
-  // With phi the phase at the midpoint and eta half of its change,
-  //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), likewise for sin.
-  // Every harmonic therefore has its secants by theta and psi in closed form, and the
-  // mean of its two end values is cos(eta) times the value at the midpoint.
+  // With the phase phi at the midpoint and half the phase change eta,
+  //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), and similarly for sin.
+  // The secants of every harmonic for theta and psi therefore have a closed form, and
+  // the mean of its two end values is cos(eta) times its value at the midpoint.
 #ifdef SWGJOINT_AVX2
   avx2_ ? WeighAvx2(dtheta, dpsi, out) : Weigh(dtheta, dpsi, out);
 #else
@@ -466,7 +473,7 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   const int j1 = SegmentNear(j0_, x1);
   const double d1 = x1 - base_[j1];
 
-  // torque: mean of dV/d(torsion) along the step, with harmonics at their mean
+  // torque: mean of dV/d(torsion) along the step, with cos and sin at their means
   if (j0_ == j1) {
     out->torque = Divided(w_, d0_, d1);
     out->slope = DividedSlope(w_, d0_, d1);
@@ -478,7 +485,7 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   const auto bound = std::minmax(out->stiffness_begin, out->stiffness_end);
   out->slope = std::clamp(out->slope, 0.5 * bound.first, 0.5 * bound.second);
 
-  // explicit derivative by the angles: mean of the values at the two torsions
+  // secants of V for the angles: mean of their values at the two torsions
   const auto angle = [&](const double u[5], int weights) {
     double end[5] = {0, 0, 0, 0, 0};
     if (j1 != j0_) Combine(j1, weight_.data() + weights * kLanes, end);

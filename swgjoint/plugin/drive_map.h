@@ -23,8 +23,8 @@ struct DriveText {
   const char* kinematic_error;
 };
 
-// Reads a string of numbers; returns false unless the whole string is numbers and all
-// of them are finite.
+// Reads a string of numbers. Returns false if the string is empty or contains anything
+// other than finite numbers.
 bool ParseNumbers(const char* text, std::vector<double>* out);
 
 // V and its derivatives at one state (Gradient) or over one step (Secant).
@@ -40,7 +40,7 @@ class DriveMap {
  public:
   static constexpr int kLanes = 4;            // harmonics that are processed together
   static constexpr int kBlock = 10 * kLanes;  // their coefficients A0, B0, .. A4, B4
-  // weights of their A and B in the mean, and in the secants by theta and by psi
+  // weights of their A and B in the mean, and in the secants for theta and for psi
   static constexpr int kWeights = 6 * kLanes;
 
   // On failure returns false and names the invalid attribute in `error`.
@@ -50,8 +50,9 @@ class DriveMap {
   // Largest order of a harmonic, in cycles per rotor turn.
   double top_order() const { return top_order_; }
 
-  // From the next Begin or Gradient on, multiplies V by `potential` and e0 by `error`,
-  // and evaluates both at rotor and link angles increased by `theta` and `psi`.
+  // From the next Begin or Gradient on, V is multiplied by `potential` and e0 by
+  // `error`, and both are evaluated at rotor and link angles increased by `theta` and
+  // `psi`.
   void Vary(double potential, double error, double theta, double psi) {
     scale_ = potential;
     error_scale_ = error;
@@ -62,18 +63,18 @@ class DriveMap {
   // Derivatives of V at one state.
   void Gradient(double theta, double psi, DriveValue* out);
 
-  // Sets the begin state of the following Secant calls.
+  // Sets the start state of the following Secant calls.
   void Begin(double theta, double psi);
-  double torsion() const { return torsion_; }  // at the begin state
+  double torsion() const { return torsion_; }  // at the start state
 
-  // Discrete gradient from the begin state to begin + (dtheta, dpsi):
+  // Discrete gradient from the start state to start + (dtheta, dpsi):
   // (torque g + e) . (dtheta, dpsi) equals the change of V up to round-off.
   void Secant(double dtheta, double dpsi, DriveValue* out);
 
  private:
   // Rule that computes cos and sin of one harmonic from those of earlier ones.
   struct Recipe {
-    int a = -1, b = -1;  // earlier harmonics; a < 0: call sin and cos
+    int a = -1, b = -1;  // earlier harmonics; a < 0: call the functions sin and cos
     double sign = 1;     // phase = phase_a + sign * phase_b
   };
 
@@ -112,15 +113,15 @@ class DriveMap {
   std::vector<double> error_c_, error_s_;  // amplitudes of cos and sin in e0
   std::vector<Recipe> recipe_;
 
-  // begin state
+  // start state
   double torsion_ = 0, d0_ = 0;
-  int j0_ = 0;  // segment; between steps a first guess, which does not affect results
+  int j0_ = 0;  // segment; between steps an initial guess that does not affect results
   std::vector<double> c_, s_;  // cos and sin of the phases
 
-  // data of a step; sized in Parse, so that steps allocate nothing
+  // data of a step, sized in Parse, so that no step allocates memory
   std::vector<double> sinc_, ch_;  // sin(eta)/eta, cos(eta); eta: half phase change
   std::vector<double> weight_;     // (blocks, kWeights)
-  double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0
+  double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0_
 };
 
 }  // namespace swgjoint

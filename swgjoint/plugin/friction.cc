@@ -47,7 +47,7 @@ double Friction::Solve(double h, double speed, double free, double response,
                        FrictionStep* step) const {
   const double z = step->stretch, reach = step->reach;
   const double half = 0.5 * stiffness_;
-  // dx without friction, and its reduction per unit of friction torque
+  // rotation dx without friction, and its reduction per unit of friction torque
   const double d = h * (speed + 0.5 * free), k = 0.5 * h * response;
   const double m = 1 + 0.5 * response * viscous_;
   // sticking: the torque is stiffness (z + dx/2) + damping dx/h
@@ -63,7 +63,8 @@ double Friction::Solve(double h, double speed, double free, double response,
     const double way = b > 0 ? 0.5 * (b + root) / m : k * stiffness_ * a * a / (root - b);
     const double mean = sign * (limit - half * a * a / way + creep);
     dx = sign * way;
-    // linear in the actual dx; the bristle must not return more energy than it stores
+    // linear in the actual dx; the bristle must not return more energy than it has
+    // stored
     rate = half;
     offset = mean - rate * dx;
     if (std::fabs(offset) > stiffness_ * std::fabs(z)) {

@@ -7,19 +7,22 @@
 
 namespace swgjoint {
 
-// Friction in one step of the scheme: torque = force + h metric dnu.
+// Friction in one step of the scheme. The torque is force + h metric dnu, where dnu is
+// the change of the relative speed; dx is the relative rotation during the step.
 struct FrictionStep {
-  double stretch = 0, reach = 0;  // stretch of the bristle at the begin, and its limit
+  double stretch = 0, reach = 0;  // stretch of the bristle at the start, and its limit
   double force = 0, metric = 0;   // terms that the engine receives
   double offset = 0, rate = 0;    // torque of the bristle alone: offset + rate dx
 };
 
 class Friction {
  public:
-  // Reads "b_theta b_psi stiffness damping coulomb static stribeck viscous load".
+  // Takes "b_theta b_psi stiffness damping coulomb static stribeck viscous load" in
+  // this order; returns false if a number is invalid.
   bool Parse(const std::vector<double>& list);
 
-  // Multiplies all torques of the law by `scale` > 0; the stretch at slip is unchanged.
+  // Scales all torques of the law as parsed by `scale` > 0; the stretch at which the
+  // bristle slips does not change.
   void Scale(double scale) {
     stiffness_ = scale * own_stiffness_;
     damping_ = scale * own_damping_;
@@ -29,10 +32,10 @@ class Friction {
   double b_theta() const { return b_theta_; }
   double b_psi() const { return b_psi_; }
 
-  // Largest stretch at a relative speed and a torque along the torsion.
+  // Largest stretch [rad] at a relative speed and a torque along the torsion.
   double Reach(double speed, double torque) const;
 
-  // Torque at one state; x is the rotation from the angle where the bristle is relaxed.
+  // Torque at one state; x is the rotation from where the bristle is relaxed.
   double Torque(double x, double reach, double speed) const;
 
   // Solves the predicted step, in which the speed changes by `free` without friction
@@ -40,8 +43,8 @@ class Friction {
   double Solve(double h, double speed, double free, double response,
                FrictionStep* step) const;
 
-  // Stretch after a rotation dx. The bristle slips at its reach and stores no more
-  // energy than the step supplied.
+  // Stretch after a rotation dx. The bristle slips at its reach and stores at most its
+  // previous energy plus the work of the step.
   double After(const FrictionStep& step, double dx) const;
 
  private:
