@@ -33,8 +33,8 @@ alpha and of beta, one and two cycles per output turn, and the sum alpha + beta,
 an eccentric wave generator excites."""
 SURE = 4.0
 """Smallest amplitude of a harmonic that is kept, in standard errors [-]. If a drive has
-none of 20 searched harmonics, noise exceeds this threshold in less than one of a
-hundred tables."""
+none of 20 searched harmonics, noise exceeds this threshold in fewer than one
+table out of a hundred."""
 _TURN = 0.98  # fraction of an output turn that a record must cover
 _PER_WAVE = 4.0  # samples per period of the highest order
 _LEVERAGE = 1e4  # largest condition number at which the orders can be separated

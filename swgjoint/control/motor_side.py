@@ -158,7 +158,7 @@ class MotorPID:
         self._integral: Array = np.zeros(task.position.shape[1:])
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """Motor torques: feed-forward of the plan plus feedback [N·m]. (..., n_joints).
+        """Motor torques, feed-forward plus feedback [N·m]. Shape (..., n_joints).
 
         Args:
             k: Index of the control instant.

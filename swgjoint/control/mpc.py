@@ -152,7 +152,7 @@ class PredictiveController:
         """Number of pairs of joint and instant with an active limit in the horizon."""
 
     def torque(self, k: int, measured: Measured) -> Array:
-        """Motor torques: feed-forward of the plan plus feedback [N·m]. (..., n_joints).
+        """Motor torques, feed-forward plus feedback [N·m]. Shape (..., n_joints).
 
         Args:
             k: Index of the control instant.

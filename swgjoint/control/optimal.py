@@ -64,8 +64,8 @@ class OptimalMotion:
     """Elastic torques along the torsion at the interval ends [N·m]. Shape (n + 1,
     n_joints)."""
     loss: float
-    """Winding loss: time integral of the sum of squared motor torques, each relative to
-    rated torque over ratio [s]."""
+    """Winding loss: time integral of the sum over all joints of the squared motor
+    torque, relative to rated torque over ratio [s]."""
     iterations: int
     """Number of IPOPT iterations."""
 

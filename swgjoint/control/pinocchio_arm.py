@@ -86,7 +86,14 @@ class PinocchioArm:
         return np.asarray(out + self._damping * velocity + dry + spring)
 
     def inertia(self, position: Array) -> Array:
-        """Inertia about every joint with the others locked [kg·m²]. (n_joints,)."""
+        """Inertia about every joint while the others are locked [kg·m²].
+
+        Args:
+            position: Joint angles [rad]. Shape (n_joints,).
+
+        Returns:
+            Inertias including armature [kg·m²]. Shape (n_joints,).
+        """
         full = self._pin.crba(self.model, self._data, self._place(position))
         return np.diag(full).copy()
 

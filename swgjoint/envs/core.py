@@ -345,7 +345,7 @@ class Core(ABC):
         return self.instant >= self.steps
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """True values without sensor errors. Shapes (n,), or (n, n_joints) for arms."""
+        """True values without sensor errors; (n,) for one joint, else (n, n_joints)."""
         error = self.link_angle - self.motor_angle / self.plant.ratio
         values: dict[str, NDArray[Any]] = {
             "link_error_arcmin": self.link_error / arcmin,
