@@ -10,6 +10,7 @@ from pathlib import Path
 from swgjoint.store import cache_folder, json_content, json_file, keep, read_kept
 
 PACKAGE = Path(__file__).resolve().parent
+"""Folder of the package."""
 _CODE = (".py", ".cc", ".h")
 
 

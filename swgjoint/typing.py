@@ -6,5 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+"""Array of float64 numbers."""
 Mask = NDArray[np.bool_]
+"""Array of bools."""
 Index = NDArray[np.int64]
+"""Array of int64 indices."""

@@ -58,6 +58,7 @@ from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.typing import Array
 
 Complex = NDArray[np.complex128]
+"""Array of complex coefficients."""
 
 LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))
 """Default orders (p, q): 2 and 4 cycles per turn of the wave generator relative to

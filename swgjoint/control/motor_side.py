@@ -42,6 +42,7 @@ class MotorPlan:
 
 
 Planner = Callable[[Task], MotorPlan]
+"""Function that makes the plan of a task."""
 
 
 def ideal_plan(task: Task) -> MotorPlan:

@@ -53,17 +53,29 @@ class ArmSettings:
     """
 
     scene: str | Path = "ur5e-circle"
+    """Name or path of a scene or of an arm."""
     level: str = "full"
+    """Level of the drives: ``full`` or ``linear``."""
     friction: bool = True
+    """Whether drives have the friction of their maps."""
     kinematic_error_arcmin: float | None = None
+    """Peak-to-peak kinematic error over one output turn [arcmin], or None."""
     action: str = "torque"
+    """Kind of the actions, one of :data:`ACTIONS`."""
     authority_of_rated: float = 0.2
+    """Largest added motor torque relative to rated torque over ratio [-]."""
     shift_arcmin: float = 10.0
+    """Largest shift of the set-points [arcmin]."""
     episode_s: float = 2.0
+    """Duration of an episode [s]."""
     sensors: Mapping[str, float] | Sensors | None = None
+    """Sensors of every joint; None: the default sensors."""
     randomise: bool | Mapping[str, float] | SpecimenTolerances = False
+    """Whether, or with which tolerances, drives and loads vary."""
     error_scale_mm: float = 1.0
+    """Error scale of the reward [mm]."""
     effort_weight: float = 0.1
+    """Effort weight of the reward [-]."""
 
     def __post_init__(self) -> None:
         for key, unit in (

@@ -50,20 +50,35 @@ class BenchSettings:
     """
 
     drive: str | DriveMap = "CSG-25-100"
+    """Catalogue name, map file or design file of the drive, or its map."""
     level: str = "full"
+    """Level of the drives: ``full`` or ``linear``."""
     rotor_inertia_kgm2: float = 1e-4
+    """Inertia of motor rotor and wave generator about the motor axis [kg·m²]."""
     load_inertia_kgm2: float = 1.0
+    """Inertia of the load about the joint [kg·m²]."""
     payload_kg: float = 0.0
+    """Payload at the end of the bar [kg]."""
     friction: bool = True
+    """Whether drives have the friction of their maps."""
     kinematic_error_arcmin: float | None = None
+    """Peak-to-peak kinematic error over one output turn [arcmin], or None."""
     torque_limit_Nm: float | None = None
+    """Torque limit of the motor [N·m]; None: repeated peak torque over ratio."""
     max_speed_rad_s: float = 0.6
+    """Largest link speed of references [rad/s]."""
     max_angle_rad: float = 1.0
+    """Largest link angle of references [rad]."""
     period_s: float = 1e-3
+    """Control period [s]."""
     episode_s: float = 2.0
+    """Duration of an episode [s]."""
     load_of_rated: float = 0.5
+    """Largest load torque relative to rated torque [-]."""
     sensors: Mapping[str, float] | Sensors | None = None
+    """Sensors of every joint; None: the default sensors."""
     randomise: bool | Mapping[str, float] | SpecimenTolerances = False
+    """Whether, or with which tolerances, drives and loads vary."""
 
     def __post_init__(self) -> None:
         for key, unit in (

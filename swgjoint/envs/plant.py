@@ -19,6 +19,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
 Index = NDArray[np.intp]
+"""Array of addresses."""
 
 
 class Plant:

@@ -106,6 +106,7 @@ KINDS: dict[str, Callable[[Array, np.random.Generator], Motion]] = {
     "multisine": multisine,
     "point_to_point": point_to_point,
 }
+"""Functions that draw a motion, by the name of its kind."""
 
 
 def draw_motion(

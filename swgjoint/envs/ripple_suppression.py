@@ -33,14 +33,23 @@ class RippleSettings(BenchSettings):
     """Arguments of ``RippleSuppression-v0``, see :class:`RippleSuppressionEnv`."""
 
     max_angle_rad: float = 3.0
+    """Largest link angle of references [rad]."""
     episode_s: float = 4.0
+    """Duration of an episode [s]."""
     slowest: float = 0.3
+    """Smallest speed relative to ``max_speed_rad_s`` [-]."""
     authority_of_rated: float = 0.2
+    """Largest added motor torque relative to rated torque over ratio [-]."""
     loop_Hz: float = 8.0
+    """Natural frequency of the motor loop [Hz]."""
     loop_damping_ratio: float = 1.0
+    """Damping ratio of the motor loop [-]."""
     ripple_scale_of_rated: float = 0.01
+    """Ripple scale of the reward relative to rated torque [-]."""
     error_scale_arcmin: float = 0.1
+    """Error scale of the reward [arcmin]."""
     effort_weight: float = 0.1
+    """Effort weight of the reward [-]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
