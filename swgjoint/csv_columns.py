@@ -192,7 +192,7 @@ def _column(
             f"{path}: {name} occurs in {len(indices)} columns; accepted: one"
         )
     near = [m for key in units for m in get_close_matches(key, header, n=1)]
-    hint = f" (did you mean {near[0][:40]!r}?)" if near else ""
+    hint = f" (the file has {near[0][:40]!r})" if near else ""
     read = ", ".join(repr(cell[:24]) for cell in header[:6])
     more = f" and {len(header) - 6} more" if len(header) > 6 else ""
     raise InputError(

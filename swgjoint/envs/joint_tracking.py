@@ -190,9 +190,9 @@ class JointTrackingEnv(SingleEnv):
     during the first 0.3 s, and the motion begins at 0.1 s. The episode is ``truncated``
     after ``episode_s`` and ``terminated`` when a limit is exceeded.
     ``info["broken_limit"]`` is then the number of the limit in
-    :data:`swgjoint.envs.core.LIMITS`: link angle
-    (1 rad + 2 ``max_angle_rad``), motor speed (twice that of the fastest reference), or
-    drive torque (momentary peak torque or ratcheting torque).
+    :data:`swgjoint.envs.core.LIMITS`: link angle (1 rad + 2 ``max_angle_rad``), motor
+    speed (twice that of the fastest reference), or drive torque (momentary peak torque
+    or ratcheting torque).
 
     ``info`` contains true values: ``link_error_arcmin``, ``transmission_error_arcmin``
     (output minus input/ratio), ``output_torque_Nm`` (of the drive on the link, mean
