@@ -146,8 +146,6 @@ def test_a_rigid_circular_spline_cannot_rub():
     """Its flank has no material points to follow: one clear line."""
     with pytest.raises(
         DesignError,
-        match=naming(
-            "reference-2d", "friction.tooth_coefficient", "0.1", "0"
-        ),
+        match=naming("reference-2d", "friction.tooth_coefficient", "0.1", "0"),
     ):
         sector_model(rubbing(), elastic_circular_spline=False)
