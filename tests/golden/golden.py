@@ -43,7 +43,8 @@ VOLATILE += ("work_s", "speed_up", "real_time", "memory", "date", "folder", "pat
 VOLATILE += ("created", "von_mises_at")
 """Parts of keys whose values are those of one machine or one run.
 
-The largest stress occurs at several places of a symmetric drive; round-off picks one."""
+The largest stress of a symmetric drive occurs at several places; round-off picks one.
+"""
 
 LONG_TABLE = 60
 """Rows of a table beyond which its columns are summed."""
