@@ -1,0 +1,106 @@
+"""The compiled loops under the sanitizers for addresses and undefined behaviour."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+CXX = os.environ.get("CXX", "g++")
+KERNELS = Path(__file__).parents[2] / "swgjoint/kernels"
+HEADERS = Path(sysconfig.get_path("include"))
+PROGRAM = """
+import importlib.util, sys
+name = "swgjoint.kernels.compiled"
+spec = importlib.util.spec_from_file_location(name, sys.argv[1])
+sys.modules[name] = module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+import swgjoint.kernels
+assert swgjoint.kernels.kernels() is module
+import pytest
+sys.exit(pytest.main(["-q", "-x", "-s", "-p", "no:cacheprovider", *sys.argv[2:]]))
+"""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="preloads a library of gcc"),
+    pytest.mark.skipif(find_spec("nanobind") is None, reason="needs nanobind"),
+    pytest.mark.skipif(shutil.which(CXX) is None, reason="needs a C++ compiler"),
+    pytest.mark.skipif(
+        not (HEADERS / "Python.h").exists(), reason="needs the headers of Python"
+    ),
+]
+
+
+def library(name: str) -> str:
+    """Path of a library of the compiler."""
+    found = subprocess.run(
+        [CXX, f"-print-file-name={name}"], check=True, capture_output=True, text=True
+    )
+    return found.stdout.strip()
+
+
+def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
+    """The module with both sanitizers; ``change`` is a file, a text and another one."""
+    for path in [*KERNELS.glob("*.cc"), *KERNELS.glob("*.h")]:
+        text = path.read_text(encoding="utf-8")
+        if change and path.name == change[0]:
+            assert text.count(change[1]) == 1
+            text = text.replace(change[1], change[2])
+        (folder / path.name).write_text(text, encoding="utf-8")
+    spec = find_spec("nanobind")
+    assert spec is not None and spec.submodule_search_locations
+    nanobind = Path(spec.submodule_search_locations[0])
+    out = folder / "compiled.so"
+    options = "-std=c++17 -O1 -g1 -fPIC -shared -fvisibility=hidden".split()
+    options += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    options += ["-fno-sanitize=vptr", "-D_GLIBCXX_ASSERTIONS"]
+    include = [nanobind / "include", nanobind / "ext/robin_map/include", HEADERS]
+    sources = [nanobind / "src/nb_combined.cpp", *sorted(folder.glob("*.cc"))]
+    subprocess.run(
+        [CXX, *options, *(f"-I{path}" for path in include), *sources, "-o", out],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return out
+
+
+def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
+    """The tests against numpy with a module, the sanitizer loaded first."""
+    environment = os.environ | {
+        "LD_PRELOAD": f"{library('libasan.so')} {library('libstdc++.so.6')}",
+        "ASAN_OPTIONS": "detect_leaks=0",
+    }
+    tests = Path(__file__).parents[1]
+    files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
+    files += sorted((tests / "gear").glob("test_compiled_*.py"))
+    assert len(files) == 3
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
+        env=environment,
+        cwd=tests.parent,
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_the_loops_are_clean(tmp_path):
+    """No access beyond an array and nothing undefined in the tests against numpy."""
+    ended = run_twins(build(tmp_path))
+    assert ended.returncode == 0, ended.stdout[-2000:] + ended.stderr[-2000:]
+    assert "passed" in ended.stdout and "skipped" not in ended.stdout
+
+
+def test_an_access_beyond_an_array_is_found(tmp_path):
+    """One column too many in a loop of the module ends the tests."""
+    wrong = ("tangents.cc", "j < size; j += 2", "j <= size; j += 2")
+    ended = run_twins(build(tmp_path, wrong))
+    assert ended.returncode != 0
+    assert "AddressSanitizer" in ended.stderr
