@@ -167,8 +167,7 @@ def test_free_ring_of_unit_width_is_the_plane_model():
     model = flexspline(design, profile, flexspline_strip(design, profile))
     teeth, n, face = model.teeth, 60, 3 * model.masters.face_size
     plane_design = design.with_changes({"micro_geometry": None})
-    model = sector_model(plane_design, half=True)
-    element = model.element
+    element = sector_model(plane_design, half=True).element
 
     angle = 2 * pi / 120 * np.arange(n)
     turn = about_z(angle)
