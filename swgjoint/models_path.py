@@ -23,7 +23,7 @@ MAX_NAME, MAX_PATH = 255, 4096
 are not larger."""
 ECHOED = 120
 """Largest length of a reference that a message quotes in full [characters]."""
-SHOWN = 12
+SHOWN = 6
 """Largest number of bundled names in a message."""
 _SHOWN_AS = {"drives": "designs"}
 """Names of kinds in messages and commands, where they differ from the folder."""

@@ -503,3 +503,11 @@ def test_a_module_in_metres_is_called_one(reference, module):
     assert names(
         line, "drive.module_mm", f"{module:g} mm", "metres", f"{1e3 * module:g} mm"
     )
+
+
+def test_an_unknown_name_takes_one_short_line():
+    """Suggestions and a list of names fit in less than 500 characters."""
+    for name in [*(f"{one}.x" for one in bundled_names("drives", ".toml")), "x" * 120]:
+        with pytest.raises(DesignError) as found:
+            Design.load(name)
+        assert len(f"swgjoint optimise: {found.value}") < 500
