@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from itertools import accumulate
 from pathlib import Path
 
 from swgjoint.errors import InputError
@@ -23,8 +24,8 @@ MAX_NAME, MAX_PATH = 255, 4096
 are not larger."""
 ECHOED = 120
 """Largest length of a reference that a message quotes in full [characters]."""
-SHOWN = 6
-"""Largest number of bundled names in a message."""
+LISTED = 200
+"""Largest length of a list of bundled names in a message [characters]."""
 _SHOWN_AS = {"drives": "designs"}
 """Names of kinds in messages and commands, where they differ from the folder."""
 TOGETHER = {"scenes": ("arms",)}
@@ -143,13 +144,15 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
 
 
 def _listed(kind: str, suffix: str) -> str:
-    """Bundled names of one kind for a message, at most the first :data:`SHOWN`."""
+    """Bundled names of one kind for a message, as many as :data:`LISTED` allows."""
     names = _names(kind, suffix)
-    if len(names) <= SHOWN:
+    lengths = accumulate(len(name) + len(", ") for name in names)
+    shown = sum(length <= LISTED for length in lengths)
+    if shown == len(names):
         return ", ".join(names)
     command = f"swgjoint list {_SHOWN_AS.get(kind, kind)}"
-    more = f"and {len(names) - SHOWN} more, see '{command}'"
-    return ", ".join([*names[:SHOWN], more])
+    more = f"and {len(names) - shown} more, see '{command}'"
+    return ", ".join([*names[:shown], more])
 
 
 def named_kind(name: str) -> str | None:
