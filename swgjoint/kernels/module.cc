@@ -5,7 +5,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
-#include <memory>
 #include <stdexcept>
 
 #include "ellipse.h"
@@ -33,9 +32,17 @@ void require(bool fits, const char* what) {
 struct Flank {
   swgjoint::Profile profile;
   Flank(In<2> table, In<2> edges, double side)
-      : profile(table.data(), table.shape(0), edges.data(), edges.shape(0), side) {
-    require(table.shape(0) > 0 && table.shape(1) == 11, "pieces: (n, 11)");
-    require(edges.shape(1) == 6, "edges: (n, 6)");
+      : profile(checked(table, 11, "pieces: (n, 11)"), table.shape(0),
+                checked(edges, 6, "edges: (n, 6)"), edges.shape(0), side) {
+    require(table.shape(0) > 0, "pieces: none");
+  }
+
+ private:
+  // before the profile reads the rows
+  static const double* checked(const In<2>& rows, std::size_t columns,
+                               const char* what) {
+    require(rows.shape(1) == columns, what);
+    return rows.data();
   }
 };
 

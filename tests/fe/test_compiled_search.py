@@ -100,6 +100,28 @@ def test_feet_of_any_point_are_those_of_numpy(contact, monkeypatch):
     assert (corners > 100) == elastic
 
 
+@pytest.mark.fe
+def test_minima_are_refined_as_in_numpy(contact, monkeypatch):
+    """Also where the closest point of the other flank is its corner."""
+    search, _, _, height = contact
+    rng = np.random.default_rng(11)
+    n, nodes = 2000, search.element.flank_size
+    low, high = search.element.flank_range
+    station, spacing = rng.uniform(low, high, n), 0.05 * (high - low)
+    # flanks shifted as a whole, so that some reach beyond the ends of the other one
+    mirrored = np.repeat(0.3 * height * rng.normal(size=(n, 1, 2)), nodes, axis=1)
+    sector = rng.integers(0, len(search.angle), n)
+    side = rng.integers(0, 2, n)
+    given = station, mirrored, sector, side, spacing
+    compiled, reference = both(monkeypatch, search)
+    wanted = reference._refine(*given)
+    np.testing.assert_allclose(compiled._refine(*given), wanted, rtol=0.0, atol=1e-12)
+    point, tangent, _ = reference._displaced(wanted, mirrored)
+    outward = np.stack([-tangent[:, 1], tangent[:, 0]], -1)
+    corner = reference._feet(point, outward, sector, side).feet.corner
+    assert (corner.sum() > 100) == (search.circular_spline.flank_dofs > 0)
+
+
 def test_other_curves_are_left_to_numpy():
     """A profile with an involute has no table of arcs and lines."""
     design = Design.load("reference-2d-involute").with_changes({"mesh.refinement": 0.5})
@@ -140,3 +162,6 @@ def test_arrays_that_do_not_fit_are_refused(contact):
             see(**wrong)
     with pytest.raises(ValueError):
         search.refine(np.zeros(3), np.zeros((3, 2, 2)), index, index, 1e-5)
+    for pieces, edges in (((2, 3), (0, 6)), ((2, 11), (1, 5)), ((0, 11), (0, 6))):
+        with pytest.raises(ValueError):
+            kernels().Flank(np.zeros(pieces), np.zeros(edges), 1.0)
