@@ -49,6 +49,36 @@ class Search:
         spacing: float,
     ) -> None: ...
 
+class StripProblems:
+    def __init__(
+        self,
+        columns: Array,
+        strip_columns: Array,
+        strip: Index,
+        closed: Mask,
+        force_unit: Array,
+        direction: Array,
+        by_value: Array,
+        by_strip: Array,
+        slope: Array,
+        offset: Array,
+        law: Array,
+    ) -> None: ...
+    def solve(
+        self,
+        offset: Array,
+        tolerance: Array,
+        tolerance_m: float,
+        tries: int,
+        singles: int,
+        chained: bool,
+        active: Mask,
+        result: Array,
+        approach: Array,
+        slope: Array,
+        solved: Mask,
+    ) -> None: ...
+
 def ellipse_distance(
     points: Array, major: float, minor: float, result: Array
 ) -> None: ...

@@ -54,10 +54,9 @@ def test_without_errors_the_perfect_drive_comes_back(reference):
     rest = at.respond(none, 0.0)
     assert rest.output_angle[0] == pytest.approx(state.rotation, abs=1e-15)
     assert rest.compliance[0] == pytest.approx(state.compliance, rel=1e-9)
-    assert rest.potential[0] == 0.0 and not rest.active.any()
-    # linear geometry against nonlinear, and the law of the strips about one force
+    assert abs(rest.potential[0]) < 1e-15 * state.energy and not rest.active.any()
     check_linear(without_strips(follow), 3e-3)
-    check_linear(follow, 1.5e-2)
+    check_linear(follow, 3e-3)
 
 
 def check_linear(follow, part):
@@ -97,8 +96,8 @@ def test_potential_is_the_integral_of_the_angle(reference):
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_superposition_is_within_five_percent_of_full_solves(reference, seed):
-    """Output error and energy at no load and at rated torque."""
+def test_superposition_is_within_two_percent_of_full_solves(reference, seed):
+    """Output error at no load and at rated torque."""
     follow, state, at = reference
     none = np.zeros((1, len(at.sector)))
     design = flawed(**ERRORS, seed=seed)
@@ -118,7 +117,8 @@ def test_superposition_is_within_five_percent_of_full_solves(reference, seed):
         found -= at.respond(none, torque).output_angle
         perfect = follow.to_torque(state, torque).rotation
         wanted = solved.output_error[solved.torque == torque] - perfect
-        assert np.abs(found - wanted).max() < 0.05 * spread
+        # with seed 2, one tooth carries 1600 N; the other positions are within 0.5 %
+        assert np.abs(found - wanted).max() < 0.02 * spread
         # to first order the gaps miss somewhere on the turn: contacts change
         first = every @ at.angle_by_gap
         assert np.abs(first - turn).max() > 0.05 * spread

@@ -58,9 +58,8 @@ def test_errors_of_the_wave_generator_are_superposed(flawed, perfect, torque):
     both = np.concatenate([teeth, outline], axis=1)
     found = perfect.with_supports().respond(both, torque).output_angle
     left_out = perfect.respond(teeth, torque).output_angle
-    # second order in micrometres, other contacts at the flanks: 1.5 %; strips of
-    # contact are stiffer on the wave generator with errors: 4 and 8 %
-    assert np.abs(found - exact).max() < 0.1 * np.abs(left_out - exact).max()
+    # second order in micrometres, other contacts at the flanks
+    assert np.abs(found - exact).max() < 0.03 * np.abs(left_out - exact).max()
 
 
 def test_energy_follows_the_outline(perfect):
@@ -83,15 +82,14 @@ def test_lot_holds_drives_that_are_solved_one_by_one(flawed, rests):
     pitch = np.round(lot.input_angle / pitch_of(DESIGN)).astype(np.int64)
     solved = full_solves(DESIGN, follow, itself, pitch, (0.0, 20.0))
     rated = solved.torque > 0.0
-    for ours, theirs in (
-        (lot.unloaded[0], solved.output_error[~rated]),
-        (lot.loaded[0], solved.output_error[rated]),
+    for ours, theirs, limit in (
+        (lot.unloaded[0], solved.output_error[~rated], 0.006),
+        # the drive is linearised without load; the mean wind-up is 0.3 % off
+        (lot.loaded[0], solved.output_error[rated], 0.016),
     ):
-        # the mean wind-up of the linear geometry is 0.3 % off
         difference = (ours - theirs) - np.mean(ours - theirs)
-        # 0.7 and 1.3 %, of which strips of contact, linearised without load, are 0.3 %
-        assert np.abs(difference).max() < 0.016 * np.ptp(theirs)
-        assert np.mean(ours) == pytest.approx(np.mean(theirs), abs=0.3e-6)
+        assert np.abs(difference).max() < limit * np.ptp(theirs)
+        assert abs(np.mean(ours - theirs)) < limit * np.ptp(theirs)
     assert np.abs(lot.unloaded[1] - lot.unloaded[0]).max() > 0.2 * np.ptp(lot.unloaded)
 
 

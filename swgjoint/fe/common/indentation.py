@@ -100,6 +100,13 @@ class Indentation:
         """Derivative of b^2 with respect to the force [m^2/N]."""
         return 2.0 * self.softness * self.radius
 
+    @property
+    def constants(self) -> Array:
+        """Constants k, A, b_0^2 and 2 k R of the law, in SI units (4,)."""
+        return np.array(
+            [self.softness, self._widest, self._narrowest, self._growth], dtype=float
+        )
+
     def approach(self, force: Array) -> Array:
         """Additional approach h [m] under non-negative forces [N]."""
         if np.isinf(self.radius):
@@ -240,25 +247,64 @@ class Strips:
     def linearise(self) -> tuple[Array, Array]:
         """Linear law for a drive that is linearised once to superpose tooth errors.
 
-        A loaded strip gets its tangent compliance. An unloaded strip may later carry
-        about as much force as the others, so it gets the secant up to their mean force.
         At least one strip must be loaded.
 
         Returns:
             Compliance (n, n) [m/N] and approach at zero force (n,) [m].
         """
+        same = self.strip[:, None] == self.strip
+        return np.where(same, self.line[self.strip], 0.0), self.offset
+
+    @property
+    def line(self) -> Array:
+        """Compliance of each strip in the law of :meth:`linearise` (n_strips,) [m/N].
+
+        A loaded strip gets its tangent compliance. An unloaded strip may later carry
+        about as much force as the others, so it gets the secant up to their mean force.
+        """
         law, force = self.law, self.force
         usual = force[force > 0.0].mean()
         secant = law.approach(usual) / usual
-        slope = np.where(force > 0.0, law.slope(force), secant)[self.strip]
-        same = self.strip[:, None] == self.strip
-        return np.where(same, slope, 0.0), self.offset
+        return np.where(force > 0.0, law.slope(force), secant)
+
+    @property
+    def line_offset(self) -> Array:
+        """Approach of each strip at zero force in that law (n_strips,) [m]."""
+        law, force = self.law, self.force
+        return np.asarray(law.approach(force) - law.slope(force) * force)
+
+    def excess(self, force: Array) -> tuple[Array, Array]:
+        """Approach of the strips beyond the linear law of :meth:`linearise`.
+
+        Args:
+            force: Forces of the strips (..., n_strips) [N]; negative ones count as
+                zero.
+
+        Returns:
+            Approach [m] and its derivative [m/N], each (..., n_strips).
+        """
+        some, law = np.maximum(force, 0.0), self.law
+        beyond = law.approach(some) - self.line * some - self.line_offset
+        return beyond, law.slope(some) - self.line
+
+    def excess_energy(self, force: Array) -> Array:
+        """Strain energy of the strips beyond that of the linear law (...) [J].
+
+        It is zero under the forces at which the law was linearised.
+
+        Args:
+            force: Forces of the strips (..., n_strips) [N]; negative ones count as
+                zero.
+        """
+        some, law = np.maximum(force, 0.0), self.law
+        beyond = law.energy(some) - law.energy(self.force)
+        beyond -= 0.5 * self.line * (some**2 - self.force**2)
+        return np.asarray(beyond.sum(axis=-1))
 
     @property
     def offset(self) -> Array:
         """Approach of each contact at zero force in the linearised law (n,) [m]."""
-        law, force = self.law, self.force
-        return (law.approach(force) - law.slope(force) * force)[self.strip]
+        return np.asarray(self.line_offset[self.strip])
 
     def error(self, force: Array) -> float:
         """Largest error [m] of the linearised law under contact forces (n,) [N]."""

@@ -19,11 +19,14 @@ its solution.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.common.pivoting import exchange, solve_active, solve_many
+from swgjoint.fe.common.indentation import Strips
+from swgjoint.fe.common.pivoting import exchange
+from swgjoint.fe.common.strip_problems import StripProblems
 from swgjoint.typing import Array, Index, Mask
 
 MOST_CHANGES = 60
@@ -87,6 +90,9 @@ class Influence:
     """Derivatives b of the output angle with respect to gap changes (n,) [rad/m]."""
     angle_by_torque: float
     """Derivative c of the output angle with respect to the torque [rad/(N·m)]."""
+    strips: Strips | None = None
+    """Contact strips of the teeth, whose indentation law is linearised in M; None if
+    the teeth do not indent or their law is linear."""
     supports: Array | None = None
     """Positions of the other contacts in the frame of the wave generator (m - n, 2)
     [m]; 2D models only."""
@@ -145,10 +151,14 @@ class Influence:
             start: Active sets of a nearby solution (n_sets, m); None for empty sets.
         """
         load = torque - self.torque
-        dg = gap_change
-        offset = self.slack + dg @ self.by_gap.T + load * self.by_torque
-        solution = solve_many(self.matrix, offset, start)
-        v = solution.value
+        offset = self.slack + gap_change @ self.by_gap.T + load * self.by_torque
+        solution = self._problems.solve(offset, start)
+        # the approach of the strips beyond their linear law acts like a gap change
+        dg, v = gap_change, solution.value
+        if self.strips is not None:
+            dg = gap_change.copy()
+            dg[:, : len(self.sector)] += solution.approach[:, self.strips.strip]
+            offset = self.slack + dg @ self.by_gap.T + load * self.by_torque
         angle = self.angle + v @ self.angle_by_value + dg @ self.angle_by_gap
         angle += load * self.angle_by_torque
 
@@ -160,15 +170,28 @@ class Influence:
         )
         sign = np.where(self.closed, 0.5, -0.5)
         potential = unchanged + np.sum(sign * v * offset, axis=1)
-
-        moves = solve_active(self.matrix, self.by_torque, solution.active)
-        slope = self.angle_by_torque + moves @ self.angle_by_value
+        if self.strips is not None:
+            potential += self.strips.excess_energy(solution.force)
+        slope = self.angle_by_torque + solution.slope
         ok = solution.solved
         return Response(
             output_angle=np.where(ok, angle, np.nan),
             potential=np.where(ok, potential, np.nan),
             compliance=np.where(ok, -slope, np.nan),
             active=solution.active,
+        )
+
+    @cached_property
+    def _problems(self) -> StripProblems:
+        """What the complementarity problems of all errors and torques share."""
+        return StripProblems(
+            matrix=self.matrix,
+            closed=self.closed,
+            by_load=self.by_torque,
+            by_value=self.angle_by_value,
+            strips=self.strips,
+            by_gap=self.by_gap[:, : len(self.sector)],
+            output_by_gap=self.angle_by_gap[: len(self.sector)],
         )
 
     def changes(self, low: float, high: float, contact: Index) -> ContactChanges:
@@ -247,6 +270,8 @@ class Gaps:
     (n, 2) [m/rad]."""
     carries: Mask
     """Whether each contact carries force (n,)."""
+    strips: Strips | None = None
+    """Contact strips whose law is linearised in the system; None without any."""
 
 
 def pivot_system(
@@ -304,6 +329,7 @@ def pivot_system(
         angle_by_value=exchanged[output, :m],
         angle_by_gap=forward[output, :n],
         angle_by_torque=sign * float(exchanged[output, output]),
+        strips=gaps.strips,
     )
 
 

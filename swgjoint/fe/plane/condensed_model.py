@@ -136,16 +136,23 @@ class CondensedModel:
             linear.circular_spline_elastic[contacts.tooth],
         )
         offset[:n] += contacts.gap - old
-        if model.indentation is not None:
-            strips = Strips.from_contacts(
-                model.indentation, contacts, state.contacts, state.tooth_force
-            )
-            compliant, approach = strips.linearise()
+        if self._strips is not None:
+            compliant, approach = self._strips.linearise()
             system[:n, :n] += compliant
             offset[:n] += approach
         if self.circular_spline_is_output:
             offset[n + 2] = -state.torque / model.copies
         return system, offset
+
+    @cached_property
+    def _strips(self) -> Strips | None:
+        """Contact strips of the teeth; None if the flanks do not indent."""
+        law, state = self.model.indentation, self.state
+        if law is None:
+            return None
+        return Strips.from_contacts(
+            law, self.contacts, state.contacts, state.tooth_force
+        )
 
     def _answers(self, response: Array) -> Array:
         """Changes of tooth gaps, anchor and rotation (n + 2, n_columns).
@@ -203,6 +210,9 @@ class CondensedModel:
                 ),
                 by_tilt=np.zeros((n, 2)),  # a 2D model has no axis to tilt
                 carries=self.carries,
+                strips=self._strips
+                if self._strips is not None and np.isfinite(self._strips.law.radius)
+                else None,
             ),
             closed_supports=supports.closed,
             free=[m, m + 1, m + 2] if self.circular_spline_is_output else [m],

@@ -33,14 +33,18 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array, Index
 
 PHASES = {"2d": 6, "3d": 4}
-"""Number of positions within a pitch; the effect of errors varies slowly over it."""
+"""Number of positions within a pitch; the effect of errors varies slowly over it. With
+four instead of six, the map of the reference drive with errors deviates from full
+solves by 9 instead of 8 % of the ripple of the input torque."""
 ALONE = 24
 """Number of positions if the cycle is a single pitch: no errors of teeth and axis."""
 POSITIONS = 40_000
 """Largest number of positions of the cycle, about two minutes of computation. It may be
 exceeded because every pitch has at least two positions."""
-LEVELS = (0.15, 0.45, 1.0)
-"""Sampled torques, of both signs, as fractions of the repeated peak torque [-]."""
+LEVELS = (0.15, 0.35, 0.65, 1.0)
+"""Sampled torques, of both signs, as fractions of the repeated peak torque [-]. What
+errors change varies slowly with the torque: twice as many torques do not make the map
+more accurate."""
 CHECKS = {"2d": 12, "3d": 3}
 """Number of positions that are also solved without linearisation to validate the map.
 Each of them takes half a minute in 3D."""

@@ -100,13 +100,15 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     that is fewer. An equilibrium where the stiffness is not positive would be unstable.
     """
     knots = drive.torsion_knots
-    x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
+    x = np.linspace(knots[0], knots[-1], 12 * knots.size)
     cycles = np.abs(drive.angle_orders @ np.array([1.0, 1.0 / drive.ratio]))
     fastest = max(1.0, float(cycles.max()))
     slowest = cycles[cycles > ROUND_OFF * fastest].min(initial=fastest)
     steps = ceil(PER_CYCLE * fastest / slowest)
     theta = np.linspace(0.0, 2.0 * np.pi / slowest, min(steps, MOST_ANGLES) + 1)
-    stiffness = drive.stiffness(x, theta, theta / drive.ratio)
+    # one matrix product: maps with tooth errors have hundreds of harmonics
+    phases, bend = drive.phases(theta, theta / drive.ratio), drive.coefficients(x, 2)
+    stiffness = bend[..., 0] @ np.cos(phases).T + bend[..., 1] @ np.sin(phases).T
     return [float(stiffness.min()), float(stiffness.max())]
 
 

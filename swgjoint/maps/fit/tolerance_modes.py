@@ -26,6 +26,11 @@ value of 0.01 would keep ten times as many, with orders that the time steps of m
 simulations do not resolve."""
 
 
+ALIKE = 2.0
+"""Largest ratio of the compliances of the linearised and the nonlinear drive without
+tooth errors [-]. If it is larger, only one of them has clearance at that torque."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToleranceModes:
     """Harmonics over the tooth cycle: values with tooth errors minus those without."""
@@ -67,8 +72,9 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
 
-    change = tabulated(tolerances.table)
-    change -= np.tile(tabulated(tolerances.perfect), (tolerances.pitches, 1))
+    table, perfect = registered(samples)
+    change = tabulated(table)
+    change -= np.tile(tabulated(perfect), (tolerances.pitches, 1))
     spectrum = np.fft.rfft(change, axis=0)[: (len(change) + 1) // 2] / len(change)
     spectrum[1:] *= 2.0
     modes = np.stack([spectrum.real, -spectrum.imag], axis=1)
@@ -79,6 +85,59 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
         potential=modes[:, :, :-1].reshape(len(modes), 2, 3, knots.size),
         error=modes[:, :, -1],
     )
+
+
+def registered(samples: MapSamples) -> tuple[Array, Array]:
+    """Tables with tooth errors and without, both based on the nonlinear solves.
+
+    Tooth errors are superposed on a linearised drive. Its stiffness differs from that
+    of the nonlinear drive, the more so the larger the torque. The changes due to the
+    errors are therefore taken at equal torque and added to the nonlinear solves.
+
+    Args:
+        samples: Samples with tolerances.
+
+    Returns:
+        Output error [rad], strain energy [J] and compliance [rad/(N·m)] with errors (3,
+        n_torques, pitches * phases) and without (3, n_torques, phases). They are those
+        of the linearised drive if only one of both drives has clearance.
+    """
+    tolerances = samples.tolerances
+    assert tolerances is not None
+    torque, shape = samples.torque[:, None], samples.output_error.shape
+    # the output error is the derivative of the complementary potential
+    curve = np.stack(
+        [
+            samples.energy + torque * samples.output_error,
+            samples.output_error,
+            -samples.compliance,
+        ]
+    )
+    at = tolerances.torque
+    potential, error, bend = interpolate_on_knots(
+        np.broadcast_to(torque, shape), curve, at
+    ).transpose(1, 2, 0)
+    nonlinear = _at_phases(
+        np.stack([error, potential - at[:, None] * error, -bend]), tolerances.phases
+    )
+    ratio = nonlinear[2] / tolerances.perfect[2]
+    if not ((ratio > 1.0 / ALIKE) & (ratio < ALIKE)).all():
+        return tolerances.table, tolerances.perfect
+    per_pitch = (3, at.size, tolerances.pitches, tolerances.phases)
+    moved = (nonlinear - tolerances.perfect)[:, :, None]
+    table = tolerances.table.reshape(per_pitch) + moved
+    return table.reshape(tolerances.table.shape), nonlinear
+
+
+def _at_phases(values: Array, phases: int) -> Array:
+    """Values over a pitch (..., n_angles) at other equal steps (..., phases)."""
+    n = values.shape[-1]
+    if n % phases == 0:
+        return values[..., :: n // phases]
+    modes = np.fft.rfft(values)[..., : (n + 1) // 2] / n
+    modes[..., 1:] *= 2.0
+    turn = 2j * np.pi * np.arange(modes.shape[-1]) / phases
+    return np.asarray((modes @ np.exp(np.outer(turn, np.arange(phases)))).real)
 
 
 def orders_of(waves: Index, samples: MapSamples) -> Index:

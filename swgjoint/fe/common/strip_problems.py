@@ -1,0 +1,272 @@
+r"""Many complementarity problems of one linearised drive whose teeth indent each other.
+
+All problems share the matrix M of :mod:`swgjoint.fe.common.influence`. It contains the
+line of the indentation law of each contact strip at one force, see
+:class:`swgjoint.fe.common.indentation.Strips`. Under tooth errors of several
+micrometres the force on a tooth changes from nothing to hundreds of newtons, and its
+strip becomes two to four times stiffer. The approach c of the strips beyond the line
+acts like an additional change of their gaps:
+
+.. math:: 0 \le v \perp w = q + M v + B c \ge 0 , \quad c_j = h(F_j) - s_j F_j - o_j ,
+
+with the force :math:`F_j` of strip j, the sum of the forces of its contacts.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from swgjoint.fe.common.indentation import Strips
+from swgjoint.fe.common.pivoting import (
+    SINGLES,
+    TOLERANCE,
+    TRIES,
+    solve_active,
+    solve_many,
+)
+from swgjoint.kernels import kernels
+from swgjoint.typing import Array, Index, Mask
+
+EXACT = 1e-14
+"""Largest error of the approach of a strip [m]."""
+ROUNDS = 60
+"""Largest number of corrections of the approach of the strips in the numpy version,
+each of which divides its error by about four."""
+PART = 32
+"""Number of problems that are solved one after another. Without a guess, each starts
+from the solution of the one before it: errors of neighbouring pitches are similar."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StripSolution:
+    """Solutions of :class:`StripProblems`, one problem per row; NaN if unsolved."""
+
+    value: Array
+    """Unknowns v, zero where not active (n_problems, m)."""
+    active: Mask
+    """Active sets (n_problems, m)."""
+    approach: Array
+    """Approach c of the strips beyond the line (n_problems, n_strips) [m]."""
+    force: Array
+    """Forces of the strips (n_problems, n_strips) [N]."""
+    slope: Array
+    """Derivative of a^T v + b^T c with respect to the load (n_problems,)."""
+    solved: Mask
+    """Whether each problem was solved (n_problems,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StripProblems:
+    """Matrix and strips that m contacts share, the first ones of them at teeth."""
+
+    matrix: Array
+    """Matrix M (m, m), positive definite."""
+    closed: Mask
+    """Whether the slack of a contact is its force, and its unknown the opening (m,)."""
+    by_load: Array
+    """Change of the offset q per unit of load (m,)."""
+    by_value: Array
+    """Change a of the output per unknown (m,)."""
+    strips: Strips | None
+    """Contact strips of the first contacts; None if the teeth do not indent."""
+    by_gap: Array
+    """Change of the offset per change of the gap of these contacts (m, n)."""
+    output_by_gap: Array
+    """Change of the output per change of the gap of these contacts (n,)."""
+
+    def solve(self, offset: Array, start: Mask | None = None) -> StripSolution:
+        """Solve the problems of all rows q of the offset.
+
+        Args:
+            offset: Offsets q (n_problems, m).
+            start: Guess of the active sets (n_problems, m); None for empty sets.
+        """
+        if kernels() is None:
+            return self._solve_in_rounds(offset, start)
+        solution = self._solve_compiled(offset, start)
+        failed = np.flatnonzero(~solution.solved)
+        if failed.size:
+            # Lemke's method, which only the numpy version has, may still find them
+            again = self._solve_in_rounds(offset[failed], None)
+            for key in ("value", "active", "approach", "force", "slope", "solved"):
+                getattr(solution, key)[failed] = getattr(again, key)
+        return solution
+
+    # -- strips ------------------------------------------------------------------------
+
+    @cached_property
+    def _strip(self) -> Index:
+        """Number of the strip of each contact, -1 without one (m,)."""
+        numbers = np.full(len(self.matrix), -1, dtype=np.int64)
+        if self.strips is not None:
+            numbers[: self.strips.strip.size] = self.strips.strip
+        return numbers
+
+    @cached_property
+    def _sums(self) -> Array:
+        """Matrix that adds up what belongs to a strip (n, n_strips)."""
+        if self.strips is None:
+            return np.zeros((self.by_gap.shape[1], 0))
+        sums = np.zeros((self.by_gap.shape[1], self.strips.force.size))
+        sums[np.arange(self.strips.strip.size), self.strips.strip] = 1.0
+        return sums
+
+    @cached_property
+    def by_strip(self) -> Array:
+        """Change B of the offset per approach of a strip (m, n_strips)."""
+        return np.asarray(self.by_gap @ self._sums)
+
+    @cached_property
+    def output_by_strip(self) -> Array:
+        """Change b of the output per approach of a strip (n_strips,)."""
+        return np.asarray(self.output_by_gap @ self._sums)
+
+    # -- numpy -------------------------------------------------------------------------
+
+    def _solve_in_rounds(self, offset: Array, start: Mask | None) -> StripSolution:
+        """Reference: solve with given approaches, correct them until they agree."""
+        count, strips = len(offset), self.strips
+        n = self._sums.shape[0]
+        approach = np.zeros((count, self._sums.shape[1]))
+        force, active = np.zeros_like(approach), start
+        agreed = np.full(count, strips is None)
+        for _ in range(ROUNDS):
+            solution = solve_many(
+                self.matrix, offset + approach @ self.by_strip.T, active
+            )
+            active = solution.active
+            if strips is None:
+                break
+            forces = np.where(self.closed, solution.slack, solution.value)
+            force = forces[:, :n] @ self._sums
+            wanted, _ = strips.excess(force)
+            agreed = np.abs(wanted - approach).max(axis=1) <= EXACT
+            if (agreed | ~solution.solved).all():
+                break
+            approach = np.where(solution.solved[:, None], wanted, approach)
+        solved = solution.solved & agreed
+        return StripSolution(
+            value=solution.value,
+            active=solution.active,
+            approach=approach,
+            force=force,
+            slope=np.where(solved, self._slopes(solution.active, force), np.nan),
+            solved=solved,
+        )
+
+    def _slopes(self, active: Mask, force: Array) -> Array:
+        """Derivative of the output with respect to the load (n_problems,)."""
+        if self.strips is None:
+            moves = solve_active(self.matrix, self.by_load, active)
+            return np.asarray(moves @ self.by_value)
+        _, derivative = self.strips.excess(force)
+        slope = np.empty(len(active))
+        n, count = self._sums.shape
+        for k, row in enumerate(active):
+            inside = np.flatnonzero(row)
+            # forces of the strips: unknowns of open contacts, slacks of closed ones
+            open_ = self._sums.T * (row & ~self.closed)[:n]
+            shut = self._sums.T * (self.closed & ~row)[:n]
+            into = np.zeros((count, len(row)))
+            into[:, :n] = open_
+            into = into + shut @ self.matrix[:n]
+            d = derivative[k][:, None]
+            system = np.block(
+                [
+                    [self.matrix[np.ix_(inside, inside)], self.by_strip[inside]],
+                    [
+                        -d * into[:, inside],
+                        np.eye(count) - d * (shut @ self.by_strip[:n]),
+                    ],
+                ]
+            )
+            right = [-self.by_load[inside], derivative[k] * (shut @ self.by_load[:n])]
+            try:
+                moves = np.linalg.solve(system, np.concatenate(right))
+            except np.linalg.LinAlgError:
+                moves = np.full(len(system), np.nan)
+            outputs = [self.by_value[inside], self.output_by_strip]
+            slope[k] = np.concatenate(outputs) @ moves
+        return slope
+
+    # -- compiled ----------------------------------------------------------------------
+
+    @cached_property
+    def _scale(self) -> Array:
+        """Square roots of the diagonal of the matrix (m,)."""
+        return np.asarray(np.sqrt(np.diag(self.matrix)))
+
+    @cached_property
+    def _compiled(self) -> Any:
+        """Matrix and strips as the compiled loop takes them, scaled."""
+        scale, strips = self._scale, self.strips
+        native = kernels()
+        assert native is not None
+        none = np.zeros(0)
+        law, line, offset = np.zeros(4), none, none
+        if strips is not None:
+            law, line, offset = strips.law.constants, strips.line, strips.line_offset
+        return native.StripProblems(
+            np.ascontiguousarray((self.matrix / scale[:, None] / scale).T),
+            np.ascontiguousarray((self.by_strip / scale[:, None]).T),
+            self._strip,
+            np.ascontiguousarray(self.closed),
+            np.where(self.closed, scale, 1.0 / scale),
+            self.by_load / scale,
+            self.by_value / scale,
+            self.output_by_strip,
+            line,
+            offset,
+            law,
+        )
+
+    def _solve_compiled(self, offset: Array, start: Mask | None) -> StripSolution:
+        """Block principal pivoting with Newton's method for the strips."""
+        scale, (count, m) = self._scale, offset.shape
+        n_strips = self._sums.shape[1]
+        q = offset / scale
+        tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
+        active = np.zeros((count, m), bool) if start is None else start.copy()
+        result, approach = np.empty((count, m)), np.empty((count, n_strips))
+        slope, solved = np.empty(count), np.empty(count, dtype=bool)
+        problems = self._compiled
+
+        def solve(part: slice) -> None:
+            problems.solve(
+                q[part],
+                tolerance[part],
+                EXACT,
+                TRIES,
+                SINGLES,
+                start is None,
+                active[part],
+                result[part],
+                approach[part],
+                slope[part],
+                solved[part],
+            )
+
+        parts = [slice(k, k + PART) for k in range(0, count, PART)]
+        if len(parts) == 1:
+            solve(parts[0])
+        else:
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                list(pool.map(solve, parts))
+        solved &= np.isfinite(result).all(axis=1) & np.isfinite(slope)
+        value = np.where(active, result, 0.0) / scale
+        slack = np.where(active, 0.0, result) * scale
+        forces = np.where(self.closed, slack, value)[:, : self._sums.shape[0]]
+        return StripSolution(
+            value=value,
+            active=active,
+            approach=approach,
+            force=forces @ self._sums,
+            slope=slope,
+            solved=solved,
+        )

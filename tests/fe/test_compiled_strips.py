@@ -1,0 +1,166 @@
+"""Problems with contact strips: their law, and the compiled loop against numpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.common.indentation import Indentation, Strips
+from swgjoint.fe.common.pivoting import exchange
+from swgjoint.fe.common.strip_problems import PART, StripProblems
+from swgjoint.kernels import kernels
+
+LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)
+TEETH, SUPPORTS, STATIONS = 12, 8, 3
+"""Teeth with a strip of three points each, and contacts without a strip."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """Contacts with gaps g = start + compliance F, and the problems around a state."""
+
+    compliance: np.ndarray
+    start: np.ndarray
+    problems: StripProblems
+    offset: np.ndarray
+
+
+def drive(seed: int = 1) -> Drive:
+    """Springs in parallel and on a common base; some teeth carry force at the start."""
+    rng = np.random.default_rng(seed)
+    teeth, contacts = TEETH * STATIONS, TEETH * STATIONS + SUPPORTS
+    mixed = rng.normal(size=(contacts, contacts))
+    compliance = 1e-9 * (np.eye(contacts) + 0.1 * mixed @ mixed.T)
+    strip = np.repeat(np.arange(TEETH), STATIONS)
+    loaded = np.where(np.arange(TEETH) % 3 == 0, rng.uniform(20.0, 90.0, TEETH), 0.0)
+    strips = Strips(law=LAW, strip=strip, force=loaded)
+    force = np.zeros(contacts)
+    force[:teeth:STATIONS] = loaded
+    force[teeth::2] = rng.uniform(10.0, 50.0, force[teeth::2].size)
+    closed = force > 0.0
+    system = compliance.copy()
+    system[:teeth, :teeth] += strips.linearise()[0]
+    gap = np.where(closed, 0.0, rng.uniform(1e-8, 5e-7, contacts))
+    exchanged, forward = exchange(system, np.flatnonzero(closed))
+    by_value, by_gap = rng.normal(size=contacts), rng.normal(size=teeth)
+    load = compliance @ rng.normal(size=contacts) * 50.0
+    return Drive(
+        compliance=compliance,
+        start=gap - compliance @ force,
+        offset=forward @ (gap - system @ force),
+        problems=StripProblems(
+            matrix=exchanged,
+            closed=closed,
+            by_load=forward @ load,
+            by_value=by_value,
+            strips=strips,
+            by_gap=forward[:, :teeth],
+            output_by_gap=by_gap,
+        ),
+    )
+
+
+def offsets(one: Drive, count: int, size: float = 4e-7) -> tuple[np.ndarray, ...]:
+    """Changes of the gaps (count, n) [m] and the offsets that they give (count, m)."""
+    rng = np.random.default_rng(2)
+    changes = rng.normal(size=(count, TEETH * STATIONS)) * size
+    return changes, one.offset + changes @ one.problems.by_gap.T
+
+
+def test_forces_and_gaps_obey_the_law_of_the_strips():
+    """Gaps follow from all forces and the approach; forces act where gaps are shut."""
+    one = drive()
+    changes, offset = offsets(one, 40)
+    # what the linearised law adds at zero force belongs to the start of the system
+    found = one.problems.solve(offset)
+    assert found.solved.all()
+    strips, m = one.problems.strips, len(one.start)
+    slack = offset + found.value @ one.problems.matrix.T
+    slack += found.approach @ one.problems.by_strip.T
+    force = np.where(one.problems.closed, slack, found.value)
+    force[np.abs(force) < 1e-6] = 0.0
+    assert (force >= 0.0).all() and (force > 0.0).any(axis=0).sum() > 0.6 * m
+    teeth, total = changes.shape[1], found.force
+    assert np.ptp(total, axis=0).min() > 20.0
+    gap = one.start + force @ one.compliance
+    start_approach = strips.law.approach(strips.force)
+    gap[:, :teeth] += changes
+    gap[:, :teeth] += (strips.law.approach(total) - start_approach)[:, strips.strip]
+    scale = np.abs(one.start).max()
+    # the start has the approach of its own forces
+    assert np.abs(gap[force > 0.0]).max() < 1e-7 * scale
+    assert gap.min() > -1e-7 * scale
+
+
+def test_slope_is_the_derivative_by_the_load():
+    """By differences of the output, strips included."""
+    one = drive()
+    _, offset = offsets(one, 20)
+    step, problems = 1e-5, one.problems
+
+    def output(load: float) -> np.ndarray:
+        there = problems.solve(offset + load * problems.by_load)
+        b = problems.output_by_strip
+        return there.value @ problems.by_value + there.approach @ b
+
+    found = problems.solve(offset)
+    slope = (output(step) - output(-step)) / (2.0 * step)
+    assert np.median(np.abs(slope / found.slope - 1.0)) < 1e-5
+    without = replace(problems, strips=None).solve(offset)
+    assert np.abs(without.slope / found.slope - 1.0).max() > 0.05
+
+
+@pytest.mark.skipif(kernels() is None, reason="built without compiled loops")
+@pytest.mark.parametrize("indents", [True, False])
+def test_compiled_loop_gives_what_numpy_gives(monkeypatch, indents):
+    """Unknowns, active sets, approaches and slopes, with and without a guess."""
+    one = drive()
+    problems = one.problems
+    if not indents:
+        problems = replace(problems, strips=None)
+    _, offset = offsets(one, PART + 7)
+    ours = problems.solve(offset)
+    again = problems.solve(offset, ours.active)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    theirs = problems.solve(offset)
+    assert np.array_equal(ours.active, theirs.active)
+    assert ours.active.any() and theirs.solved.all()
+    for one_of in (ours, again):
+        for key in ("value", "approach", "force", "slope"):
+            wanted = getattr(theirs, key)
+            scale = np.abs(wanted).max(initial=1e-300)
+            # both end when an approach is right to 1e-14 m of 1e-7 m
+            limit = (1e-6 if indents else 1e-11) * scale
+            assert np.abs(getattr(one_of, key) - wanted).max(initial=0.0) < limit
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    """Parts of fixed length are solved one after another."""
+    import os
+
+    one = drive()
+    _, offset = offsets(one, 3 * PART)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    alone = one.problems.solve(offset)
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    assert np.array_equal(one.problems.solve(offset).value, alone.value)
+
+
+@pytest.mark.parametrize("how", ["", "numpy"])
+def test_unsolvable_problems_are_nan(monkeypatch, how):
+    """A singular matrix, beside a problem that needs no exchange."""
+    monkeypatch.setenv("SWGJOINT_KERNELS", how)
+    problems = StripProblems(
+        matrix=np.array([[1.0, 1.0], [1.0, 1.0]]),
+        closed=np.zeros(2, dtype=bool),
+        by_load=np.ones(2),
+        by_value=np.ones(2),
+        strips=None,
+        by_gap=np.eye(2),
+        output_by_gap=np.ones(2),
+    )
+    found = problems.solve(np.array([[1.0, 1.0], [-1.0, -1.0]]))
+    assert found.solved[0] and not found.value[0].any() and not found.active[0].any()
+    assert not found.solved[1] and np.isnan(found.slope[1])
