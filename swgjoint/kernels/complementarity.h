@@ -1,6 +1,6 @@
 // Complementarity problems that share one matrix, with contact strips that indent.
 //
-// The compiled twin of solve_with_strips in swgjoint/fe/common/strip_problems.py, which
+// The compiled twin of StripProblems in swgjoint/fe/common/strip_problems.py, which
 // explains the problem.
 
 #ifndef SWGJOINT_KERNELS_COMPLEMENTARITY_H_

@@ -10,7 +10,7 @@ import pytest
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fit.fit import _end_at_largest_torque, fit_map
-from swgjoint.maps.fit.tolerance_modes import orders_of
+from swgjoint.maps.fit.tolerance_modes import orders_of, registered
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
@@ -99,6 +99,44 @@ def test_known_potential_of_both_angles_comes_back(layout):
         assert np.abs(energy - wanted).max() < 1e-4 * np.ptp(wanted) + 1e-10
         torque = K * x * (1 + waves(SWINGS, alpha, beta))
         assert np.abs(drive.torque(x, theta, ideal) - torque).max() < 1e-3 * K * 2e-3
+
+
+def test_stiffness_of_the_linearised_drive_does_not_matter():
+    """Only what errors change at a torque counts, unless clearances differ."""
+    samples = known("circular_spline_fixed")
+    exact = samples.tolerances
+    softer = replace(samples, tolerances=exact.in_series(0.1 / K))
+    for found, wanted in zip(
+        registered(softer), (exact.table, exact.perfect), strict=True
+    ):
+        assert np.abs(found - wanted).max() < 1e-12
+    loose = exact.in_series(10.0 / K)
+    table, perfect = registered(replace(samples, tolerances=loose))
+    assert np.array_equal(table, loose.table)
+    assert np.array_equal(perfect, loose.perfect)
+
+
+def test_errors_may_be_sampled_at_other_torques_and_phases():
+    """The drive without errors is interpolated over torque and angle."""
+    samples = known("circular_spline_fixed", phases=5)
+    rows = [0, 3, 6]
+    sampled = samples.tolerances
+    fewer = replace(
+        sampled,
+        torque=sampled.torque[rows],
+        table=sampled.table[:, rows],
+        perfect=sampled.perfect[:, rows],
+    )
+    shifted = replace(
+        samples,
+        torque=samples.torque * 1.1,
+        output_error=samples.output_error - 0.1 * samples.torque[:, None] / K,
+        energy=samples.energy + 0.5 * 0.21 * samples.torque[:, None] ** 2 / K,
+        tolerances=fewer,
+    )
+    table, perfect = registered(shifted)
+    assert np.abs(perfect - fewer.perfect).max() < 1e-12
+    assert np.abs(table - fewer.table).max() < 1e-12
 
 
 def test_forces_are_the_gradient_of_the_potential():
