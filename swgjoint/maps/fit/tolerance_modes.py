@@ -26,7 +26,7 @@ value of 0.01 would keep ten times as many, with orders that the time steps of m
 simulations do not resolve."""
 
 
-ALIKE = 2.0
+ALIKE = 20.0
 """Largest ratio of the compliances of the linearised and the nonlinear drive without
 tooth errors [-]. If it is larger, only one of them has clearance at that torque."""
 
