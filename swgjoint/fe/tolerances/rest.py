@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from swgjoint.fe.tolerances.cycle import pitch_of
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import with_perfect_teeth
+from swgjoint.typing import Array
 
 PHASES = 4
 """Number of positions within a pitch; the effect of errors varies slowly over it."""
@@ -68,24 +69,26 @@ class Rest:
         """State and influence from which to superpose errors under a torque [N·m]."""
         return self.loaded.get(torque, self.sides[0 if torque >= 0.0 else 1])
 
-    def with_loads(self, follow: Follower[Any], torques: Sequence[float]) -> Rest:
+    def under_both_signs(self, follow: Follower[Any], levels: Array) -> Rest:
         """The position with linearisations under load.
 
         With some wave generators the contacts change so much between zero and rated
         torque that a drive linearised at zero torque has twenty times the ripple of the
-        nonlinear one.
+        nonlinear one. If a torque cannot be solved, it and all larger ones of its sign
+        are left out.
 
         Args:
             follow: Solver of the drive with perfect teeth.
-            torques: Torques of one sign, in increasing distance from zero [N·m]. The
-                first one that cannot be solved ends the sequence.
+            levels: Magnitudes of the torques, increasing (n,) [N·m].
         """
-        loaded, state = dict(self.loaded), self.near(torques[0])[0]
-        for torque in torques:
-            state = follow.to_torque(state, torque)
-            if not state.outcome.ok:
-                break
-            loaded[torque] = state, follow.influence(state)
+        loaded = {}
+        for sign in (1.0, -1.0):
+            state = self.near(sign)[0]
+            for torque in (sign * levels).tolist():
+                state = follow.to_torque(state, torque)
+                if not state.outcome.ok:
+                    break
+                loaded[torque] = state, follow.influence(state)
         return replace(self, loaded=loaded)
 
 

@@ -20,7 +20,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import FAINT, across_clearance
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
-from swgjoint.fe.tolerances.rest import SMALL, Rest, influences, perfect_drive
+from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import (
     has_errors,
@@ -96,13 +96,12 @@ def sample_tolerances(
         most = PHASES[model] if pitches_of(design) > 1 else ALONE
         phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
     own_reference = has_errors(with_perfect_teeth(design))
-    positions = phases * (2 if own_reference else 1)
-    tick = _stage(progress, design, 1, positions * (2 if model == "2d" else 1))
+    tick = _stage(progress, design, 1, phases * (2 if own_reference else 1))
     options: dict[str, Any] = {"phases": phases, "model": model, "tick": tick}
     follow, linear = influences(design, **options)
-    reference = linear
+    ideal_drive, reference = follow, linear
     if own_reference:
-        reference = influences(without_errors(design), **options)[1]
+        ideal_drive, reference = influences(without_errors(design), **options)
     pitches = np.arange(pitches_of(design), dtype=np.int64)
     errors = gap_errors(design, pitches)
     none = tuple(np.zeros_like(one[:1]) for one in errors)
@@ -111,22 +110,19 @@ def sample_tolerances(
     has_play = any(rest.opposite is not None for rest in (*linear, *reference))
     if has_play:
         levels = np.append(small, levels)
-    elif model == "2d":
-        # in 3D a linearisation takes minutes, so that only the unloaded one is used
-        linear = _linearised_under(follow, linear, levels, tick)
-        if own_reference:
-            flawless_drive = perfect_drive(without_errors(design))
-            reference = _linearised_under(flawless_drive, reference, levels, tick)
-        else:
-            reference = linear
+    # in 3D a linearisation takes minutes, so that only the unloaded one is used
+    under_load = levels if model == "2d" and not has_play else levels[:0]
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
     steps = loads * -(-pitches.size // CHUNK)  # number of chunks, rounded up
     tick = _stage(progress, design, 2, phases * steps)
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
+        flawless = loaded = flawless.under_both_signs(ideal_drive, under_load)
         if there is None:
-            phase_table, count = _over_torque(rest, errors, levels, small, tick)
+            if own_reference:
+                loaded = rest.under_both_signs(follow, under_load)
+            phase_table, count = _over_torque(loaded, errors, levels, small, tick)
         else:
             phase_table, count = there
             tick(steps)
@@ -170,21 +166,6 @@ def sample_tolerances(
         free=free,
         solved=solved,
     )
-
-
-def _linearised_under(
-    follow: Follower[Any],
-    rests: Sequence[Rest],
-    levels: Array,
-    tick: Callable[[], None],
-) -> list[Rest]:
-    """Positions with linearisations under all torques of both signs."""
-    positions, up = [], levels.tolist()
-    for rest in rests:
-        loaded = rest.with_loads(follow, up)
-        positions.append(loaded.with_loads(follow, [-t for t in up]))
-        tick()
-    return positions
 
 
 def full_solves(
@@ -311,12 +292,13 @@ def _over_torque(
             tick()
     sides = []
     for sign in (-1.0, 1.0):
-        active, rows = at_rest, []
+        active, before, rows = at_rest, rest.near(0.0)[1], []
         for level in levels:
-            torque = sign * level
+            at = rest.near(sign * level)[1]
             # a guess is of use only for the same contacts
-            known = None if torque in rest.loaded else active
-            level_row, active = row(torque, slice(None), known, tick)
+            known = active if at is before else None
+            level_row, active = row(sign * level, slice(None), known, tick)
+            before = at
             rows.append(level_row)
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
