@@ -10,7 +10,7 @@ import pytest
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fit.fit import _end_at_largest_torque, fit_map
-from swgjoint.maps.fit.tolerance_modes import orders_of, registered
+from swgjoint.maps.fit.tolerance_modes import orders_of, register_by_torque
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
@@ -107,11 +107,11 @@ def test_stiffness_of_the_linearised_drive_does_not_matter():
     exact = samples.tolerances
     softer = replace(samples, tolerances=exact.in_series(0.1 / K))
     for found, wanted in zip(
-        registered(softer), (exact.table, exact.perfect), strict=True
+        register_by_torque(softer), (exact.table, exact.perfect), strict=True
     ):
         assert np.abs(found - wanted).max() < 1e-12
     loose = exact.in_series(100.0 / K)
-    table, perfect = registered(replace(samples, tolerances=loose))
+    table, perfect = register_by_torque(replace(samples, tolerances=loose))
     assert np.array_equal(table, loose.table)
     assert np.array_equal(perfect, loose.perfect)
 
@@ -134,7 +134,7 @@ def test_errors_may_be_sampled_at_other_torques_and_phases():
         energy=samples.energy + 0.5 * 0.21 * samples.torque[:, None] ** 2 / K,
         tolerances=fewer,
     )
-    table, perfect = registered(shifted)
+    table, perfect = register_by_torque(shifted)
     assert np.abs(perfect - fewer.perfect).max() < 1e-12
     assert np.abs(table - fewer.table).max() < 1e-12
 

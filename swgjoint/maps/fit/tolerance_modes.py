@@ -72,7 +72,7 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
 
-    table, perfect = registered(samples)
+    table, perfect = register_by_torque(samples)
     change = tabulated(table)
     change -= np.tile(tabulated(perfect), (tolerances.pitches, 1))
     spectrum = np.fft.rfft(change, axis=0)[: (len(change) + 1) // 2] / len(change)
@@ -87,7 +87,7 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
     )
 
 
-def registered(samples: MapSamples) -> tuple[Array, Array]:
+def register_by_torque(samples: MapSamples) -> tuple[Array, Array]:
     """Tables with tooth errors and without, both based on the nonlinear solves.
 
     Tooth errors are superposed on a linearised drive. Its stiffness differs from that
