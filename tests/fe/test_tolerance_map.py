@@ -74,6 +74,7 @@ def test_turn_of_the_map_is_that_of_the_superposition(drive):
     assert turn == pytest.approx(wanted, rel=0.05)
 
 
+@pytest.mark.timeout(1800)  # about 300 CPU seconds
 def test_map_of_the_bundled_drive_meets_full_solves():
     """Between its torques and angles, within 10 % of the ripple over the whole turn."""
     design = Design.load("reference-2d-tolerances")
