@@ -205,7 +205,7 @@ def test_a_map_is_kept_before_its_equilibria_are_removed(monkeypatch, tmp_path):
 @pytest.mark.fe
 def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_path):
     """Every torque of every position in the pitch is a step; finished ones are kept."""
-    monkeypatch.setattr(tolerance_sampling, "LEVELS", (1.0,))
+    monkeypatch.setitem(tolerance_sampling.LEVELS, "2d", (1.0,))
     monkeypatch.setitem(tolerance_sampling.CHECKS, "2d", 1)
     monkeypatch.setattr(tolerance_sampling, "CHUNK", 62)
     design = few_teeth(**{"tolerances.circular_spline_eccentricity_um": 5.0})
