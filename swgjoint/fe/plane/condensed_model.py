@@ -146,9 +146,9 @@ class CondensedModel:
 
     @cached_property
     def _strips(self) -> Strips | None:
-        """Contact strips of the teeth; None if the flanks do not indent."""
+        """Contact strips of the teeth; None if the flanks conform or do not indent."""
         law, state = self.model.indentation, self.state
-        if law is None:
+        if law is None or np.isinf(law.radius):
             return None
         return Strips.from_contacts(
             law, self.contacts, state.contacts, state.tooth_force
@@ -210,9 +210,7 @@ class CondensedModel:
                 ),
                 by_tilt=np.zeros((n, 2)),  # a 2D model has no axis to tilt
                 carries=self.carries,
-                strips=self._strips
-                if self._strips is not None and np.isfinite(self._strips.law.radius)
-                else None,
+                strips=self._strips,
             ),
             closed_supports=supports.closed,
             free=[m, m + 1, m + 2] if self.circular_spline_is_output else [m],

@@ -24,8 +24,6 @@ KEEP_TORQUE = 0.05
 the largest one [-]. Random tooth errors spread the torque over thousands of orders. A
 value of 0.01 would keep ten times as many, with orders that the time steps of most
 simulations do not resolve."""
-
-
 ALIKE = 20.0
 """Largest ratio of the compliances of the linearised and the nonlinear drive without
 tooth errors [-]. If it is larger, only one of them has clearance at that torque."""
