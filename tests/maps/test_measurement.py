@@ -13,6 +13,7 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.file import map_bytes
+from swgjoint.maps.fit.torsion_fit import REACHES, fit_torsion
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.sheet.loop import TorqueLoop, torque_loop
 from swgjoint.units import arcmin, deg
@@ -131,6 +132,30 @@ def test_one_lap_of_few_samples_is_enough(tmp_path):
     wanted, ours = drive.spec_sheet(SHEET), found.spec_sheet(SHEET)
     for key in SHEET:
         assert ours[key] == pytest.approx(wanted[key], rel=0.02)
+
+
+def test_round_off_does_not_choose_the_elements():
+    """Samples farther apart than most yield torsions: the fit is still unique."""
+    drive = replace(
+        DriveMap.linear(2e4, rated_torque=50.0, **TEETH),
+        hysteresis=(Jenkin(stiffness=2e4, yield_torque=2.0),),
+    )
+    loop = torque_loop(drive)
+    keep = np.arange(0, loop.torque.size, 6)
+    fits = [
+        fit_torsion(
+            replace(
+                loop,
+                torque=loop.torque[keep]
+                * (1.0 + 1e-13 * rng.standard_normal(len(keep))),
+                torsion=loop.torsion[keep],
+            )
+        )
+        for rng in map(np.random.default_rng, range(4))
+    ]
+    assert len(fits[0].yields) < len(REACHES)
+    for fit in fits[1:]:
+        np.testing.assert_allclose(fit.yields, fits[0].yields, rtol=1e-6, atol=1e-9)
 
 
 def test_a_lens_is_many_elements(tmp_path):

@@ -26,6 +26,9 @@ FAINT = 1e-3
 """Hysteresis below this fraction of the largest torque is neglected [-]. The same
 fraction of the total yield torque applies to single elements."""
 
+# of the part of a candidate's signal that neither the spring nor the candidates before
+# it have; samples that are farther apart than two yield torsions leave only round-off
+_DISTINCT = 1e-9
 # weight of the second difference of the stiffness, which matters only without data
 _SMOOTH = 1e-4
 _SIGNIFICANT = 20.0  # threshold of an F test, far above the effect of noise
@@ -103,10 +106,12 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
     a given yield torsion, the torque of an element along the record is its yield torque
     times a known signal. Samples enter the fit once the record has covered a torsion
     range of twice the largest yield torsion, after which its start no longer affects
-    the elements. Elements are kept if they reduce the residual by more than noise
-    could. A record with one direction of the torque has none. A loop of another kind,
-    such as one whose width in torque is smallest in the middle, leaves a residual,
-    which the report states.
+    the elements. Candidates that stick for less than the distance of the samples all
+    have the same signal; the one with the largest yield torsion stands for them, so
+    that the solution is unique. Elements are kept if they reduce the residual by more
+    than noise could. A record with one direction of the torque has none. A loop of
+    another kind, such as one whose width in torque is smallest in the middle, leaves a
+    residual, which the report states.
 
     Args:
         loop: Measured loop with both signs of the torque.
@@ -120,15 +125,17 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
         known[:] = True
     torque, x = loop.torque[known], loop.torsion[known]
     count = max(1, min(intervals, np.unique(torque).size // 3))
+    knots = np.linspace(x.min(), x.max(), count + 1)
+    signals = np.column_stack([stretches(loop.torsion, d)[known] / d for d in reaches])
+    distinct = _distinct(_spring_basis(x, knots), signals)
+    reaches, signals = reaches[distinct], signals[:, distinct]
     record = LoopRecord(
         loop=loop,
         torque=torque,
         torsion=x,
-        knots=np.linspace(x.min(), x.max(), count + 1),
+        knots=knots,
         reaches=reaches,
-        signals=np.column_stack(
-            [stretches(loop.torsion, d)[known] / d for d in reaches]
-        ),
+        signals=signals,
     )
     plain = _solve(x, torque, record.knots, record.signals[:, :0])
     solution = plain
@@ -198,7 +205,7 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
     count, elements = knots.size - 1, signals.shape[1]
     h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
     # unknowns: torques relative to h * secant, stiffness relative to the secant
-    basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h, signals])
+    basis = np.column_stack([_spring_basis(x, knots), signals])
     bend = np.zeros((max(0, count - 1), basis.shape[1]))
     for row in range(len(bend)):
         bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
@@ -214,6 +221,32 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
         error=(basis @ solution.x) * (h * secant) - torque,
         bounded=solution.active_mask,
     )
+
+
+def _distinct(spring: Array, signals: Array) -> Array:
+    """Which signals are not sums of the spring and the signals before them. Bool (m,).
+
+    Args:
+        spring: Columns of the spring. Shape (n, k), n >= k.
+        signals: Signals of the candidate elements. Shape (n, m).
+    """
+    known = np.linalg.qr(spring)[0]
+    keep = np.zeros(signals.shape[1], dtype=bool)
+    for i, signal in enumerate(signals.T):
+        rest = signal.copy()
+        for _ in range(2):  # once more removes what the first pass leaves by round-off
+            rest -= known @ (known.T @ rest)
+        size = np.linalg.norm(rest)
+        keep[i] = size > _DISTINCT * np.linalg.norm(signal)
+        if keep[i]:
+            known = np.column_stack([known, rest / size])
+    return keep
+
+
+def _spring_basis(x: Array, knots: Array) -> Array:
+    """Torque of the spring per unit of its unknowns [-]. Shape (n, n_knots + 1)."""
+    h = float(knots[1] - knots[0])
+    return np.column_stack([np.ones_like(x), _integrals(x, knots) / h])
 
 
 def _integrals(x: Array, knots: Array) -> Array:
