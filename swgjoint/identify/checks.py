@@ -12,6 +12,7 @@ from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.identify.log import BenchLog
+from swgjoint.identify.unknowns import SPRINGS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.loop_units import TORSION_AT_RATED
 from swgjoint.typing import Array
@@ -171,7 +172,7 @@ def doubts_of(
 
 
 def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> list[str]:
-    """Notes on sensor offsets, the averaging window and units.
+    """Notes on lines that the log does not reach, sensor offsets, window and units.
 
     Args:
         model: The fitted model.
@@ -184,6 +185,14 @@ def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> li
         if abs(r.mean()) > r.std()
     ]
     notes = []
+    if model.spring == "three_lines" and len(model.slopes) < 3:
+        corner = ("T1", "T2")[len(model.slopes) - 1]
+        missing = " and ".join(SPRINGS["three_lines"][len(model.slopes) :])
+        notes.append(
+            f"the log reaches {model.largest_torque:.3g} N·m, below the corner {corner}"
+            f" {getattr(model.ratings, corner):.3g} N·m: no {missing}; beyond the log"
+            f" the map continues with {model.slopes[-1]}"
+        )
     if offset:
         notes.append(
             f"mean of measured minus modelled torque: {', '.join(offset)}; offset of a"

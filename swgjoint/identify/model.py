@@ -263,13 +263,38 @@ class Model:
         return float(np.abs(n @ np.diff(angles)).max(initial=0.0))
 
     @cached_property
+    def largest_torque(self) -> float:
+        """Largest output torque in the fit, by either channel [N·m]."""
+        at_output = {"output_torque": 1.0, "motor_torque": abs(self.ratio)}
+        return max(
+            at_output[key] * float(np.abs(x).max())
+            for key, x in self.measured_torques().items()
+        )
+
+    @cached_property
+    def slopes(self) -> tuple[str, ...]:
+        """Stiffness parameters that the log can determine.
+
+        K2 matters only above T1 and K3 only above T2.
+        """
+        names = SPRINGS[self.spring]
+        if self.spring == "cubic":
+            return names
+        corners = (0.0, self.ratings.T1, self.ratings.T2)
+        return tuple(
+            name
+            for name, corner in zip(names, corners, strict=True)
+            if self.largest_torque > corner
+        )
+
+    @cached_property
     def unknowns(self) -> tuple[ModelParameter, ...]:
         """Parameters in the order of all arrays of values."""
         return tuple(unknowns_of(self))
 
     def amplitudes(self, values: Array) -> Array:
         """Cosine and sine amplitudes of the kinematic error [rad]. (n_harmonics, 2)."""
-        first = len(SPRINGS[self.spring]) + 2 + 2 * self.hysteresis
+        first = len(self.slopes) + 2 + 2 * self.hysteresis
         return values[first : first + 2 * len(self.orders)].reshape(-1, 2)
 
     def _spring(self, p: Mapping[str, float], x: Array) -> Array:
@@ -293,9 +318,11 @@ def lines_of(model: Model, p: Mapping[str, float]) -> tuple[Array, Array]:
 
     Returns:
         Knots and stiffness; each stiffness parameter is at least a small positive one.
+        Beyond the torques of the log, the last known line goes on.
     """
     r, least = model.ratings, _SOFTEST * model.mean_stiffness
-    K1, K2, K3 = (max(float(p[k]), least) for k in SPRINGS["three_lines"])
+    known = [max(float(p[k]), least) for k in model.slopes]
+    K1, K2, K3 = known + [known[-1]] * (3 - len(known))
     top = max(r.momentary_peak, 1.5 * r.T2)
     return three_lines(r.T1, r.T2, K1, K2, K3, largest=top)
 

@@ -45,7 +45,7 @@ def unknowns_of(model: Model) -> list[ModelParameter]:
     def slope(name: str) -> ModelParameter:
         return ModelParameter(name=name, unit="N·m/rad", start=K, scale=K)
 
-    unknowns = [slope(name) for name in SPRINGS[model.spring]]
+    unknowns = [slope(name) for name in model.slopes]
     if model.spring == "cubic":
         cubic = ModelParameter(
             name="hardening", unit="N·m/rad³", start=0.0, scale=K / x**2

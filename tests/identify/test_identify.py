@@ -347,6 +347,26 @@ def test_one_torque_is_enough(bench, absent):
     assert has == (absent == "output_torque") == (found.drive.friction is not None)
 
 
+def test_a_line_that_the_log_does_not_reach_is_left_out(bench):
+    """T2 above every torque of the log: no K3, which would be any number."""
+    drive, rows, truth = bench
+    high = replace(drive.ratings, T2=200.0)
+    found = identify(log_of(rows), **settings(drive) | {"ratings": high})
+    assert "K3" not in found.estimates
+    # one line in place of two
+    assert 0.9 * truth["K1"] < found.estimates["K1"].value < 1.1 * truth["K1"]
+    assert truth["K2"] < found.estimates["K2"].value < truth["K3"]
+    assert any("T2 200 N·m: no K3" in note for note in found.notes)
+    # the error and the friction do not depend on it
+    assert found.estimates["error_2_0_cos"].value == pytest.approx(
+        truth["error_2_0_cos"], rel=0.05
+    )
+    # beyond the log the last line goes on
+    np.testing.assert_allclose(
+        found.drive.end_stiffness[0, 0], found.estimates["K2"].value, rtol=1e-9
+    )
+
+
 @pytest.mark.parametrize("layout", ["flexspline_fixed", "circular_spline_fixed"])
 def test_zero_of_the_encoder_turns_the_error(bench, layout):
     """A log whose motor counts from elsewhere gives the same map."""
