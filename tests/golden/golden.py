@@ -46,6 +46,9 @@ VOLATILE += ("created", "von_mises_at")
 The largest stress of a symmetric drive occurs at several places; round-off picks one.
 """
 
+SETTING = ("level", "integrator", "step_s")
+"""Keys of a row of a search, which is in the order of its cost."""
+
 LONG_TABLE = 60
 """Rows of a table beyond which its columns are summed."""
 
@@ -85,9 +88,11 @@ def stable(value: Any, folder: str) -> Any:
             if key not in timed and not any(part in key for part in VOLATILE)
         }
     if isinstance(value, list):
-        items = [stable(item, folder) for item in value]
         if any(isinstance(item, dict) and "cost" in item for item in value):
-            items.sort(key=json.dumps)  # they are in the order of their cost
+            # a search by cost: the timing decides what else is tried, and its order
+            value = [item for item in value if item.get("within", True)]
+            value.sort(key=lambda item: [str(item.get(k)) for k in SETTING])
+        items = [stable(item, folder) for item in value]
         return summed(items) if len(items) > LONG_TABLE else items
     if isinstance(value, str):
         # sentences may improve; what they must name is tested where they arise
@@ -117,13 +122,17 @@ def map_content(path: Path) -> dict[str, Any]:
     """Arrays of a map by their sums, and a hash of all their bytes."""
     drive = DriveMap.load(path)
     arrays = {k: v for k, v in vars(drive).items() if isinstance(v, np.ndarray)}
+    # energies instead of coefficients, of which the highest are round-off over a short
+    # interval to the fourth power
+    interval = np.diff(drive.torsion_knots)[:, None]
+    energies = {"potential": drive.potential * interval ** np.arange(5)}
     digest = hashlib.sha256()
     for key in sorted(arrays):
         digest.update(key.encode() + np.ascontiguousarray(arrays[key]).tobytes())
     return {
         "sums": {
             key: [list(array.shape), float(np.abs(array).sum())]
-            for key, array in sorted(arrays.items())
+            for key, array in sorted((arrays | energies).items())
         },
         "sha256": digest.hexdigest(),
         "info": stable(json.loads(json.dumps(drive.info, default=str)), str(path)),
