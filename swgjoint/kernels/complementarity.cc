@@ -21,6 +21,18 @@ SWGJOINT_WIDE void add_multiple(double* y, const double* x, double a, std::size_
   for (std::size_t i = 0; i < n; ++i) y[i] += a * x[i];
 }
 
+// y -= a[0] x[0] + a[1] x[1] + ..., one product after another
+SWGJOINT_WIDE void subtract_four(double* y, const double* const* x, const double* a,
+                                 std::size_t n) {
+  const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
+  const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+  for (std::size_t i = 0; i < n; ++i) {
+    y[i] = y[i] - a0 * x0[i] - a1 * x1[i] - a2 * x2[i] - a3 * x3[i];
+  }
+}
+
+constexpr std::size_t kPanel = 4;  // columns that are eliminated at once
+
 }  // namespace
 
 double StripLaw::excess(std::size_t strip, double force, double* derivative) const {
@@ -172,21 +184,37 @@ void StripSolver::assemble(const double* offset, const bool* active) {
 bool StripSolver::factorise() {
   const std::size_t size = right_.size();
   pivots_.resize(size);
-  for (std::size_t c = 0; c < size; ++c) {
-    std::size_t best = c;
-    for (std::size_t i = c + 1; i < size; ++i) {
-      if (std::abs(matrix_[i * size + c]) > std::abs(matrix_[best * size + c])) best = i;
+  for (std::size_t first = 0; first < size; first += kPanel) {
+    const std::size_t end = std::min(first + kPanel, size), rest = size - end;
+    for (std::size_t c = first; c < end; ++c) {
+      std::size_t best = c;
+      for (std::size_t i = c + 1; i < size; ++i) {
+        if (std::abs(matrix_[i * size + c]) > std::abs(matrix_[best * size + c])) best = i;
+      }
+      const double pivot = matrix_[best * size + c];
+      if (!(std::abs(pivot) > 0.0)) return false;
+      pivots_[c] = best;
+      double* own = matrix_.data() + c * size;
+      if (best != c) std::swap_ranges(own, own + size, matrix_.data() + best * size);
+      for (std::size_t i = c + 1; i < size; ++i) {
+        double* row = matrix_.data() + i * size;
+        const double part = row[c] /= pivot;
+        for (std::size_t k = c + 1; k < end; ++k) row[k] -= part * own[k];
+      }
     }
-    const double pivot = matrix_[best * size + c];
-    if (!(std::abs(pivot) > 0.0)) return false;
-    pivots_[c] = best;
-    double* own = matrix_.data() + c * size;
-    if (best != c) std::swap_ranges(own, own + size, matrix_.data() + best * size);
-    for (std::size_t i = c + 1; i < size; ++i) {
+    // the columns after the panel: first in its own rows, then in those below
+    const double* rows[kPanel];
+    for (std::size_t c = first; c < end; ++c) {
+      double* own = matrix_.data() + c * size;
+      rows[c - first] = own + end;
+      for (std::size_t b = first; b < c; ++b) {
+        add_multiple(own + end, rows[b - first], -own[b], rest);
+      }
+    }
+    if (rest == 0) break;
+    for (std::size_t i = end; i < size; ++i) {
       double* row = matrix_.data() + i * size;
-      if (row[c] == 0.0) continue;
-      const double part = row[c] /= pivot;
-      add_multiple(row + c + 1, own + c + 1, -part, size - c - 1);
+      subtract_four(row + end, rows, row + first, rest);
     }
   }
   return true;

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
+from swgjoint.fe.common.pivot_base import similar_parts
 from swgjoint.fe.common.pivoting import exchange
-from swgjoint.fe.common.strip_problems import PART, StripProblems
+from swgjoint.fe.common.strip_problems import FEW, PART, StripProblems
 from swgjoint.kernels import kernels
 
 LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)
@@ -114,8 +116,10 @@ def test_slope_is_the_derivative_by_the_load():
 
 @pytest.mark.skipif(kernels() is None, reason="built without compiled loops")
 @pytest.mark.parametrize("indents", [True, False])
-def test_compiled_loop_gives_what_numpy_gives(monkeypatch, indents):
-    """Unknowns, active sets, approaches and slopes, with and without a guess."""
+@pytest.mark.parametrize("few", [0, FEW])
+def test_compiled_loop_gives_what_numpy_gives(monkeypatch, indents, few):
+    """Unknowns, active sets, approaches and slopes, also from a guess or a base."""
+    monkeypatch.setattr(strip_problems, "FEW", few)
     one = drive()
     problems = one.problems
     if not indents:
@@ -137,15 +141,28 @@ def test_compiled_loop_gives_what_numpy_gives(monkeypatch, indents):
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    """Parts of fixed length are solved one after another."""
+    """Groups of fixed length are solved one after another."""
     import os
 
+    monkeypatch.setattr(strip_problems, "GROUP", 2)
     one = drive()
-    _, offset = offsets(one, 3 * PART)
+    _, offset = offsets(one, 5 * PART)
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     alone = one.problems.solve(offset)
     monkeypatch.setattr(os, "cpu_count", lambda: 3)
     assert np.array_equal(one.problems.solve(offset).value, alone.value)
+
+
+def test_parts_are_similar():
+    """Every problem once; the spread in a part is a fraction of that of all."""
+    rng = np.random.default_rng(3)
+    place = rng.normal(size=(500, 2))
+    offset = place @ rng.normal(size=(2, 40))
+    parts = similar_parts(offset, 20)
+    assert sorted(np.concatenate(parts).tolist()) == list(range(500))
+    assert max(map(len, parts)) <= 20
+    inside = np.mean([place[part].var(axis=0).sum() for part in parts])
+    assert inside < 0.15 * place.var(axis=0).sum()
 
 
 @pytest.mark.parametrize("how", ["", "numpy"])

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.fe.common.indentation import Strips
+from swgjoint.fe.common.pivot_base import Base, similar_parts
 from swgjoint.fe.common.pivoting import (
     SINGLES,
     TOLERANCE,
@@ -38,9 +39,15 @@ EXACT = 1e-14
 ROUNDS = 60
 """Largest number of corrections of the approach of the strips in the numpy version,
 each of which divides its error by about four."""
-PART = 32
-"""Number of problems that are solved one after another. Without a guess, each starts
-from the solution of the one before it: errors of neighbouring pitches are similar."""
+PART = 64
+"""Largest number of similar problems that share a base, see :class:`Base`."""
+GROUP = 16
+"""Number of parts that are solved one after another. Without a guess, each problem
+starts from the solution of the one before it."""
+FEW = 48
+"""Number of active unknowns up to which a part is solved without a base. With a base,
+what is left to solve for are the differences from it, but a base costs as much as
+some ten problems."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -203,28 +210,48 @@ class StripProblems:
         return np.asarray(np.sqrt(np.diag(self.matrix)))
 
     @cached_property
-    def _compiled(self) -> Any:
-        """Matrix and strips as the compiled loop takes them, scaled."""
-        scale, strips = self._scale, self.strips
+    def _origin(self) -> Base:
+        """The problems with all unknowns inactive."""
+        scale = self._scale
+        return Base(
+            inside=np.zeros(0, dtype=np.int64),
+            forward=np.zeros((len(scale), 0)),
+            matrix=self.matrix / scale[:, None] / scale,
+            by_strip=self.by_strip / scale[:, None],
+            by_load=self.by_load / scale,
+            by_value=self.by_value / scale,
+            output_by_strip=self.output_by_strip,
+            slope=0.0,
+        )
+
+    def _native(self, base: Base) -> Any:
+        """Matrix and strips of a base as the compiled loop takes them."""
         native = kernels()
         assert native is not None
+        scale, strips = self._scale, self.strips
         none = np.zeros(0)
         law, line, offset = np.zeros(4), none, none
         if strips is not None:
             law, line, offset = strips.law.constants, strips.line, strips.line_offset
+        closed = self.closed.copy()
+        closed[base.inside] ^= True
         return native.StripProblems(
-            np.ascontiguousarray((self.matrix / scale[:, None] / scale).T),
-            np.ascontiguousarray((self.by_strip / scale[:, None]).T),
+            np.ascontiguousarray(base.matrix.T),
+            np.ascontiguousarray(base.by_strip.T),
             self._strip,
-            np.ascontiguousarray(self.closed),
+            closed,
             np.where(self.closed, scale, 1.0 / scale),
-            self.by_load / scale,
-            self.by_value / scale,
-            self.output_by_strip,
+            np.ascontiguousarray(base.by_load),
+            np.ascontiguousarray(base.by_value),
+            np.ascontiguousarray(base.output_by_strip),
             line,
             offset,
             law,
         )
+
+    @cached_property
+    def _native_origin(self) -> Any:
+        return self._native(self._origin)
 
     def _solve_compiled(self, offset: Array, start: Mask | None) -> StripSolution:
         """Block principal pivoting with Newton's method for the strips."""
@@ -235,29 +262,60 @@ class StripProblems:
         active = np.zeros((count, m), bool) if start is None else start.copy()
         result, approach = np.empty((count, m)), np.empty((count, n_strips))
         slope, solved = np.empty(count), np.empty(count, dtype=bool)
-        problems = self._compiled
 
-        def solve(part: slice) -> None:
+        def solve(part: Index, base: Base, problems: Any, chained: bool) -> None:
+            inside = base.inside
+            own, ends = q[part], active[part]
+            if inside.size:
+                known = own[:, inside]
+                own[:, inside] = 0.0
+                own += known @ base.forward.T
+                ends[:, inside] ^= True
+            values, moved = np.empty(own.shape), np.empty((len(part), n_strips))
+            slopes, done = np.empty(len(part)), np.empty(len(part), dtype=bool)
             problems.solve(
-                q[part],
+                own,
                 tolerance[part],
                 EXACT,
                 TRIES,
                 SINGLES,
-                start is None,
-                active[part],
-                result[part],
-                approach[part],
-                slope[part],
-                solved[part],
+                chained,
+                ends,
+                values,
+                moved,
+                slopes,
+                done,
             )
+            ends[:, inside] ^= True
+            result[part], active[part], approach[part] = values, ends, moved
+            slope[part], solved[part] = slopes + base.slope, done
 
-        parts = [slice(k, k + PART) for k in range(0, count, PART)]
-        if len(parts) == 1:
-            solve(parts[0])
+        def solve_parts(parts: list[Index]) -> None:
+            last = np.zeros(m, bool)
+            for part in parts:
+                if start is not None:
+                    last = active[part].mean(axis=0) > 0.5
+                base, problems = self._origin, self._native_origin
+                if last.sum() > FEW and part.size > 1:
+                    base = self._origin.exchange(last)
+                    problems = self._native(base)
+                if start is None:
+                    active[part[0]] = last
+                solve(part, base, problems, start is None)
+                if solved[part[-1]]:
+                    last = active[part[-1]]
+
+        parts = similar_parts(q, PART)
+        groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
+        if start is None:
+            # a solution from which the others of a group start
+            for group in groups:
+                group.insert(0, group[0][:1])
+        if len(groups) == 1:
+            solve_parts(groups[0])
         else:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
-                list(pool.map(solve, parts))
+                list(pool.map(solve_parts, groups))
         solved &= np.isfinite(result).all(axis=1) & np.isfinite(slope)
         value = np.where(active, result, 0.0) / scale
         slack = np.where(active, 0.0, result) * scale

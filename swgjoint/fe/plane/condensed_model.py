@@ -163,7 +163,7 @@ class CondensedModel:
         n = len(self.contacts)
         return np.concatenate(
             [
-                np.einsum("kn,knl->kl", self._rows, response[self.contacts.sector]),
+                at_sectors(self._rows, self.contacts.sector, response),
                 np.einsum("snf,snl->fl", self._loads[:, :, n:], response),
             ]
         )
@@ -223,6 +223,21 @@ class CondensedModel:
         )
 
 
+def at_sectors(rows: Array, sector: Index, response: Array) -> Array:
+    """Products of rows with the responses of their sectors (k, n_columns).
+
+    Args:
+        rows: One row per product (k, n).
+        sector: Sector of each row (k,).
+        response: Responses of all sectors (N, n, n_columns).
+    """
+    products = np.empty((len(rows), response.shape[2]))
+    for number in np.unique(sector):
+        here = sector == number
+        products[here] = rows[here] @ response[number]
+    return products
+
+
 def _by_shift(weight: Array) -> Array:
     """Derivatives of the gaps with respect to a shift of the whole tooth (n, 2) [-]."""
     return np.asarray(weight.reshape(len(weight), -1, 2).sum(axis=1))
@@ -259,7 +274,7 @@ def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Intervals:
-    """Selection of k intervals between bore nodes, with p stations each."""
+    """Selection of k intervals of the bore, with p stations each."""
 
     sector: Index
     """Sector of each interval (k,)."""
@@ -279,6 +294,9 @@ class _Intervals:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Supports:
     """The k intervals of the bore that touch the wave generator or may do so.
+
+    All intervals have the same number of stations: those between two bore nodes, or
+    those of a part of the sector.
 
     The stations of an interval share one force F and one mean gap g; K is the sum of
     their stiffnesses. The slack s = g + F/K of the layer below them satisfies F s = 0.
@@ -307,8 +325,8 @@ class Supports:
             state: The equilibrium.
             used: Whether to use each interval (N, intervals).
         """
-        p = linear.stations.per_interval
-        touching = state.touching.reshape(len(used), -1, p)
+        touching = state.touching.reshape(*used.shape, -1)
+        p = touching.shape[2]
         sector, interval = np.nonzero(used)
         touches = touching[sector, interval]
         is_closed = np.asarray(touches.any(axis=1))
@@ -344,5 +362,5 @@ class Supports:
         Args:
             response: Displacements of the sectors (N, n, n_columns) [m].
         """
-        moved = np.einsum("kn,knl->kl", self.rows, response[self.intervals.sector])
+        moved = at_sectors(self.rows, self.intervals.sector, response)
         return np.asarray(np.where(self.closed, -self.stiffness, 1.0)[:, None] * moved)

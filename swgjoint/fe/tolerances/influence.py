@@ -18,10 +18,13 @@ from swgjoint.typing import Mask
 STATIONS = 30
 """Number of possible contact points along a flank, in addition to those of the perfect
 drive, because contacts move along conforming flanks."""
-SUPPORTS = 3
-"""Number of intervals of a sector's bore that may touch the wave generator, in addition
-to those that do. With two instead of three, the kinematic error of lots deviates from
-full solves by 1.04 % of its peak-to-peak value."""
+SUPPORTS = 500
+"""Largest number of intervals into which the bore is divided, each of which touches the
+wave generator or not. With 480 of them, output angles of the reference drive deviate
+from full solves by up to 0.13 % of their peak-to-peak value at zero torque and 2.5 % at
+twice the rated torque; with 240, by 0.23 and 2.4 %; with the 1,200 intervals between
+bore nodes, by 0.07 and 1.6 %. A drive that is pressed on its wave generator all around
+takes thirty times as long with all intervals as with 400."""
 
 
 def influence(
@@ -92,9 +95,9 @@ def _tooth_contacts(
 
 def _near_supports(model: SectorModel, linear: Linearised, state: State) -> Mask:
     """Mask of bore intervals that touch the wave generator or may do so (N, n)."""
-    shape = (model.sectors, -1, model.stations.per_interval)
-    gap = linear.gap.reshape(shape)
-    used = np.asarray(state.touching.reshape(shape).any(axis=2))
-    spread = np.arange(SUPPORTS) * used.shape[1] // SUPPORTS
-    used[:, spread] |= gap[:, spread].min(axis=2) < REACH * model.lobe_height
-    return used
+    sectors, stations = linear.gap.shape
+    most = max(1, SUPPORTS // sectors)
+    count = next(n for n in range(most, 0, -1) if stations % n == 0)
+    shape = (sectors, count, -1)
+    near = linear.gap.reshape(shape).min(axis=2) < REACH * model.lobe_height
+    return np.asarray(near | state.touching.reshape(shape).any(axis=2))

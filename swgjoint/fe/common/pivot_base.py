@@ -1,0 +1,103 @@
+"""Complementarity problems relative to an active set near their solutions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swgjoint.typing import Array, Index, Mask
+
+DIRECTIONS = 16
+"""Number of random directions in which the similarity of problems is judged."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Base:
+    """Scaled problems in which some unknowns have changed places with their slacks.
+
+    With the base near the solutions, few unknowns are active: only those in which a
+    solution differs from it. (A principal pivot transform; Cottle, Pang and Stone
+    (1992), "The linear complementarity problem", section 2.3.)
+    """
+
+    inside: Index
+    """Unknowns that have changed places (k,)."""
+    forward: Array
+    """Change of the offset q per offset of these unknowns, whose own are removed
+    (m, k)."""
+    matrix: Array
+    """Matrix (m, m)."""
+    by_strip: Array
+    """Change of the offset per approach of a strip (m, n_strips)."""
+    by_load: Array
+    """Change of the offset per unit of load (m,)."""
+    by_value: Array
+    """Change of the output per unknown (m,)."""
+    output_by_strip: Array
+    """Change of the output per approach of a strip (n_strips,)."""
+    slope: float
+    """Change of the output per unit of load while all unknowns are inactive."""
+
+    def exchange(self, active: Mask) -> Base:
+        """The problems in which the active unknowns have changed places.
+
+        Args:
+            active: Unknowns to exchange (m,).
+        """
+        inside, outside = np.flatnonzero(active), np.flatnonzero(~active)
+        inverse = np.linalg.inv(self.matrix[np.ix_(inside, inside)])
+        forward = np.empty((len(active), inside.size))
+        forward[inside] = -inverse
+        forward[outside] = -self.matrix[np.ix_(outside, inside)] @ inverse
+        # the columns of the other unknowns, of the load and of the strips
+        columns = np.column_stack(
+            [self.matrix[:, outside], self.by_load, self.by_strip]
+        )
+        known = columns[inside]
+        columns[inside] = 0.0
+        columns += forward @ known
+        outputs = self.by_value[inside] @ columns[inside]
+        outputs[: outside.size] += self.by_value[outside]
+        matrix, by_value = np.empty_like(self.matrix), np.empty_like(self.by_value)
+        matrix[:, inside], matrix[:, outside] = -forward, columns[:, : outside.size]
+        by_value[inside] = -self.by_value[inside] @ forward[inside]
+        by_value[outside] = outputs[: outside.size]
+        return Base(
+            inside=inside,
+            forward=forward,
+            matrix=matrix,
+            by_load=columns[:, outside.size],
+            by_strip=columns[:, outside.size + 1 :],
+            by_value=by_value,
+            output_by_strip=self.output_by_strip + outputs[outside.size + 1 :],
+            slope=float(outputs[outside.size]),
+        )
+
+
+def similar_parts(offset: Array, size: int) -> list[Index]:
+    """Parts of similar problems, consecutive ones near each other.
+
+    The problems are halved at the median of their direction of largest variance, again
+    and again.
+
+    Args:
+        offset: Offsets q (n_problems, m).
+        size: Largest number of problems of a part.
+
+    Returns:
+        Row numbers of each part.
+    """
+    rng = np.random.default_rng(0)
+    seen = offset @ rng.standard_normal((offset.shape[1], DIRECTIONS))
+
+    def halved(rows: Index) -> list[Index]:
+        if rows.size <= size:
+            return [rows]
+        from_mean = seen[rows] - seen[rows].mean(axis=0)
+        widest = np.linalg.eigh(from_mean.T @ from_mean)[1][:, -1]
+        order = rows[np.argsort(from_mean @ widest, kind="stable")]
+        half = rows.size // 2
+        return [*halved(order[:half]), *halved(order[half:])]
+
+    return halved(np.arange(len(offset)))
