@@ -1,11 +1,13 @@
 r"""A map linearised about its ideal motion, for many positions and harmonics.
 
 The output angle psi stays within about a milliradian of theta/i, so the phases of the
-harmonics change very little over the distance s = psi - theta/i. Their effect is
-linearised in s at each theta:
+harmonics change very little over the distance s = psi - psi_0 from psi_0 = theta/i.
+Their effect is linearised in s at each theta:
 
 .. math:: V = V_0(\Delta) + s V_1(\Delta), \quad e_0 = a + s b, \quad
-    \Delta = e_0 - s, \quad T = -\frac{dV}{ds} .
+    \Delta = \theta/i - \psi_0 + e_0 - s, \quad T = -\frac{dV}{ds} .
+
+Where the highest harmonics change more, psi_0 is the solution found so far.
 
 The sums over the harmonics are then matrix products, computed once per position instead
 of once per iteration.
@@ -16,15 +18,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 _NEWTON = 12
+_CLOSER = 3
+"""Largest number of linearisations about the solution found so far."""
 _BEND = 1e-3
 """Largest second-order term (q s)^2/2 that is neglected; q is the largest order of psi
 [-]."""
+_FLAT = 1e-8
+"""The same where the map is linearised about the solution found so far [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,8 +42,10 @@ class IdealMotion:
     """The full map."""
     theta: Array
     """Input angles [rad]. Shape (n,)."""
+    about: Array
+    """Output angles psi_0 about which the map is linearised [rad]. Shape (n,)."""
     error: Array
-    """a [rad] and b [-], which are e0 and de0/dpsi at psi = theta/i. Shape (2, n)."""
+    """a [rad] and b [-], which are e0 and de0/dpsi at psi_0. Shape (2, n)."""
     potential: Array
     """Coefficients of V_0 [J/rad^k] and V_1 [J/rad^(k+1)], as in a map.
 
@@ -49,14 +58,19 @@ class IdealMotion:
     """
 
     @classmethod
-    def from_map(cls, drive: Potential, theta: Array) -> IdealMotion:
-        """The harmonics of a map, summed at psi = theta/i.
+    def from_map(
+        cls, drive: Potential, theta: Array, about: Array | None = None
+    ) -> IdealMotion:
+        """The harmonics of a map, summed at psi = psi_0.
 
         Args:
             drive: The map.
             theta: Input angles [rad]. Shape (n,).
+            about: Output angles psi_0 [rad]. Shape (n,). None takes theta/i.
         """
-        phases = drive.phases(theta, theta / drive.ratio)
+        if about is None:
+            about = theta / drive.ratio
+        phases = drive.phases(theta, about)
         cos, sin = np.cos(phases), np.sin(phases)
         n_psi = drive.angle_orders[:, 1]
         # factors of the cosine and sine amplitudes, for a value and its psi derivative
@@ -68,6 +82,7 @@ class IdealMotion:
         return cls(
             drive=drive,
             theta=theta,
+            about=about,
             error=both @ drive.kinematic_error.ravel(),
             potential=(both @ table).reshape(2, theta.size, *shape),
             ends=both @ drive.end_stiffness.reshape(value.shape[1], -1),
@@ -77,11 +92,11 @@ class IdealMotion:
         """Torque T on the output [N·m] and stiffness -dT/dpsi [N·m/rad]. Shapes (n,).
 
         Args:
-            shift: Distance s = psi - theta/i [rad]. Shape (n,).
+            shift: Distance s = psi - psi_0 [rad]. Shape (n,).
         """
         knots = self.drive.torsion_knots
         a, b = self.error
-        x = a + (b - 1.0) * shift
+        x = self.theta / self.drive.ratio - self.about + a + (b - 1.0) * shift
         inside = np.clip(x, knots[0], knots[-1])
         j = np.clip(np.searchsorted(knots, inside, "right") - 1, 0, knots.size - 2)
         c = np.moveaxis(self.potential[:, np.arange(x.size), j], -1, 0)  # (5, 2, n)
@@ -99,8 +114,8 @@ class IdealMotion:
     def output_angle(self, torque: float) -> Array:
         """Output angle psi at which the drive exerts a torque [rad]. Shape (n,).
 
-        The full map is solved at positions where Newton's method does not converge or
-        the second-order term exceeds :data:`_BEND`.
+        Where the second-order term exceeds :data:`_BEND`, the map is linearised again.
+        The full map is solved where this does not converge.
 
         Args:
             torque: Torque T on the output [N·m].
@@ -110,7 +125,34 @@ class IdealMotion:
             ComputationError: If the map reaches it at no output angle.
         """
         drive = self.drive
-        shift = self.error[0] - (drive.mean_torsion(torque) if torque else 0.0)
+        twist = drive.mean_torsion(torque) if torque else 0.0
+        psi, near = self._solve(torque, self.error[0] - twist, _BEND)
+        for _ in range(_CLOSER):
+            again = np.flatnonzero(np.isfinite(psi) & ~near)
+            if not again.size:
+                break
+            at = IdealMotion.from_map(drive, self.theta[again], psi[again])
+            psi[again], near[again] = at._solve(torque, np.zeros(again.size), _FLAT)
+        far = ~near
+        if far.any():
+            psi[far] = output_angle(drive, self.theta[far], torque)
+        return psi
+
+    def _solve(
+        self, torque: float, shift: Array, bend: float
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Output angles by Newton's method from a first distance s (n,) [rad].
+
+        Args:
+            torque: Torque T on the output [N·m].
+            shift: First distance s [rad]. Shape (n,).
+            bend: Largest second-order term (q s)^2/2 of a valid linearisation [-].
+
+        Returns:
+            Output angles [rad], NaN where the method does not converge, and whether
+            the linearisation holds there. Shapes (n,).
+        """
+        drive = self.drive
         settled = 1e-12 * float(np.ptp(drive.torsion_knots))
         step = np.full(shift.shape, np.inf)
         for _ in range(_NEWTON):
@@ -121,9 +163,7 @@ class IdealMotion:
             if not (np.abs(step) > settled).any():
                 break
             shift = shift + step
-        psi = self.theta / drive.ratio + shift
         order = np.abs(drive.angle_orders[:, 1]).max()
-        again = ~(np.abs(step) <= settled) | ((order * shift) ** 2 > 2.0 * _BEND)
-        if again.any():
-            psi[again] = output_angle(drive, self.theta[again], torque)
-        return np.asarray(psi)
+        converged = np.abs(step) <= settled
+        near = converged & ((order * shift) ** 2 <= 2.0 * bend)
+        return np.where(converged, self.about + shift, np.nan), near

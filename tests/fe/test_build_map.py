@@ -204,7 +204,7 @@ def test_a_map_is_kept_before_its_equilibria_are_removed(monkeypatch, tmp_path):
 
 @pytest.mark.fe
 def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_path):
-    """Every torque of every position in the pitch is a step; finished ones are kept."""
+    """Torques and linearisations of every position are steps; finished ones are kept."""
     monkeypatch.setitem(tolerance_sampling.LEVELS, "2d", (1.0,))
     monkeypatch.setitem(tolerance_sampling.CHECKS, "2d", 1)
     monkeypatch.setattr(tolerance_sampling, "CHUNK", 62)
@@ -223,6 +223,7 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
         sample_tolerances(design, **options, progress=until_the_second, keep=keep)
     steps = [call[1:] for call in calls if "superposition" in call[0]]
     total = 2 * (2 * (len(whole.torque) // 2) + 1)
+    total += 2 * 2  # linearisations under both signs of the torque
     assert steps == [(k, steps[0][1]) for k in range(len(steps))]
     assert steps[0][1] in (total, total - 4)  # a clearance adds its ends afterwards
     superposed = []

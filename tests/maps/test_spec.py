@@ -106,6 +106,24 @@ def test_accuracy_equals_a_dense_evaluation(synthetic_map):
         assert sheet[key] == pytest.approx(sum(ends) / arcmin, rel=1e-4)
 
 
+def test_turn_holds_for_harmonics_that_move_with_the_torsion(monkeypatch):
+    """Tooth orders of the output turn by 1 rad of phase: still the full map's angle."""
+    drive = with_angles(
+        DriveMap.linear(1e4, rated_torque=50.0),
+        [(2, 0), (0, 200), (200, -200)],
+        [(3e-5, 0.0), (0.0, 1e-5), (2e-6, 1e-6)],
+    )
+    turn = error_turn(drive, 50.0)
+    theta, error = turn.output_turn()
+    some = np.arange(0, theta.size, theta.size // 300)
+    wanted = output_angle(drive, theta[some], 50.0) - theta[some] / drive.ratio
+    assert (200 * np.abs(wanted)).max() > 0.5
+    assert np.abs(error[some] - wanted).max() < 1e-4 * 1e-5  # of the highest order
+    # by the second linearisation, not position by position
+    monkeypatch.delattr("swgjoint.maps.ideal_motion.output_angle")
+    assert np.array_equal(error_turn(drive, 50.0).signal, turn.signal)
+
+
 def test_no_load_error_is_the_kinematic_error():
     """Without angle-dependent energy the unloaded output stands at e0 exactly."""
     orders, amplitudes = [(2, 0), (0, 2)], [(3e-5, 0.0), (0.0, 1e-5)]

@@ -69,7 +69,12 @@ class Rest:
         """State and influence from which to superpose errors under a torque [N·m]."""
         return self.loaded.get(torque, self.sides[0 if torque >= 0.0 else 1])
 
-    def under_both_signs(self, follow: Follower[Any], levels: Array) -> Rest:
+    def under_both_signs(
+        self,
+        follow: Follower[Any],
+        levels: Array,
+        tick: Callable[[int], None] = lambda parts: None,
+    ) -> Rest:
         """The position with linearisations under load.
 
         With some wave generators the contacts change so much between zero and rated
@@ -80,15 +85,18 @@ class Rest:
         Args:
             follow: Solver of the drive with perfect teeth.
             levels: Magnitudes of the torques, increasing (n,) [N·m].
+            tick: Called with the number of torques that are done or left out.
         """
         loaded = {}
         for sign in (1.0, -1.0):
             state = self.near(sign)[0]
-            for torque in (sign * levels).tolist():
+            for k, torque in enumerate((sign * levels).tolist()):
                 state = follow.to_torque(state, torque)
                 if not state.outcome.ok:
+                    tick(levels.size - k)
                     break
                 loaded[torque] = state, follow.influence(state)
+                tick(1)
         return replace(self, loaded=loaded)
 
 

@@ -115,17 +115,20 @@ def sample_tolerances(
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
     steps = loads * -(-pitches.size // CHUNK)  # number of chunks, rounded up
-    tick = _stage(progress, design, 2, phases * steps)
+    # a linearisation under load takes about as long as a chunk
+    linearised = 2 * under_load.size * (2 if own_reference else 1)
+    tick = _stage(progress, design, 2, phases * (steps + linearised))
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
-        flawless = loaded = flawless.under_both_signs(ideal_drive, under_load)
+        flawless = flawless.under_both_signs(ideal_drive, under_load, tick)
+        loaded = flawless
         if there is None:
             if own_reference:
-                loaded = rest.under_both_signs(follow, under_load)
+                loaded = rest.under_both_signs(follow, under_load, tick)
             phase_table, count = _over_torque(loaded, errors, levels, small, tick)
         else:
             phase_table, count = there
-            tick(steps)
+            tick(steps + (linearised // 2 if own_reference else 0))
         if not np.isfinite(phase_table).all():
             lost = np.isnan(phase_table).any(axis=(0, 1)).sum()
             raise ComputationError(
