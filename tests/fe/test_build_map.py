@@ -204,7 +204,7 @@ def test_a_map_is_kept_before_its_equilibria_are_removed(monkeypatch, tmp_path):
 
 @pytest.mark.fe
 def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_path):
-    """Torques and linearisations of every position are steps; finished ones are kept."""
+    """Torques and linearisations of a position are steps; finished ones are kept."""
     monkeypatch.setitem(tolerance_sampling.LEVELS, "2d", (1.0,))
     monkeypatch.setitem(tolerance_sampling.CHECKS, "2d", 1)
     monkeypatch.setattr(tolerance_sampling, "CHUNK", 62)
