@@ -187,7 +187,7 @@ def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> li
     notes = []
     if model.spring == "three_lines" and len(model.slopes) < 3:
         corner = ("T1", "T2")[len(model.slopes) - 1]
-        missing = " and ".join(SPRINGS["three_lines"][len(model.slopes) :])
+        missing = " or ".join(SPRINGS["three_lines"][len(model.slopes) :])
         notes.append(
             f"the log reaches {model.largest_torque:.3g} N·m, below the corner {corner}"
             f" {getattr(model.ratings, corner):.3g} N·m: no {missing}; beyond the log"

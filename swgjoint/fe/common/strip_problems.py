@@ -310,7 +310,8 @@ class StripProblems:
         if start is None:
             # a solution from which the others of a group start
             for group in groups:
-                group.insert(0, group[0][:1])
+                if group[0].size > 1:
+                    group.insert(0, group[0][:1])
         if len(groups) == 1:
             solve_parts(groups[0])
         else:

@@ -43,7 +43,7 @@ def picture(identified: Identified) -> Figure:
         row[0].legend(loc="upper right")
         _line(row[1], time, left, "", color="tab:red", lw=0.6)
         row[1].set_ylabel(
-            f"measured minus model [N·m], rms {np.sqrt(np.mean(left**2)):.2g}"
+            f"measured minus model [N·m]\nrms {np.sqrt(np.mean(left**2)):.2g}"
         )
         for ax in row:
             ax.set_xlabel("time [s]")
