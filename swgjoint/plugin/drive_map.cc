@@ -4,68 +4,13 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <limits>
-#include <unordered_map>
+
+#include "lanes.h"
 
 namespace swgjoint {
 namespace {
-
-// Vector of kLanes harmonics that undergo the same operations.
-#if defined(__GNUC__)
-typedef double Lanes __attribute__((vector_size(8 * DriveMap::kLanes)));
-#define SWGJOINT_INLINE inline __attribute__((always_inline))
-#else
-struct Lanes {
-  double v[DriveMap::kLanes];
-  double operator[](int i) const { return v[i]; }
-  Lanes& operator+=(const Lanes& o) { return *this = *this + o; }
-  template <class F>
-  static Lanes Each(F f) { return {{f(0), f(1), f(2), f(3)}}; }
-  friend Lanes operator+(const Lanes& a, const Lanes& b) {
-    return Each([&](int i) { return a[i] + b[i]; });
-  }
-  friend Lanes operator-(const Lanes& a, const Lanes& b) {
-    return Each([&](int i) { return a[i] - b[i]; });
-  }
-  friend Lanes operator*(const Lanes& a, const Lanes& b) {
-    return Each([&](int i) { return a[i] * b[i]; });
-  }
-  friend Lanes operator*(const Lanes& a, double b) {
-    return Each([&](int i) { return a[i] * b; });
-  }
-  friend Lanes operator+(double a, const Lanes& b) {
-    return Each([&](int i) { return a + b[i]; });
-  }
-};
-#define SWGJOINT_INLINE inline
-#endif
-SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
-  std::memcpy(x, from, sizeof(Lanes));
-}
-SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
-  std::memcpy(to, &x, sizeof(Lanes));
-}
-// Sum of the lanes of each of the four vectors.
-SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
-                          const Lanes& d, double out[4]) {
-#if defined(__GNUC__) && !defined(__clang__)
-  typedef long long Index __attribute__((vector_size(sizeof(Lanes))));
-  const Lanes ab = __builtin_shuffle(a, b, Index{0, 4, 2, 6}) +
-                   __builtin_shuffle(a, b, Index{1, 5, 3, 7});
-  const Lanes cd = __builtin_shuffle(c, d, Index{0, 4, 2, 6}) +
-                   __builtin_shuffle(c, d, Index{1, 5, 3, 7});
-  Store(out, __builtin_shuffle(ab, cd, Index{0, 1, 4, 5}) +
-                 __builtin_shuffle(ab, cd, Index{2, 3, 6, 7}));
-#else
-  const Lanes* all[4] = {&a, &b, &c, &d};
-  for (int k = 0; k < 4; ++k) {
-    const Lanes& x = *all[k];
-    out[k] = (x[0] + x[1]) + (x[2] + x[3]);
-  }
-#endif
-}
 
 // Polynomial with coefficients w, and its first two derivatives.
 double Value(const double w[5], double d) {
@@ -131,6 +76,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   if (!Numbers(text.ratio, "ratio", 1, &list, error)) return false;
   ratio_ = list[0];
   if (ratio_ == 0) return Fail(error, "ratio", "is 0");
+  inverse_ratio_ = 1 / ratio_;
 
   // orders in (theta, psi), with the mean (0, 0) first
   if (!Numbers(text.orders, "orders", 0, &orders, error)) return false;
@@ -171,9 +117,6 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     v->assign(padded, 0.0);
   }
   weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
-#ifdef SWGJOINT_AVX2
-  avx2_ = __builtin_cpu_supports("avx2");
-#endif
   for (int k = 1; k < n_; ++k) {
     n_theta[k - 1] = orders[2 * k];
     n_psi[k - 1] = orders[2 * k + 1];
@@ -219,35 +162,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     }
   }
 
-  FindRecipes();
   return true;
-}
-
-// Finds harmonics whose orders are the sum or difference of those of two earlier ones;
-// these harmonics need no call of sin and cos. Of several pairs, the one whose later
-// member comes first is used, then the one whose earlier member comes first.
-void DriveMap::FindRecipes() {
-  const int count = n_ - 1;
-  const auto key = [](double theta, double psi) {
-    // one integer from two integers below 2e6
-    return static_cast<int64_t>(theta) * (int64_t{1} << 22) + static_cast<int64_t>(psi);
-  };
-  std::unordered_map<int64_t, int> first;  // harmonic by its orders
-  const auto find = [&](double theta, double psi) {
-    const auto at = first.find(key(theta, psi));
-    return at == first.end() ? count : at->second;
-  };
-  for (int k = 0; k < count; ++k) first.emplace(key(n_theta_[k], n_psi_[k]), k);
-  recipe_.assign(count, Recipe());
-  for (int k = 0; k < count; ++k) {
-    for (int a = 0; a < k; ++a) {
-      const double theta = n_theta_[k] - n_theta_[a], psi = n_psi_[k] - n_psi_[a];
-      const int plus = find(theta, psi), minus = find(-theta, -psi);
-      if (std::min(plus, minus) > a) continue;
-      recipe_[k] = plus <= minus ? Recipe{a, plus, 1} : Recipe{a, minus, -1};
-      break;
-    }
-  }
 }
 
 // Segment that contains a torsion; 0 and segments_ - 1 are the end parabolas.
@@ -264,36 +179,34 @@ int DriveMap::SegmentNear(int guess, double torsion) const {
   return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
 }
 
-// Computes cos and sin of all phases at the given angles.
-void DriveMap::Rotate(double theta, double psi) {
-  double* c = c_.data();
-  double* s = s_.data();
-  for (int k = 0; k < n_ - 1; ++k) {
-    const Recipe& r = recipe_[k];
-    if (r.a < 0) {
-      const double phase = n_theta_[k] * theta + n_psi_[k] * psi;
-      c[k] = std::cos(phase);
-      s[k] = std::sin(phase);
-    } else {
-      const double sb = r.sign * s[r.b];
-      c[k] = c[r.a] * c[r.b] - s[r.a] * sb;
-      s[k] = s[r.a] * c[r.b] + c[r.a] * sb;
-    }
-  }
-}
-
 void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
   Begin(theta, psi);
   Secant(0.0, 0.0, out);
 }
 
 void DriveMap::Begin(double theta, double psi) {
-  Rotate(theta + shift_theta_, psi + shift_psi_);
-  double e0 = error_mean_;
-  for (int k = 0; k < n_ - 1; ++k) e0 += error_c_[k] * c_[k] + error_s_[k] * s_[k];
-  torsion_ = theta / ratio_ + error_scale_ * e0 - psi;
+  torsion_ = theta / ratio_ + error_scale_ * Rotate(theta, psi) - psi;
   j0_ = SegmentNear(j0_, torsion_);
   d0_ = torsion_ - base_[j0_];
+}
+
+// Computes cos and sin of all phases at the given angles, and returns e0.
+SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
+  theta += shift_theta_;
+  psi += shift_psi_;
+  Lanes sum = {};
+  for (int k = 0; k < blocks_ * kLanes; k += kLanes) {
+    Lanes n, m, c, s, error_c, error_s;
+    Load(&n_theta_[k], &n);
+    Load(&n_psi_[k], &m);
+    Load(&error_c_[k], &error_c);
+    Load(&error_s_[k], &error_s);
+    CosSin(n * theta + m * psi, &c, &s);
+    sum += error_c * c + error_s * s;
+    Store(&c_[k], c);
+    Store(&s_[k], s);
+  }
+  return error_mean_ + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
 }
 
 // Computes sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic.
@@ -329,10 +242,10 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
 }
 
 // Computes, in one pass over the table, the weights of all A and B, the weighted sums
-// in the segment of the start state, and g. The processor determines how many lanes are
-// processed at once; the result is bit for bit the same. kPsi means that a harmonic
-// depends on psi, and kSmall that no phase changes by more than 0.5 rad.
-template <bool kPsi, bool kSmall>
+// in the segment of the start state, and g. kPsi means that a harmonic depends on psi.
+// No phase changes by more than 2^kHalvings/2 rad; at kHalvings < 0, HalfStep has
+// computed sinc_ and ch_ for any change.
+template <bool kPsi, int kHalvings>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
   const double* __restrict row =
       table_.data() + static_cast<size_t>(j0_) * blocks_ * kBlock;
@@ -347,19 +260,14 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
   double* __restrict out_weight = weight_.data();
   Lanes w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
   const int blocks = blocks_;
-  for (int b = 0, k = 0; b < blocks; ++b, k += kLanes, row += kBlock) {
-    Lanes n, m = {}, sinc, ch, c0, s0, error_c, error_s, even, odd;
+  for (int b = 0, k = 0; b < blocks; ++b, k += kLanes) {
+    Lanes n, m = {}, sinc, ch, c0, s0, error_c, error_s;
     Load(in_theta + k, &n);
     if (kPsi) Load(in_psi + k, &m);
     Lanes eta = n * (0.5 * dtheta);
     if (kPsi) eta += m * (0.5 * dpsi);
-    if (kSmall) {
-      // |eta| <= 1/4, where the truncation error of these series is below 2^-53
-      const Lanes z = eta * eta;
-      sinc = 1 + z * (-1. / 6 + z * (1. / 120 + z * (-1. / 5040 + z * (1. / 362880 +
-             z * (-1. / 39916800)))));
-      ch = 1 + z * (-1. / 2 + z * (1. / 24 + z * (-1. / 720 + z * (1. / 40320 +
-           z * (-1. / 3628800 + z * (1. / 479001600))))));
+    if constexpr (kHalvings >= 0) {
+      SincCos<kHalvings>(eta, &sinc, &ch);
     } else {
       Load(in_sinc + k, &sinc);
       Load(in_ch + k, &ch);
@@ -384,6 +292,18 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
       Store(weight + 4 * kLanes, psi_c);
       Store(weight + 5 * kLanes, psi_s);
     }
+  }
+  for (int b = 0; b < blocks; ++b, row += kBlock) {
+    const double* weight = out_weight + b * kWeights;
+    Lanes mean_c, mean_s, theta_c, theta_s, psi_c, psi_s, even, odd;
+    Load(weight, &mean_c);
+    Load(weight + kLanes, &mean_s);
+    Load(weight + 2 * kLanes, &theta_c);
+    Load(weight + 3 * kLanes, &theta_s);
+    if (kPsi) {
+      Load(weight + 4 * kLanes, &psi_c);
+      Load(weight + 5 * kLanes, &psi_s);
+    }
     for (int p = 0; p < 5; ++p) {
       Load(row + 2 * p * kLanes, &even);
       Load(row + (2 * p + 1) * kLanes, &odd);
@@ -400,7 +320,7 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
   for (int p = 0; p < 4; ++p) w_[p] += mean[p];
   w_[4] = mean[4] + rest[0];
   u_theta_[4] = rest[1];
-  out->g_theta = 1.0 / ratio_ + error_scale_ * rest[2];
+  out->g_theta = inverse_ratio_ + error_scale_ * rest[2];
   out->g_psi = error_scale_ * rest[3] - 1.0;
   if (kPsi) {
     Sums(v[0], v[1], v[2], v[3], u_psi_);
@@ -409,28 +329,18 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
   }
 }
 
-SWGJOINT_INLINE void DriveMap::WeighInline(double dtheta, double dpsi, DriveValue* out) {
+SWGJOINT_CLONES void DriveMap::Weigh(double dtheta, double dpsi, DriveValue* out) {
   const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
   if (top <= 0.5) {
-    moves_psi_ ? Sweep<true, true>(dtheta, dpsi, out)
-               : Sweep<false, true>(dtheta, dpsi, out);
+    moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
+  } else if (top <= 2) {
+    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
   } else {
     HalfStep(dtheta, dpsi);
-    moves_psi_ ? Sweep<true, false>(dtheta, dpsi, out)
-               : Sweep<false, false>(dtheta, dpsi, out);
+    moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)
+               : Sweep<false, -1>(dtheta, dpsi, out);
   }
 }
-
-void DriveMap::Weigh(double dtheta, double dpsi, DriveValue* out) {
-  WeighInline(dtheta, dpsi, out);
-}
-
-#ifdef SWGJOINT_AVX2
-__attribute__((target("avx2"))) void DriveMap::WeighAvx2(double dtheta, double dpsi,
-                                                         DriveValue* out) {
-  WeighInline(dtheta, dpsi, out);
-}
-#endif
 
 // Computes the mean torque of a step that crosses knots. The work is summed piece by
 // piece, which avoids the difference of two large energies.
@@ -464,11 +374,7 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), and similarly for sin.
   // The secants of every harmonic for theta and psi therefore have a closed form, and
   // the mean of its two end values is cos(eta) times its value at the midpoint.
-#ifdef SWGJOINT_AVX2
-  avx2_ ? WeighAvx2(dtheta, dpsi, out) : Weigh(dtheta, dpsi, out);
-#else
   Weigh(dtheta, dpsi, out);
-#endif
   const double x1 = torsion_ + (out->g_theta * dtheta + out->g_psi * dpsi);
   const int j1 = SegmentNear(j0_, x1);
   const double d1 = x1 - base_[j1];

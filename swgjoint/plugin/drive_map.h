@@ -6,10 +6,7 @@
 #include <string>
 #include <vector>
 
-// Enables a second version of the inner loop, which is selected at run time.
-#if defined(__GNUC__) && defined(__x86_64__)
-#define SWGJOINT_AVX2
-#endif
+#include "lanes.h"
 
 namespace swgjoint {
 
@@ -38,8 +35,8 @@ struct DriveValue {
 
 class DriveMap {
  public:
-  static constexpr int kLanes = 4;            // harmonics that are processed together
-  static constexpr int kBlock = 10 * kLanes;  // their coefficients A0, B0, .. A4, B4
+  // coefficients A0, B0, .. A4, B4 of the harmonics that are processed together
+  static constexpr int kBlock = 10 * kLanes;
   // weights of their A and B in the mean, and in the secants for theta and for psi
   static constexpr int kWeights = 6 * kLanes;
 
@@ -72,33 +69,21 @@ class DriveMap {
   void Secant(double dtheta, double dpsi, DriveValue* out);
 
  private:
-  // Rule that computes cos and sin of one harmonic from those of earlier ones.
-  struct Recipe {
-    int a = -1, b = -1;  // earlier harmonics; a < 0: call the functions sin and cos
-    double sign = 1;     // phase = phase_a + sign * phase_b
-  };
-
-  void FindRecipes();
   int Segment(double torsion) const;
   int SegmentNear(int guess, double torsion) const;
   void HalfStep(double dtheta, double dpsi);
-  template <bool kPsi, bool kSmall>
+  template <bool kPsi, int kHalvings>
   void Sweep(double dtheta, double dpsi, DriveValue* out);
-  void WeighInline(double dtheta, double dpsi, DriveValue* out);
   void Weigh(double dtheta, double dpsi, DriveValue* out);
-#ifdef SWGJOINT_AVX2
-  void WeighAvx2(double dtheta, double dpsi, DriveValue* out);
-  bool avx2_ = false;
-#endif
   void Work(int j1, double x1, DriveValue* out) const;
-  void Rotate(double theta, double psi);
+  double Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;
 
   int n_ = 0;         // number of harmonics, including the mean
   int blocks_ = 0;    // number of blocks of kLanes harmonics, without the mean
   int segments_ = 0;  // number of intervals between knots, plus two end parabolas
   bool moves_psi_ = false;  // whether a harmonic depends on psi
-  double ratio_ = 1;
+  double ratio_ = 1, inverse_ratio_ = 1;
   double scale_ = 1, error_scale_ = 1, shift_theta_ = 0, shift_psi_ = 0;  // Vary
   double top_theta_ = 0, top_psi_ = 0;  // largest orders in theta and psi
   double top_order_ = 0;                // largest |n_theta + n_psi/ratio|
@@ -111,7 +96,6 @@ class DriveMap {
   // one value per harmonic without the mean, padded with zeros to whole blocks
   std::vector<double> n_theta_, n_psi_;
   std::vector<double> error_c_, error_s_;  // amplitudes of cos and sin in e0
-  std::vector<Recipe> recipe_;
 
   // start state
   double torsion_ = 0, d0_ = 0;
