@@ -125,6 +125,7 @@ Drive::Region Drive::Region::Find(const mjModel* m) {
 // Warns once per model and step size when the integration region is left.
 void Drive::Watch(const mjModel* m, const mjData* d, int instance, int scheme) {
   const mjtNum h = m->opt.timestep, limit = region_.step[scheme];
+  if (limit <= 0 && region_.phase <= 0) return;
   const mjtNum speed = std::fabs(d->qvel[v_rotor_]);
   const mjtNum phase = h * map_.top_order() * speed;
   const bool turns = scheme == 0 && region_.phase > 0 && phase > region_.phase;
@@ -216,8 +217,12 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   drive->q_link_ = m->jnt_qposadr[link];
   drive->v_rotor_ = m->jnt_dofadr[rotor];
   drive->v_link_ = m->jnt_dofadr[link];
-  drive->column_.resize(
-      std::max(m->M_rownnz[drive->v_rotor_], m->M_rownnz[drive->v_link_]));
+  const int dofs = m->M_rownnz[drive->v_rotor_], others = m->M_rownnz[drive->v_link_];
+  drive->column_.resize(2 * std::max(dofs, others));
+  const int* ancestor = m->M_colind + m->M_rowadr[drive->v_rotor_];
+  drive->siblings_ = dofs == others &&
+                     std::equal(ancestor, ancestor + dofs - 1,
+                                m->M_colind + m->M_rowadr[drive->v_link_]);
   const int row = m->ten_J_rowadr[t];
   for (int j = row; j < row + m->ten_J_rownnz[t]; ++j) {
     if (m->ten_J_colind[j] == drive->v_rotor_) drive->entry_rotor_ = j;
@@ -244,18 +249,18 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
   std::vector<double> list;
   Friction friction;
   if (!ParseNumbers(text, &list) || !friction.Parse(list)) return false;
-  const int size = friction.b_psi() == 0 ? 1 : 2;
+  const int size = friction.b()[1] == 0 ? 1 : 2;
   for (int t = 0; t < m->ntendon; ++t) {
     const int wrap = m->tendon_adr[t];
     const mjtNum cubic = m->tendon_stiffnesspoly[mjNPOLY * t + 1];
     if (m->tendon_num[t] != size || m->wrap_type[wrap] != mjWRAP_JOINT ||
-        m->wrap_objid[wrap] != rotor || m->wrap_prm[wrap] != friction.b_theta() ||
+        m->wrap_objid[wrap] != rotor || m->wrap_prm[wrap] != friction.b()[0] ||
         m->tendon_stiffness[t] <= 0 || m->tendon_damping[t] != 0 ||
         cubic <= 0 || cubic > kFrictionCubic) {
       continue;
     }
     if (size == 2 && (m->wrap_objid[wrap + 1] != link ||
-                      m->wrap_prm[wrap + 1] != friction.b_psi())) {
+                      m->wrap_prm[wrap + 1] != friction.b()[1])) {
       continue;
     }
     friction_ = friction;
@@ -266,8 +271,11 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
 
 // Rotation (or speed) of the wave generator relative to the flexspline, from positions
 // (or velocities) of rotor and link.
-mjtNum Drive::Rotation(const mjtNum* q) const {
-  return friction_->b_theta() * q[0] + friction_->b_psi() * q[1];
+mjtNum Drive::Rotation(const Pair& q) const { return Dot(friction_->b(), q); }
+
+void Drive::AddTorque(mjData* d, const Pair& torque) const {
+  d->qfrc_passive[v_rotor_] += torque[0];
+  d->qfrc_passive[v_link_] += torque[1];
 }
 
 // Applies the deviations of this drive from its map, which are user data of its tendon.
@@ -289,12 +297,9 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
 
   // remove the spring force of the tendon that the engine applied
   const mjtNum native = NativeForce(m, d, tendon_);
-  d->qfrc_passive[v_rotor_] += native * d->ten_J[entry_rotor_];
-  d->qfrc_passive[v_link_] += native * d->ten_J[entry_link_];
+  AddTorque(d, Pair{d->ten_J[entry_rotor_], d->ten_J[entry_link_]} * native);
   if (friction_) {
-    const mjtNum rubbed = NativeForce(m, d, friction_tendon_);
-    d->qfrc_passive[v_rotor_] += rubbed * friction_->b_theta();
-    d->qfrc_passive[v_link_] += rubbed * friction_->b_psi();
+    AddTorque(d, friction_->b() * NativeForce(m, d, friction_tendon_));
   }
 
   // the solver PGS ignores the tendon term of the metric
@@ -337,62 +342,72 @@ void Drive::Slip(mjtNum change, DriveValue* value) const {
 // therefore gets a torque at which the engine reports divergence and resets, as it does
 // after any other divergence. The step does not change the history of the drive.
 bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
-  const auto bounded = [](mjtNum x) { return std::fabs(x) <= kDiverged; };  // not NaN
-  if (std::all_of(numbers.begin(), numbers.end(), bounded)) return false;
+  bool bounded = true;
+  for (mjtNum x : numbers) bounded &= std::fabs(x) <= kDiverged;  // false for NaN
+  if (bounded) return false;
   d->qfrc_passive[v_rotor_] = kDiverged;
   d->qfrc_passive[v_link_] = 0;
   return true;
 }
 
-// Acceleration of a dof due to a unit torque on it, with all other dofs free. This is
-// the entry of the dof on the diagonal of M^-1. With M = L' D L and the unit vector e
-// of the dof, it is the sum of (L^-T e)^2/D over the dof and its ancestors.
-mjtNum Drive::Response(const mjModel* m, const mjData* d, int dof) {
-  const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
-  std::fill_n(column_.begin(), last, 0.0);
-  column_[last] = 1;
-  mjtNum sum = 0;
-  for (int a = last; a >= 0; --a) {
+// Acceleration of each of two dofs due to a unit torque on it, with all other dofs
+// free. These are their entries on the diagonal of M^-1. With M = L' D L and the unit
+// vector e of a dof, an entry is the sum of (L^-T e)^2/D over the dof and its
+// ancestors. The dofs must have the same ancestors.
+Pair Drive::Response(const mjModel* m, const mjData* d, int dof, int other) {
+  const int ancestors = m->M_rownnz[dof] - 1;
+  const int* ancestor = m->M_colind + m->M_rowadr[dof];
+  const mjtNum* first = d->qLD + m->M_rowadr[dof];
+  const mjtNum* second = d->qLD + m->M_rowadr[other];
+  mjtNum* column = column_.data();  // L^-T e of both dofs, in pairs
+  for (int b = 0; b < ancestors; ++b) Store(column + 2 * b, Pair{-first[b], -second[b]});
+  Pair sum = {d->qLDiagInv[dof], d->qLDiagInv[other]};
+  for (int a = ancestors - 1; a >= 0; --a) {
     // the ancestors of an ancestor are the preceding entries
-    const int j = m->M_colind[row + a];
+    const int j = ancestor[a];
     const mjtNum* factor = d->qLD + m->M_rowadr[j];
-    sum += column_[a] * column_[a] * d->qLDiagInv[j];
-    for (int b = 0; b < a; ++b) column_[b] -= factor[b] * column_[a];
+    Pair x, y;
+    Load(column + 2 * a, &x);
+    sum += x * x * d->qLDiagInv[j];
+    for (int b = 0; b < a; ++b) {
+      Load(column + 2 * b, &y);
+      Store(column + 2 * b, y - x * factor[b]);
+    }
   }
   return sum;
+}
+
+// Accelerations of rotor and link due to a unit torque on each, see above.
+Pair Drive::Responses(const mjModel* m, const mjData* d) {
+  if (siblings_) return Response(m, d, v_rotor_, v_link_);
+  return Pair{Response(m, d, v_rotor_, v_rotor_)[0],
+              Response(m, d, v_link_, v_link_)[0]};
 }
 
 // Adds the torques at the current state: gradient of the potential, hysteresis, damping
 // and friction.
 void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
+  const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
+  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   DriveValue value;
-  map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
+  map_.Gradient(q[0], q[1], &value);
   Place(d->plugin_state + m->plugin_stateadr[instance] + kAccelerations);
   Slip(0, &value);
   mjtNum rubs = 0;
   if (friction_) {
     const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance] +
                           kAccelerations + reach_.size();
-    const mjtNum q[2] = {d->qpos[q_rotor_], d->qpos[q_link_]};
-    const mjtNum v[2] = {d->qvel[v_rotor_], d->qvel[v_link_]};
     const mjtNum speed = Rotation(v);
     const mjtNum x = state[1] != 0 ? Rotation(q) - state[0] : 0;
     rubs = friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
   }
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
-  const mjtNum rate =
-      value.g_theta * d->qvel[v_rotor_] + value.g_psi * d->qvel[v_link_];
-  const mjtNum force = value.torque + damping * rate;
-  if (Diverges(d, {force, value.g_theta, value.g_psi, value.e_theta, value.e_psi,
-                   rubs})) {
+  const mjtNum force = value.torque + damping * Dot(value.g, v);
+  if (Diverges(d, {force, value.g[0], value.g[1], value.e[0], value.e[1], rubs})) {
     return;
   }
-  if (friction_) {
-    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
-    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
-  }
-  d->qfrc_passive[v_rotor_] -= force * value.g_theta + value.e_theta;
-  d->qfrc_passive[v_link_] -= force * value.g_psi + value.e_psi;
+  if (friction_) AddTorque(d, friction_->b() * -rubs);
+  AddTorque(d, (value.g * force + value.e) * -1);
   step_.gradient = true;
 }
 
@@ -413,89 +428,73 @@ mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
 // and from the tangent stiffness of the tendon's cubic spring at ten_length (p).
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
-  const mjtNum vm = d->qvel[v_rotor_], vl = d->qvel[v_link_];
-  const mjtNum wm = Response(m, d, v_rotor_), wl = Response(m, d, v_link_);
+  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
+  const Pair weight = Responses(m, d);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  const Pair other = {state[0], state[1]};
   const mjtNum damping = Damping(m, d);
 
   // the scheme is a midpoint rule for the positions of half a step earlier
-  map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);
+  const Pair x = Pair{d->qpos[q_rotor_], d->qpos[q_link_]} - v * (0.5 * h);
+  map_.Begin(x[0], x[1]);
   Place(state + kAccelerations);
   DriveValue& g = step_.value;
   FrictionStep& rub = step_.friction;
-  mjtNum dm = 0, dl = 0, force = 0, p = 0, speed = 0, turned = 0;
+  Pair dv = {0, 0};
+  mjtNum force = 0, p = 0, speed = 0, turned = 0;
   if (friction_) {
     const mjtNum* rest = state + kAccelerations + reach_.size();
-    const mjtNum x[2] = {d->qpos[q_rotor_] - 0.5 * h * vm,
-                         d->qpos[q_link_] - 0.5 * h * vl};
-    const mjtNum v[2] = {vm, vl};
     speed = Rotation(v);
     step_.rotation = Rotation(x);
     turned = rest[1] != 0 ? step_.rotation - rest[0] : 0;
   }
   for (int pass = 0; pass < passes_; ++pass) {
-    const mjtNum xm = h * (vm + 0.5 * dm), xl = h * (vl + 0.5 * dl);
-    map_.Secant(xm, xl, &g);
-    Slip(g.g_theta * xm + g.g_psi * xl, &g);
+    const Pair dx = (v + dv * 0.5) * h;
+    map_.Secant(dx[0], dx[1], &g);
+    if (!reach_.empty()) Slip(Dot(g.g, dx), &g);
     const mjtNum k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
-    const mjtNum w = g.g_theta * g.g_theta * wm + g.g_psi * g.g_psi * wl;
+    const mjtNum w = Dot(g.g * g.g, weight);
     const mjtNum ka = h * h * k * w;
     const mjtNum nu = numerical_damping_ * ka * ka / (16 + ka * ka);
-    const mjtNum rate = g.g_theta * vm + g.g_psi * vl;
-    const mjtNum predicted = g.g_theta * dm + g.g_psi * dl;
-    force = g.torque - 0.5 * h * g.slope * predicted + (nu * k * h + damping) * rate;
+    force = g.torque - 0.5 * h * g.slope * Dot(g.g, dv) +
+            (nu * k * h + damping) * Dot(g.g, v);
     p = 0.5 * g.slope + 0.75 * nu * k + 0.5 * damping / h;
     if (pass + 1 == passes_ && !friction_) break;
+    const Pair free = other - weight * g.e;
+    const mjtNum change = h * (Dot(g.g, free) - w * force) / (1 + h * h * w * p);
+    const Pair before = dv;
+    dv = (free - weight * g.g * (force + h * p * change)) * h;
     if (friction_) {
-      const mjtNum dv[2] = {dm, dl};
-      rub.reach = friction_->Reach(speed + 0.5 * Rotation(dv), g.torque);
+      rub.reach = friction_->Reach(speed + 0.5 * Rotation(before), g.torque);
       rub.stretch = std::clamp(turned, -rub.reach, rub.reach);
-    }
-    const mjtNum am = state[0] - wm * g.e_theta, al = state[1] - wl * g.e_psi;
-    const mjtNum change = h * (g.g_theta * am + g.g_psi * al - w * force) /
-                          (1 + h * h * w * p);
-    const mjtNum f = force + h * p * change;
-    dm = h * (am - wm * g.g_theta * f);
-    dl = h * (al - wl * g.g_psi * f);
-    if (friction_) {
       // response of rotor and link to friction, (M + h^2 p g g')^-1 b
-      const mjtNum bm = friction_->b_theta(), bl = friction_->b_psi();
-      const mjtNum along = h * h * p * (wm * bm * g.g_theta + wl * bl * g.g_psi) /
-                           (1 + h * h * w * p);
-      const mjtNum rm = wm * (bm - along * g.g_theta);
-      const mjtNum rl = wl * (bl - along * g.g_psi);
-      const mjtNum dv[2] = {dm, dl}, response[2] = {h * rm, h * rl};
-      const mjtNum rubs =
-          friction_->Solve(h, speed, Rotation(dv), Rotation(response), &rub);
-      dm -= h * rm * rubs;
-      dl -= h * rl * rubs;
+      const Pair b = friction_->b();
+      const mjtNum along = h * h * p * Dot(weight * b, g.g) / (1 + h * h * w * p);
+      const Pair answer = weight * (b - g.g * along) * h;
+      dv -= answer *
+            friction_->Solve(h, speed, Rotation(dv), Rotation(answer), &rub);
     }
   }
 
-  if (Diverges(d, {force, p, g.g_theta, g.g_psi, g.e_theta, g.e_psi, rub.force,
-                   rub.metric})) {
+  if (Diverges(d, {force, p, g.g[0], g.g[1], g.e[0], g.e[1], rub.force, rub.metric})) {
     return;
   }
   p = SetTangent(m, d, tendon_, p);
   // cancel the force -h p times the tendon velocity, which the engine adds along g
   const mjtNum shift = h * p * d->ten_velocity[tendon_];
-  d->ten_J[entry_rotor_] = g.g_theta;
-  d->ten_J[entry_link_] = g.g_psi;
-  d->qfrc_passive[v_rotor_] -= (force - shift) * g.g_theta + g.e_theta;
-  d->qfrc_passive[v_link_] -= (force - shift) * g.g_psi + g.e_psi;
+  d->ten_J[entry_rotor_] = g.g[0];
+  d->ten_J[entry_link_] = g.g[1];
+  AddTorque(d, (g.g * (force - shift) + g.e) * -1);
   if (friction_) {
     // the same for friction along b, through the second term of the metric
     rub.metric = SetTangent(m, d, friction_tendon_, rub.metric);
     const mjtNum rubs = rub.force - h * rub.metric * d->ten_velocity[friction_tendon_];
-    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
-    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
+    AddTorque(d, friction_->b() * -rubs);
   }
 
   step_.scheme = true;
-  step_.v_rotor = vm;
-  step_.v_link = vl;
-  step_.w_rotor = wm;
-  step_.w_link = wl;
+  step_.v = v;
+  step_.weight = weight;
   step_.force = force;
   step_.metric = p;
   step_.torsion = map_.torsion();
@@ -527,9 +526,9 @@ void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
     }
   }
   mjtNum* bristle = state + kAccelerations + reach_.size();
+  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   if (friction_ && step_.gradient) {
-    const mjtNum q[2] = {d->qpos[q_rotor_], d->qpos[q_link_]};
-    const mjtNum v[2] = {d->qvel[v_rotor_], d->qvel[v_link_]};
+    const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
     const mjtNum x = Rotation(q);
     DriveValue value;
     map_.Gradient(q[0], q[1], &value);
@@ -542,23 +541,17 @@ void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
   if (!step_.scheme) return;
   const mjtNum h = m->opt.timestep;
   const DriveValue& g = step_.value;
-  const mjtNum dm = d->qvel[v_rotor_] - step_.v_rotor;
-  const mjtNum dl = d->qvel[v_link_] - step_.v_link;
-  const mjtNum f = step_.force + h * step_.metric * (g.g_theta * dm + g.g_psi * dl);
-  mjtNum on_rotor = g.g_theta * f + g.e_theta, on_link = g.g_psi * f + g.e_psi;
+  const Pair dv = v - step_.v;
+  Pair torque = g.g * (step_.force + h * step_.metric * Dot(g.g, dv)) + g.e;
   if (friction_) {
     const FrictionStep& rub = step_.friction;
-    const mjtNum v[2] = {step_.v_rotor, step_.v_link}, dv[2] = {dm, dl};
     const mjtNum change = Rotation(dv);
-    const mjtNum rubs = rub.force + h * rub.metric * change;
-    on_rotor += friction_->b_theta() * rubs;
-    on_link += friction_->b_psi() * rubs;
-    const mjtNum dx = h * (Rotation(v) + 0.5 * change);
+    torque += friction_->b() * (rub.force + h * rub.metric * change);
+    const mjtNum dx = h * (Rotation(step_.v) + 0.5 * change);
     bristle[0] = step_.rotation + dx - friction_->After(rub, dx);
     bristle[1] = 1;
   }
-  state[0] = dm / h + step_.w_rotor * on_rotor;
-  state[1] = dl / h + step_.w_link * on_link;
+  Store(state, dv * (1 / h) + step_.weight * torque);
 }
 
 void Drive::RegisterPlugin() {

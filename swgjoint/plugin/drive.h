@@ -11,6 +11,7 @@
 
 #include "drive_map.h"
 #include "friction.h"
+#include "lanes.h"
 
 namespace swgjoint {
 
@@ -43,7 +44,7 @@ class Drive {
   // Results of Compute that Advance needs, within one step.
   struct Step {
     bool scheme = false, gradient = false;
-    mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // speeds, Response
+    Pair v = {}, weight = {};                                 // speeds, Responses
     mjtNum force = 0, metric = 0;                             // along g, and p
     mjtNum torsion = 0, rotation = 0;                         // at the start of step
     DriveValue value;
@@ -62,13 +63,15 @@ class Drive {
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
   mjtNum Damping(const mjModel* m, const mjData* d) const;
-  mjtNum Response(const mjModel* m, const mjData* d, int dof);
+  Pair Response(const mjModel* m, const mjData* d, int dof, int other);
+  Pair Responses(const mjModel* m, const mjData* d);
   void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
   bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
   void Place(const mjtNum* rest);
   void Slip(mjtNum change, DriveValue* value) const;
   bool FindFriction(const mjModel* m, const char* text, int rotor, int link);
-  mjtNum Rotation(const mjtNum* q) const;
+  mjtNum Rotation(const Pair& q) const;
+  void AddTorque(mjData* d, const Pair& torque) const;
   void Vary(const mjModel* m);
 
   DriveMap map_;
@@ -79,7 +82,8 @@ class Drive {
   // Jenkin elements: stiffness, yield torsion, and torsion relative to the relaxed
   // state
   std::vector<mjtNum> stiffness_, reach_, stretch_;
-  std::vector<mjtNum> column_;  // workspace of Response: a column of L^-T
+  bool siblings_ = false;       // whether rotor and link have the same ancestors
+  std::vector<mjtNum> column_;  // workspace of Response: two columns of L^-T
   mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
   int friction_tendon_ = -1;  // tendon of the friction term of the metric

@@ -12,25 +12,33 @@
 namespace swgjoint {
 namespace {
 
-// Polynomial with coefficients w, and its first two derivatives.
+// Polynomial with coefficients w, and its derivative.
 double Value(const double w[5], double d) {
   return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
 }
 double Slope(const double w[5], double d) {
   return w[1] + d * (2 * w[2] + d * (3 * w[3] + d * 4 * w[4]));
 }
-double Curvature(const double w[5], double d) {
-  return 2 * w[2] + d * (6 * w[3] + d * 12 * w[4]);
+// The mean torque between two torsions that belong to one polynomial of the potential,
+// and its derivative by the second torsion.
+SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
+  // The torque is cubic, so that the trapezoidal rule with a correction by the end
+  // derivatives is exact. It needs no difference of energies and remains accurate if
+  // the torsions are close or equal.
+  const double c2 = 2 * w[2], c3 = 3 * w[3], c4 = 4 * w[4];
+  const Pair cubic = d * c4;
+  const Pair stiffness = c2 + d * (2 * c3 + cubic * 3);
+  const Pair torque = w[1] + d * (c2 + d * (c3 + cubic));
+  const double sixth = (stiffness[1] - stiffness[0]) * (1. / 6);
+  const double step = d[1] - d[0];
+  return {0.5 * (torque[0] + torque[1] - step * sixth),
+          0.5 * (stiffness[1] - sixth - step * (1. / 3) * (c3 + 3 * cubic[1])),
+          stiffness};
 }
-// (w(b) - w(a))/(b - a), computed without these differences, so that it is accurate for
-// small b - a and equals the derivative if b == a.
-double Divided(const double w[5], double a, double b) {
-  const double ab = a * a + a * b + b * b;
-  return w[1] + w[2] * (a + b) + w[3] * ab + w[4] * (a + b) * (a * a + b * b);
-}
-// Derivative of Divided with respect to b.
-double DividedSlope(const double w[5], double a, double b) {
-  return w[2] + w[3] * (a + 2 * b) + w[4] * (a * a + 2 * a * b + 3 * b * b);
+// Mean of the polynomial's values at two places.
+SWGJOINT_INLINE double MeanValue(const double w[5], const Pair& d) {
+  const Pair value = w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
+  return 0.5 * (value[0] + value[1]);
 }
 
 // Sets an error message about an attribute, and returns false.
@@ -173,12 +181,6 @@ int DriveMap::Segment(double torsion) const {
                           knots_.begin());
 }
 
-// The same, but tests a guess first, because the torsion rarely leaves its segment
-// within a step.
-int DriveMap::SegmentNear(int guess, double torsion) const {
-  return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
-}
-
 void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
   Begin(theta, psi);
   Secant(0.0, 0.0, out);
@@ -279,8 +281,9 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
     const Lanes sh = eta * sinc;
     const Lanes c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
     const Lanes mean_c = c * ch, mean_s = s * ch;
-    const Lanes dc = s * sinc * -1, ds = c * sinc;
-    const Lanes theta_c = dc * n, theta_s = ds * n, psi_c = dc * m, psi_s = ds * m;
+    const Lanes by_theta = sinc * n, by_psi = sinc * m;
+    const Lanes theta_c = s * (by_theta * -1), theta_s = c * by_theta;
+    const Lanes psi_c = s * (by_psi * -1), psi_s = c * by_psi;
     g_theta += error_c * theta_c + error_s * theta_s;
     if (kPsi) g_psi += error_c * psi_c + error_s * psi_s;
     double* weight = out_weight + b * kWeights;
@@ -307,21 +310,19 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
     for (int p = 0; p < 5; ++p) {
       Load(row + 2 * p * kLanes, &even);
       Load(row + (2 * p + 1) * kLanes, &odd);
-      w[p] += mean_c * even + mean_s * odd;
+      if (p > 0) w[p] += mean_c * even + mean_s * odd;  // the torque does not need w[0]
       u[p] += theta_c * even + theta_s * odd;
       if (kPsi) v[p] += psi_c * even + psi_s * odd;
     }
   }
   const double* mean = &mean_[static_cast<size_t>(j0_) * 5];
   double rest[4];
-  Sums(w[0], w[1], w[2], w[3], w_);
+  Sums(w[1], w[2], w[3], w[4], w_ + 1);
   Sums(u[0], u[1], u[2], u[3], u_theta_);
-  Sums(w[4], u[4], g_theta, g_psi, rest);
-  for (int p = 0; p < 4; ++p) w_[p] += mean[p];
-  w_[4] = mean[4] + rest[0];
-  u_theta_[4] = rest[1];
-  out->g_theta = inverse_ratio_ + error_scale_ * rest[2];
-  out->g_psi = error_scale_ * rest[3] - 1.0;
+  Sums(u[4], g_theta, g_psi, g_psi, rest);
+  for (int p = 1; p < 5; ++p) w_[p] += mean[p];
+  u_theta_[4] = rest[0];
+  out->g = Pair{inverse_ratio_, -1.0} + Pair{rest[1], rest[2]} * error_scale_;
   if (kPsi) {
     Sums(v[0], v[1], v[2], v[3], u_psi_);
     Sums(v[4], v[4], v[4], v[4], rest);
@@ -329,23 +330,10 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
   }
 }
 
-SWGJOINT_CLONES void DriveMap::Weigh(double dtheta, double dpsi, DriveValue* out) {
-  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
-  if (top <= 0.5) {
-    moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
-  } else if (top <= 2) {
-    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
-  } else {
-    HalfStep(dtheta, dpsi);
-    moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)
-               : Sweep<false, -1>(dtheta, dpsi, out);
-  }
-}
-
 // Computes the mean torque of a step that crosses knots. The work is summed piece by
 // piece, which avoids the difference of two large energies.
-void DriveMap::Work(int j1, double x1, DriveValue* out) const {
-  double w[5], work = 0, torque_end = 0;
+MeanTorque DriveMap::Work(int j1, double x1) const {
+  double w[5], work = 0, begin = 0;
   const int step = j1 > j0_ ? 1 : -1;
   double from = torsion_;
   for (int j = j0_;; j += step) {
@@ -356,53 +344,54 @@ void DriveMap::Work(int j1, double x1, DriveValue* out) const {
       Combine(j, weight_.data(), w);
     }
     const double to = j == j1 ? x1 : knots_[step > 0 ? j : j - 1];
-    work += Divided(w, from - base_[j], to - base_[j]) * (to - from);
+    const MeanTorque piece = Mean(w, Pair{from - base_[j], to - base_[j]});
+    work += piece.torque * (to - from);
     from = to;
-    if (j == j0_) out->stiffness_begin = Curvature(w, d0_);
-    if (j == j1) {
-      out->stiffness_end = Curvature(w, x1 - base_[j]);
-      torque_end = Slope(w, x1 - base_[j]);
-      break;
-    }
+    if (j == j0_) begin = piece.stiffness[0];
+    if (j != j1) continue;
+    const double torque = work / (x1 - torsion_);
+    return {torque, (Slope(w, x1 - base_[j]) - torque) / (x1 - torsion_),
+            Pair{begin, piece.stiffness[1]}};
   }
-  out->torque = work / (x1 - torsion_);
-  out->slope = (torque_end - out->torque) / (x1 - torsion_);
 }
 
-void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
+SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   // With the phase phi at the midpoint and half the phase change eta,
   //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), and similarly for sin.
   // The secants of every harmonic for theta and psi therefore have a closed form, and
   // the mean of its two end values is cos(eta) times its value at the midpoint.
-  Weigh(dtheta, dpsi, out);
-  const double x1 = torsion_ + (out->g_theta * dtheta + out->g_psi * dpsi);
+  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
+  if (top <= 0.5) {
+    moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
+  } else if (top <= 2) {
+    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
+  } else {
+    HalfStep(dtheta, dpsi);
+    moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)
+               : Sweep<false, -1>(dtheta, dpsi, out);
+  }
+  const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
   const int j1 = SegmentNear(j0_, x1);
-  const double d1 = x1 - base_[j1];
+  const Pair d = {d0_, x1 - base_[j1]};
 
   // torque: mean of dV/d(torsion) along the step, with cos and sin at their means
-  if (j0_ == j1) {
-    out->torque = Divided(w_, d0_, d1);
-    out->slope = DividedSlope(w_, d0_, d1);
-    out->stiffness_begin = Curvature(w_, d0_);
-    out->stiffness_end = Curvature(w_, d1);
-  } else {
-    Work(j1, x1, out);
-  }
-  const auto bound = std::minmax(out->stiffness_begin, out->stiffness_end);
-  out->slope = std::clamp(out->slope, 0.5 * bound.first, 0.5 * bound.second);
+  const MeanTorque mean = j0_ == j1 ? Mean(w_, d) : Work(j1, x1);
+  const double begin = mean.stiffness[0], end = mean.stiffness[1];
+  out->torque = scale_ * mean.torque;
+  out->slope = scale_ * std::clamp(mean.slope, 0.5 * std::min(begin, end),
+                                   0.5 * std::max(begin, end));
+  out->stiffness_begin = scale_ * begin;
+  out->stiffness_end = scale_ * end;
 
   // secants of V for the angles: mean of their values at the two torsions
   const auto angle = [&](const double u[5], int weights) {
-    double end[5] = {0, 0, 0, 0, 0};
-    if (j1 != j0_) Combine(j1, weight_.data() + weights * kLanes, end);
-    return 0.5 * (Value(u, d0_) + Value(j1 == j0_ ? u : end, d1));
+    if (j1 == j0_) return MeanValue(u, d);
+    double other[5] = {0, 0, 0, 0, 0};
+    Combine(j1, weight_.data() + weights * kLanes, other);
+    return 0.5 * (Value(u, d[0]) + Value(other, d[1]));
   };
-  out->e_theta = angle(u_theta_, 2);
-  out->e_psi = moves_psi_ ? angle(u_psi_, 4) : 0.0;
-  for (double* x : {&out->torque, &out->slope, &out->stiffness_begin,
-                    &out->stiffness_end, &out->e_theta, &out->e_psi}) {
-    *x *= scale_;
-  }
+  const double e_theta = scale_ * angle(u_theta_, 2);
+  out->e = Pair{e_theta, moves_psi_ ? scale_ * angle(u_psi_, 4) : 0.0};
 }
 
 }  // namespace swgjoint

@@ -26,11 +26,17 @@ bool ParseNumbers(const char* text, std::vector<double>* out);
 
 // V and its derivatives at one state (Gradient) or over one step (Secant).
 struct DriveValue {
-  double g_theta = 0, g_psi = 0;  // d(torsion)/d(theta, psi)
+  Pair g = {};                    // d(torsion)/d(theta, psi)
   double torque = 0;              // dV/d(torsion) at fixed angles [N m]
   double slope = 0;               // d(torque)/d(torsion at the end of the step)
   double stiffness_begin = 0, stiffness_end = 0;  // d2V/d(torsion)2 [N m/rad]
-  double e_theta = 0, e_psi = 0;  // dV/d(theta, psi) at fixed torsion [N m]
+  Pair e = {};                    // dV/d(theta, psi) at fixed torsion [N m]
+};
+
+// Mean of dV/d(torsion) between two torsions, at fixed angles.
+struct MeanTorque {
+  double torque, slope;  // mean, and its derivative by the second torsion
+  Pair stiffness;        // d2V/d(torsion)2 at both
 };
 
 class DriveMap {
@@ -70,12 +76,15 @@ class DriveMap {
 
  private:
   int Segment(double torsion) const;
-  int SegmentNear(int guess, double torsion) const;
+  // The same, but tests a guess first, because the torsion rarely leaves its segment
+  // within a step.
+  int SegmentNear(int guess, double torsion) const {
+    return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
+  }
   void HalfStep(double dtheta, double dpsi);
   template <bool kPsi, int kHalvings>
   void Sweep(double dtheta, double dpsi, DriveValue* out);
-  void Weigh(double dtheta, double dpsi, DriveValue* out);
-  void Work(int j1, double x1, DriveValue* out) const;
+  MeanTorque Work(int j1, double x1) const;
   double Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;
 

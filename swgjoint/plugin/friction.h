@@ -5,6 +5,8 @@
 
 #include <vector>
 
+#include "lanes.h"
+
 namespace swgjoint {
 
 // Friction in one step of the scheme. The torque is force + h metric dnu, where dnu is
@@ -29,8 +31,8 @@ class Friction {
     viscous_ = scale * own_viscous_;
   }
 
-  double b_theta() const { return b_theta_; }
-  double b_psi() const { return b_psi_; }
+  // Relative rotation by (theta, psi).
+  Pair b() const { return Pair{b_theta_, b_psi_}; }
 
   // Largest stretch [rad] at a relative speed and a torque along the torsion.
   double Reach(double speed, double torque) const;

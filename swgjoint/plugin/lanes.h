@@ -1,4 +1,5 @@
-// Vectors of four harmonics that undergo the same operations, and their cos and sin.
+// Vectors of numbers that undergo the same operations: four harmonics with their cos
+// and sin, or rotor and link.
 #ifndef SWGJOINT_PLUGIN_LANES_H_
 #define SWGJOINT_PLUGIN_LANES_H_
 
@@ -19,41 +20,56 @@ constexpr int kLanes = 4;
 
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(8 * kLanes)));
+typedef double Pair __attribute__((vector_size(16)));
 #define SWGJOINT_INLINE inline __attribute__((always_inline))
 #else
-struct Lanes {
-  double v[kLanes];
+template <int N>
+struct Vector {
+  double v[N];
   double operator[](int i) const { return v[i]; }
-  Lanes& operator+=(const Lanes& o) { return *this = *this + o; }
+  Vector& operator+=(const Vector& o) { return *this = *this + o; }
+  Vector& operator-=(const Vector& o) { return *this = *this - o; }
   template <class F>
-  static Lanes Each(F f) { return {{f(0), f(1), f(2), f(3)}}; }
-  friend Lanes operator+(const Lanes& a, const Lanes& b) {
+  static Vector Each(F f) {
+    Vector out;
+    for (int i = 0; i < N; ++i) out.v[i] = f(i);
+    return out;
+  }
+  friend Vector operator+(const Vector& a, const Vector& b) {
     return Each([&](int i) { return a[i] + b[i]; });
   }
-  friend Lanes operator-(const Lanes& a, const Lanes& b) {
+  friend Vector operator-(const Vector& a, const Vector& b) {
     return Each([&](int i) { return a[i] - b[i]; });
   }
-  friend Lanes operator*(const Lanes& a, const Lanes& b) {
+  friend Vector operator*(const Vector& a, const Vector& b) {
     return Each([&](int i) { return a[i] * b[i]; });
   }
-  friend Lanes operator+(const Lanes& a, double b) {
+  friend Vector operator+(const Vector& a, double b) {
     return Each([&](int i) { return a[i] + b; });
   }
-  friend Lanes operator-(const Lanes& a, double b) { return a + -b; }
-  friend Lanes operator*(const Lanes& a, double b) {
+  friend Vector operator-(const Vector& a, double b) { return a + -b; }
+  friend Vector operator*(const Vector& a, double b) {
     return Each([&](int i) { return a[i] * b; });
   }
-  friend Lanes operator+(double a, const Lanes& b) { return b + a; }
-  friend Lanes operator-(double a, const Lanes& b) { return b * -1 + a; }
+  friend Vector operator+(double a, const Vector& b) { return b + a; }
+  friend Vector operator-(double a, const Vector& b) { return b * -1 + a; }
 };
+typedef Vector<kLanes> Lanes;
+typedef Vector<2> Pair;
 #define SWGJOINT_INLINE inline
 #endif
 
-SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
-  std::memcpy(x, from, sizeof(Lanes));
+template <class V>
+SWGJOINT_INLINE void Load(const double* from, V* x) {
+  std::memcpy(x, from, sizeof(V));
 }
-SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
-  std::memcpy(to, &x, sizeof(Lanes));
+template <class V>
+SWGJOINT_INLINE void Store(double* to, const V& x) {
+  std::memcpy(to, &x, sizeof(V));
+}
+SWGJOINT_INLINE double Dot(const Pair& a, const Pair& b) {
+  const Pair product = a * b;
+  return product[0] + product[1];
 }
 
 // Sum of the lanes of each of the four vectors.
