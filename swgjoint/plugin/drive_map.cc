@@ -1,24 +1,14 @@
 #include "drive_map.h"
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "lanes.h"
 
 namespace swgjoint {
 namespace {
 
-// Polynomial with coefficients w, and its derivative.
-double Value(const double w[5], double d) {
-  return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
-}
-double Slope(const double w[5], double d) {
-  return w[1] + d * (2 * w[2] + d * (3 * w[3] + d * 4 * w[4]));
-}
 // The mean torque between two torsions that belong to one polynomial of the potential,
 // and its derivative by the second torsion.
 SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
@@ -41,137 +31,7 @@ SWGJOINT_INLINE double MeanValue(const double w[5], const Pair& d) {
   return 0.5 * (value[0] + value[1]);
 }
 
-// Sets an error message about an attribute, and returns false.
-bool Fail(std::string* error, const char* attribute, const std::string& why) {
-  *error = std::string("attribute '") + attribute + "' " + why;
-  return false;
-}
-
-// Reads an attribute of `count` numbers, or of any number of them if `count` is 0.
-bool Numbers(const char* text, const char* attribute, size_t count,
-             std::vector<double>* out, std::string* error) {
-  if (!ParseNumbers(text, out)) {
-    return Fail(error, attribute, "is not a list of finite numbers");
-  }
-  if (count && out->size() != count) {
-    return Fail(error, attribute,
-                "has " + std::to_string(out->size()) + " numbers, needs " +
-                    std::to_string(count));
-  }
-  return true;
-}
-
 }  // namespace
-
-bool ParseNumbers(const char* text, std::vector<double>* out) {
-  out->clear();
-  if (!text) return false;
-  const char* end = text + std::strlen(text);
-  while (true) {
-    while (text < end && std::isspace(static_cast<unsigned char>(*text))) ++text;
-    if (text == end) return !out->empty();
-    double value;
-    const auto result = std::from_chars(text, end, value);
-    if (result.ec != std::errc() || !std::isfinite(value)) return false;
-    text = result.ptr;
-    if (text < end && !std::isspace(static_cast<unsigned char>(*text))) return false;
-    out->push_back(value);
-  }
-}
-
-bool DriveMap::Parse(const DriveText& text, std::string* error) {
-  std::vector<double> list, orders;
-  if (!Numbers(text.ratio, "ratio", 1, &list, error)) return false;
-  ratio_ = list[0];
-  if (ratio_ == 0) return Fail(error, "ratio", "is 0");
-  inverse_ratio_ = 1 / ratio_;
-
-  // orders in (theta, psi), with the mean (0, 0) first
-  if (!Numbers(text.orders, "orders", 0, &orders, error)) return false;
-  if (orders.size() % 2) return Fail(error, "orders", "does not hold pairs");
-  n_ = static_cast<int>(orders.size() / 2);
-  for (int k = 0; k < n_; ++k) {
-    const double theta = orders[2 * k], psi = orders[2 * k + 1];
-    if (theta != std::rint(theta) || psi != std::rint(psi) || std::fabs(theta) > 1e6 ||
-        std::fabs(psi) > 1e6) {
-      return Fail(error, "orders", "holds a number that is no integer below 1e6");
-    }
-    moves_psi_ |= psi != 0;
-    top_order_ = std::max(top_order_, std::fabs(theta + psi / ratio_));
-    top_theta_ = std::max(top_theta_, std::fabs(theta));
-    top_psi_ = std::max(top_psi_, std::fabs(psi));
-  }
-  if (orders[0] != 0 || orders[1] != 0) {
-    return Fail(error, "orders", "does not begin with the mean (0 0)");
-  }
-
-  if (!Numbers(text.knots, "knots", 0, &knots_, error)) return false;
-  const int m = static_cast<int>(knots_.size()) - 1;
-  if (m < 1) return Fail(error, "knots", "has fewer than two numbers");
-  for (int j = 0; j < m; ++j) {
-    if (knots_[j + 1] <= knots_[j]) return Fail(error, "knots", "does not increase");
-  }
-  const size_t n = n_;
-  std::vector<double> potential, end;
-  if (!Numbers(text.potential, "potential", n * 2 * m * 5, &potential, error) ||
-      !Numbers(text.end_stiffness, "end_stiffness", n * 4, &end, error) ||
-      !Numbers(text.kinematic_error, "kinematic_error", n * 2, &list, error)) {
-    return false;
-  }
-  blocks_ = (n_ - 1 + kLanes - 1) / kLanes;
-  const size_t padded = static_cast<size_t>(blocks_) * kLanes;
-  std::vector<double> n_theta(padded, 0.0), n_psi(padded, 0.0);
-  for (auto* v : {&error_c_, &error_s_, &c_, &s_, &sinc_, &ch_}) {
-    v->assign(padded, 0.0);
-  }
-  weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
-  for (int k = 1; k < n_; ++k) {
-    n_theta[k - 1] = orders[2 * k];
-    n_psi[k - 1] = orders[2 * k + 1];
-    error_c_[k - 1] = list[2 * k];
-    error_s_[k - 1] = list[2 * k + 1];
-  }
-  error_mean_ = list[0];
-  n_theta_ = n_theta;
-  n_psi_ = n_psi;
-
-  // one table for the intervals and for the parabolas beyond the first and last knot
-  segments_ = m + 2;
-  base_.resize(segments_);
-  low_.assign(segments_, -std::numeric_limits<double>::infinity());
-  high_.assign(segments_, std::numeric_limits<double>::infinity());
-  mean_.assign(static_cast<size_t>(segments_) * 5, 0.0);
-  table_.assign(static_cast<size_t>(segments_) * blocks_ * kBlock, 0.0);
-  for (int seg = 0; seg < segments_; ++seg) {
-    base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
-    if (seg > 0) low_[seg] = knots_[seg - 1];
-    if (seg <= m) high_[seg] = knots_[seg];
-    for (int k = 0; k < n_; ++k) {
-      for (int ab = 0; ab < 2; ++ab) {
-        double to[5] = {0, 0, 0, 0, 0};
-        const int j = std::clamp(seg - 1, 0, m - 1);
-        const double* from = &potential[((2 * k + ab) * static_cast<size_t>(m) + j) * 5];
-        if (seg >= 1 && seg <= m) {
-          std::copy(from, from + 5, to);
-        } else {
-          const double d = seg == 0 ? 0.0 : knots_[m] - knots_[m - 1];
-          to[0] = Value(from, d);
-          to[1] = Slope(from, d);
-          to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
-        }
-        if (k == 0) {
-          if (ab == 0) std::copy(to, to + 5, &mean_[static_cast<size_t>(seg) * 5]);
-          continue;
-        }
-        const int block = (k - 1) / kLanes, lane = (k - 1) % kLanes;
-        double* row = &table_[(static_cast<size_t>(seg) * blocks_ + block) * kBlock];
-        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * kLanes + lane] = to[p];
-      }
-    }
-  }
-
-  return true;
-}
 
 // Segment that contains a torsion; 0 and segments_ - 1 are the end parabolas.
 int DriveMap::Segment(double torsion) const {
@@ -197,13 +57,23 @@ SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
   theta += shift_theta_;
   psi += shift_psi_;
   Lanes sum = {};
-  for (int k = 0; k < blocks_ * kLanes; k += kLanes) {
-    Lanes n, m, c, s, error_c, error_s;
-    Load(&n_theta_[k], &n);
-    Load(&n_psi_[k], &m);
+  for (int b = 0, k = 0; b < blocks_; ++b, k += kLanes) {
+    Lanes c, s, error_c, error_s;
+    const Recipe& from = recipe_[b];
+    if (from.block < 0) {
+      Lanes n, m;
+      Load(&n_theta_[k], &n);
+      Load(&n_psi_[k], &m);
+      CosSin(n * theta + m * psi, &c, &s);
+    } else {
+      Lanes c0, s0;
+      Load(&c_[from.block * kLanes], &c0);
+      Load(&s_[from.block * kLanes], &s0);
+      c = c0 * c_[from.shift] - s0 * s_[from.shift];
+      s = s0 * c_[from.shift] + c0 * s_[from.shift];
+    }
     Load(&error_c_[k], &error_c);
     Load(&error_s_[k], &error_s);
-    CosSin(n * theta + m * psi, &c, &s);
     sum += error_c * c + error_s * s;
     Store(&c_[k], c);
     Store(&s_[k], s);

@@ -39,6 +39,14 @@ struct MeanTorque {
   Pair stiffness;        // d2V/d(torsion)2 at both
 };
 
+// Polynomial with coefficients w, and its derivative.
+inline double Value(const double w[5], double d) {
+  return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
+}
+inline double Slope(const double w[5], double d) {
+  return w[1] + d * (2 * w[2] + d * (3 * w[3] + d * 4 * w[4]));
+}
+
 class DriveMap {
  public:
   // coefficients A0, B0, .. A4, B4 of the harmonics that are processed together
@@ -75,6 +83,14 @@ class DriveMap {
   void Secant(double dtheta, double dpsi, DriveValue* out);
 
  private:
+  // Rule that computes cos and sin of one block of harmonics from those of an earlier
+  // block, if all four orders differ from it by the same amount.
+  struct Recipe {
+    int block = -1;  // earlier block; -1: compute cos and sin of the phases
+    int shift = 0;   // earlier harmonic whose orders are the difference
+  };
+
+  void FindRecipes(int count);
   int Segment(double torsion) const;
   // The same, but tests a guess first, because the torsion rarely leaves its segment
   // within a step.
@@ -105,6 +121,8 @@ class DriveMap {
   // one value per harmonic without the mean, padded with zeros to whole blocks
   std::vector<double> n_theta_, n_psi_;
   std::vector<double> error_c_, error_s_;  // amplitudes of cos and sin in e0
+
+  std::vector<Recipe> recipe_;  // one per block
 
   // start state
   double torsion_ = 0, d0_ = 0;

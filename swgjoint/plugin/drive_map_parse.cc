@@ -1,0 +1,171 @@
+// Reading of the attributes of a map.
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "drive_map.h"
+#include "lanes.h"
+
+namespace swgjoint {
+namespace {
+
+// Sets an error message about an attribute, and returns false.
+bool Fail(std::string* error, const char* attribute, const std::string& why) {
+  *error = std::string("attribute '") + attribute + "' " + why;
+  return false;
+}
+
+// Reads an attribute of `count` numbers, or of any number of them if `count` is 0.
+bool Numbers(const char* text, const char* attribute, size_t count,
+             std::vector<double>* out, std::string* error) {
+  if (!ParseNumbers(text, out)) {
+    return Fail(error, attribute, "is not a list of finite numbers");
+  }
+  if (count && out->size() != count) {
+    return Fail(error, attribute,
+                "has " + std::to_string(out->size()) + " numbers, needs " +
+                    std::to_string(count));
+  }
+  return true;
+}
+
+}  // namespace
+
+bool ParseNumbers(const char* text, std::vector<double>* out) {
+  out->clear();
+  if (!text) return false;
+  const char* end = text + std::strlen(text);
+  while (true) {
+    while (text < end && std::isspace(static_cast<unsigned char>(*text))) ++text;
+    if (text == end) return !out->empty();
+    double value;
+    const auto result = std::from_chars(text, end, value);
+    if (result.ec != std::errc() || !std::isfinite(value)) return false;
+    text = result.ptr;
+    if (text < end && !std::isspace(static_cast<unsigned char>(*text))) return false;
+    out->push_back(value);
+  }
+}
+
+bool DriveMap::Parse(const DriveText& text, std::string* error) {
+  std::vector<double> list, orders;
+  if (!Numbers(text.ratio, "ratio", 1, &list, error)) return false;
+  ratio_ = list[0];
+  if (ratio_ == 0) return Fail(error, "ratio", "is 0");
+  inverse_ratio_ = 1 / ratio_;
+
+  // orders in (theta, psi), with the mean (0, 0) first
+  if (!Numbers(text.orders, "orders", 0, &orders, error)) return false;
+  if (orders.size() % 2) return Fail(error, "orders", "does not hold pairs");
+  n_ = static_cast<int>(orders.size() / 2);
+  for (int k = 0; k < n_; ++k) {
+    const double theta = orders[2 * k], psi = orders[2 * k + 1];
+    if (theta != std::rint(theta) || psi != std::rint(psi) || std::fabs(theta) > 1e6 ||
+        std::fabs(psi) > 1e6) {
+      return Fail(error, "orders", "holds a number that is no integer below 1e6");
+    }
+    moves_psi_ |= psi != 0;
+    top_order_ = std::max(top_order_, std::fabs(theta + psi / ratio_));
+    top_theta_ = std::max(top_theta_, std::fabs(theta));
+    top_psi_ = std::max(top_psi_, std::fabs(psi));
+  }
+  if (orders[0] != 0 || orders[1] != 0) {
+    return Fail(error, "orders", "does not begin with the mean (0 0)");
+  }
+
+  if (!Numbers(text.knots, "knots", 0, &knots_, error)) return false;
+  const int m = static_cast<int>(knots_.size()) - 1;
+  if (m < 1) return Fail(error, "knots", "has fewer than two numbers");
+  for (int j = 0; j < m; ++j) {
+    if (knots_[j + 1] <= knots_[j]) return Fail(error, "knots", "does not increase");
+  }
+  const size_t n = n_;
+  std::vector<double> potential, end;
+  if (!Numbers(text.potential, "potential", n * 2 * m * 5, &potential, error) ||
+      !Numbers(text.end_stiffness, "end_stiffness", n * 4, &end, error) ||
+      !Numbers(text.kinematic_error, "kinematic_error", n * 2, &list, error)) {
+    return false;
+  }
+  blocks_ = (n_ - 1 + kLanes - 1) / kLanes;
+  const size_t padded = static_cast<size_t>(blocks_) * kLanes;
+  std::vector<double> n_theta(padded, 0.0), n_psi(padded, 0.0);
+  for (auto* v : {&error_c_, &error_s_, &c_, &s_, &sinc_, &ch_}) {
+    v->assign(padded, 0.0);
+  }
+  weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
+  for (int k = 1; k < n_; ++k) {
+    n_theta[k - 1] = orders[2 * k];
+    n_psi[k - 1] = orders[2 * k + 1];
+    error_c_[k - 1] = list[2 * k];
+    error_s_[k - 1] = list[2 * k + 1];
+  }
+  error_mean_ = list[0];
+  n_theta_ = n_theta;
+  n_psi_ = n_psi;
+
+  // one table for the intervals and for the parabolas beyond the first and last knot
+  segments_ = m + 2;
+  base_.resize(segments_);
+  low_.assign(segments_, -std::numeric_limits<double>::infinity());
+  high_.assign(segments_, std::numeric_limits<double>::infinity());
+  mean_.assign(static_cast<size_t>(segments_) * 5, 0.0);
+  table_.assign(static_cast<size_t>(segments_) * blocks_ * kBlock, 0.0);
+  for (int seg = 0; seg < segments_; ++seg) {
+    base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
+    if (seg > 0) low_[seg] = knots_[seg - 1];
+    if (seg <= m) high_[seg] = knots_[seg];
+    for (int k = 0; k < n_; ++k) {
+      for (int ab = 0; ab < 2; ++ab) {
+        double to[5] = {0, 0, 0, 0, 0};
+        const int j = std::clamp(seg - 1, 0, m - 1);
+        const double* from = &potential[((2 * k + ab) * static_cast<size_t>(m) + j) * 5];
+        if (seg >= 1 && seg <= m) {
+          std::copy(from, from + 5, to);
+        } else {
+          const double d = seg == 0 ? 0.0 : knots_[m] - knots_[m - 1];
+          to[0] = Value(from, d);
+          to[1] = Slope(from, d);
+          to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
+        }
+        if (k == 0) {
+          if (ab == 0) std::copy(to, to + 5, &mean_[static_cast<size_t>(seg) * 5]);
+          continue;
+        }
+        const int block = (k - 1) / kLanes, lane = (k - 1) % kLanes;
+        double* row = &table_[(static_cast<size_t>(seg) * blocks_ + block) * kBlock];
+        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * kLanes + lane] = to[p];
+      }
+    }
+  }
+
+  FindRecipes(n_ - 1);
+  return true;
+}
+
+// Finds blocks whose orders are those of an earlier block plus those of an earlier
+// harmonic. A map of finite elements has all multiples of one order, so that only its
+// first blocks need a series. Zeros that pad the last block do not count.
+void DriveMap::FindRecipes(int count) {
+  recipe_.assign(blocks_, Recipe());
+  for (int k = kLanes; k < count; k += kLanes) {
+    const auto shifted = [&](int a, int shift) {
+      for (int b = 0; b < std::min(kLanes, count - k); ++b) {
+        if (n_theta_[k + b] != n_theta_[a + b] + n_theta_[shift] ||
+            n_psi_[k + b] != n_psi_[a + b] + n_psi_[shift]) {
+          return false;
+        }
+      }
+      return true;
+    };
+    for (int a = 0; a < k && recipe_[k / kLanes].block < 0; a += kLanes) {
+      for (int shift = 0; shift < k; ++shift) {
+        if (shifted(a, shift)) recipe_[k / kLanes] = {a / kLanes, shift};
+      }
+    }
+  }
+}
+
+}  // namespace swgjoint
