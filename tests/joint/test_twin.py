@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 
+from swgjoint.drives.references import load_drive
 from swgjoint.joint.reference import gradient_force, scheme_force
 from swgjoint.maps.drive_map import DriveMap
+
+ROOT = Path(__file__).parents[2]
 
 
 def random_motion(bench, rng, spread=1.5, speed=30.0):
@@ -49,14 +54,9 @@ def test_gradient_force_equals_twin(bench, any_layout, integrator):
         )
 
 
-@pytest.mark.parametrize("speed", [30.0, 1.0])
-def test_scheme_force_equals_twin(bench, any_layout, speed):
-    """Force, direction and stiffness that the scheme hands over equal the twin's.
-
-    The slow motion turns every harmonic by less than 1/4 rad in half a step, which the
-    plugin does by series.
-    """
-    b = bench(any_layout, damping_ratio=0.05)
+def check_scheme(b, speed):
+    """Force, direction and stiffness that the scheme hands over equal the twin's."""
+    drive = b.drive.drive
     rng = np.random.default_rng(2)
     t = b.model.tendon(b.drive.tendon).id
     row = b.model.ten_J_rowadr[t]
@@ -64,7 +64,7 @@ def test_scheme_force_equals_twin(bench, any_layout, speed):
     h = b.model.opt.timestep
     for _ in range(100):
         motion = random_motion(b, rng, speed=speed)
-        want = scheme_force(any_layout, motion, timestep=h, damping=b.drive.damping)
+        want = scheme_force(drive, motion, timestep=h, damping=b.drive.damping)
         a, _, c = 1e-9, 0.0, 1.0
         metric = a + 3 * c * b.data.ten_length[t] ** 2
         assert metric == pytest.approx(want.metric, rel=1e-8)
@@ -76,8 +76,27 @@ def test_scheme_force_equals_twin(bench, any_layout, speed):
             b.data.qfrc_passive[b.v],
             np.array([want.theta, want.psi]) + shift,
             rtol=0,
-            atol=1e-12 * scale(any_layout) + 1e-12 * np.abs(shift).max(),
+            atol=1e-12 * scale(drive) + 1e-12 * np.abs(shift).max(),
         )
+
+
+@pytest.mark.parametrize("speed", [30.0, 1.0])
+def test_scheme_force_equals_twin(bench, any_layout, speed):
+    """The plugin computes sin and cos of large and small phase changes in two ways."""
+    check_scheme(bench(any_layout, damping_ratio=0.05), speed)
+
+
+@pytest.mark.parametrize("phase", [0.2, 1.0, 10.0])
+def test_scheme_force_of_many_harmonics_equals_twin(bench, phase):
+    """23 multiples of one order, most of which follow from others.
+
+    In a step the phase of the highest order changes by about ``phase``: most often less
+    than 1/2 rad, less than 2 rad or more, which are three ways to compute sin and cos.
+    """
+    drive = load_drive(str(ROOT / "notebooks/maps/reference-2d.swg"))
+    b = bench(drive, damping_ratio=0.05)
+    top = np.abs(drive.angle_orders).max()
+    check_scheme(b, phase / top / b.model.opt.timestep)
 
 
 LIMIT = {"joint": 'limited="true" range="-10 10"'}
