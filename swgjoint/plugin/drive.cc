@@ -449,21 +449,24 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     turned = rest[1] != 0 ? step_.rotation - rest[0] : 0;
   }
   for (int pass = 0; pass < passes_; ++pass) {
-    const Pair dx = (v + dv * 0.5) * h;
+    const Pair dx = v * h + dv * (0.5 * h);
     map_.Secant(dx[0], dx[1], &g);
     if (!reach_.empty()) Slip(Dot(g.g, dx), &g);
     const mjtNum k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
     const mjtNum w = Dot(g.g * g.g, weight);
-    const mjtNum ka = h * h * k * w;
+    const mjtNum ka = h * h * w * k;
     const mjtNum nu = numerical_damping_ * ka * ka / (16 + ka * ka);
-    force = g.torque - 0.5 * h * g.slope * Dot(g.g, dv) +
-            (nu * k * h + damping) * Dot(g.g, v);
-    p = 0.5 * g.slope + 0.75 * nu * k + 0.5 * damping / h;
+    const mjtNum rate = Dot(g.g, v);
+    // the last factor of every product is the one that takes longest to compute
+    force = (g.torque + damping * rate - 0.5 * h * Dot(g.g, dv) * g.slope) +
+            h * rate * k * nu;
+    p = (0.5 * damping / h + 0.5 * g.slope) + 0.75 * k * nu;
     if (pass + 1 == passes_ && !friction_) break;
     const Pair free = other - weight * g.e;
-    const mjtNum change = h * (Dot(g.g, free) - w * force) / (1 + h * h * w * p);
+    const mjtNum change =
+        (h * Dot(g.g, free) - h * w * force) / (1 + h * h * w * p);
     const Pair before = dv;
-    dv = (free - weight * g.g * (force + h * p * change)) * h;
+    dv = free * h - weight * g.g * h * (force + h * p * change);
     if (friction_) {
       rub.reach = friction_->Reach(speed + 0.5 * Rotation(before), g.torque);
       rub.stretch = std::clamp(turned, -rub.reach, rub.reach);

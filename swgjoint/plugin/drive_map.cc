@@ -19,10 +19,10 @@ SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
   const Pair cubic = d * c4;
   const Pair stiffness = c2 + d * (2 * c3 + cubic * 3);
   const Pair torque = w[1] + d * (c2 + d * (c3 + cubic));
-  const double sixth = (stiffness[1] - stiffness[0]) * (1. / 6);
-  const double step = d[1] - d[0];
-  return {0.5 * (torque[0] + torque[1] - step * sixth),
-          0.5 * (stiffness[1] - sixth - step * (1. / 3) * (c3 + 3 * cubic[1])),
+  const double step = d[1] - d[0], growth = stiffness[1] - stiffness[0];
+  return {0.5 * (torque[0] + torque[1]) - step * (1. / 12) * growth,
+          0.5 * stiffness[1] - growth * (1. / 12) -
+              step * (1. / 6) * (c3 + 3 * cubic[1]),
           stiffness};
 }
 // Mean of the polynomial's values at two places.
@@ -115,7 +115,7 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
 
 // Computes, in one pass over the table, the weights of all A and B, the weighted sums
 // in the segment of the start state, and g. kPsi means that a harmonic depends on psi.
-// No phase changes by more than 2^kHalvings/2 rad; at kHalvings < 0, HalfStep has
+// No phase changes by more than 2^kHalvings rad; at kHalvings < 0, HalfStep has
 // computed sinc_ and ch_ for any change.
 template <bool kPsi, int kHalvings>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
@@ -231,10 +231,10 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   // The secants of every harmonic for theta and psi therefore have a closed form, and
   // the mean of its two end values is cos(eta) times its value at the midpoint.
   const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
-  if (top <= 0.5) {
+  if (top <= 1) {
     moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
   } else if (top <= 2) {
-    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
+    moves_psi_ ? Sweep<true, 1>(dtheta, dpsi, out) : Sweep<false, 1>(dtheta, dpsi, out);
   } else {
     HalfStep(dtheta, dpsi);
     moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)

@@ -92,23 +92,25 @@ SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
 #endif
 }
 
-// Computes sin(x)/x and cos(x) for |x| <= 2^(kHalvings - 2).
+// Computes sin(x)/x and cos(x) for |x| <= 2^(kHalvings - 1).
 template <int kHalvings>
 SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
-  // Series with a truncation error below 2^-53 for |y| <= 1/4. They are summed in pairs
+  // Series with a truncation error below 2^-53 for |y| <= 1/2. They are summed in pairs
   // of terms, because one term after the other would take twice as long.
   Lanes y = x * (1.0 / (1 << kHalvings));
   const Lanes z = y * y, z2 = z * z, z4 = z2 * z2;
   *sinc = ((1 + z * (-1. / 6)) + z2 * (1. / 120 + z * (-1. / 5040))) +
-          z4 * (1. / 362880 + z * (-1. / 39916800));
+          z4 * ((1. / 362880 + z * (-1. / 39916800)) + z2 * (1. / 6227020800));
   *cos = ((1 + z * (-1. / 2)) + z2 * (1. / 24 + z * (-1. / 720))) +
-         z4 * ((1. / 40320 + z * (-1. / 3628800)) + z2 * (1. / 479001600));
+         z4 * ((1. / 40320 + z * (-1. / 3628800)) +
+               z2 * (1. / 479001600 + z * (-1. / 87178291200)));
   // sin(2y) = 2 sin(y) cos(y), cos(2y) = 1 - 2 sin(y)^2
   for (int k = 0; k < kHalvings; ++k) {
-    const Lanes sin = y * *sinc;
-    *sinc = *sinc * *cos;
-    *cos = 1 - sin * sin * 2;
-    y = y * 2;
+    const Lanes twice = y * 2;
+    const Lanes product = *sinc * *cos;
+    *cos = 1 - (twice * *sinc) * (y * *sinc);
+    *sinc = product;
+    y = twice;
   }
 }
 
@@ -122,7 +124,7 @@ SWGJOINT_INLINE void CosSin(const Lanes& phase, Lanes* cos, Lanes* sin) {
   const Lanes rest =
       ((phase - turns * kTurn[0]) - turns * kTurn[1]) - turns * kTurn[2];
   Lanes sinc;
-  SincCos<4>(rest, &sinc, cos);
+  SincCos<3>(rest, &sinc, cos);
   *sin = rest * sinc;
 }
 
