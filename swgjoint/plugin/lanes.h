@@ -116,16 +116,20 @@ SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
 
 // Computes cos and sin of any phase.
 SWGJOINT_INLINE void CosSin(const Lanes& phase, Lanes* cos, Lanes* sin) {
-  // Adding and subtracting kRound rounds to an integer. 2 pi is the sum of three
-  // numbers; products of the first two (26 bits each) with up to 2^27 turns are exact.
+  // Adding and subtracting kRound rounds to an integer. Pi is the sum of two numbers, of
+  // which the first has 26 bits: its product with up to 2^27 half turns is exact. More
+  // half turns lose no more than the phase itself has lost.
   constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52
-  constexpr double kTurn[3] = {0x1.921fb5p+2, 0x1.110b46p-24, 0x1.1a62633145c07p-52};
-  const Lanes turns = (phase * 0.15915494309189535 + kRound) - kRound;
-  const Lanes rest =
-      ((phase - turns * kTurn[0]) - turns * kTurn[1]) - turns * kTurn[2];
-  Lanes sinc;
-  SincCos<3>(rest, &sinc, cos);
-  *sin = rest * sinc;
+  constexpr double kPi = 0x1.921fb5p+1, kRest = 0x1.110b4611a6263p-25;
+  const Lanes halves = (phase * 0.31830988618379069 + kRound) - kRound;
+  const Lanes rest = (phase - halves * kPi) - halves * kRest;
+  // an odd number of half turns changes both signs
+  const Lanes odd = halves - ((halves * 0.5 + kRound) - kRound) * 2;
+  const Lanes sign = 1 - odd * odd * 2;
+  Lanes sinc, even;
+  SincCos<2>(rest, &sinc, &even);
+  *cos = sign * even;
+  *sin = sign * rest * sinc;
 }
 
 }  // namespace swgjoint
