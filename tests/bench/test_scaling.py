@@ -104,3 +104,16 @@ def test_teeth_are_timed_on_a_rigid_wave_generator():
     row = scaling_fe.teeth(60)
     assert row["outcome"] == "converged"
     assert row["seconds"] > 0.0
+
+
+def test_a_lot_is_timed_without_its_perfect_drive(monkeypatch):
+    """The superposition of two drives, for a few angles."""
+    perfect = scaling_fe.perfect_positions
+    monkeypatch.setattr(scaling_fe, "perfect_positions", lambda d: perfect(d, phases=1))
+    scaling_fe._perfect_positions.cache_clear()
+    try:
+        row = scaling_fe.lot(2)
+    finally:
+        scaling_fe._perfect_positions.cache_clear()
+    assert row["model"] == "2d"
+    assert row["seconds"] > 0.0

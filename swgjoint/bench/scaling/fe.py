@@ -1,17 +1,22 @@
-"""Run time of the 2D meshing simulation over teeth, mesh, torque and positions."""
+"""Run time of the 2D model over teeth, mesh, torque, positions and drives of a lot."""
 
 from __future__ import annotations
 
 import time
+from functools import cache
 from typing import Any
 
 from swgjoint.errors import SwgError
 from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.fe.tolerances.lot import perfect_positions, sample_lot
+from swgjoint.fe.tolerances.rest import Rest
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 
 DESIGN = "reference-2d"
 """Design of all sweeps but that of the number of teeth."""
+LOT = "reference-2d-tolerances"
+"""Design of the drives of a lot."""
 POSITIONS = 3
 """Number of positions after the first one, which counts as set-up."""
 
@@ -72,3 +77,21 @@ def angles(count: float) -> dict[str, Any]:
     row = _measure(Design.load(DESIGN), positions=int(count))
     each = row.get("seconds")
     return row | {"seconds": None if each is None else each * count}
+
+
+def lot(count: float) -> dict[str, Any]:
+    """Run time of a lot with a number of drives, without that of the perfect drive."""
+    design = Design.load(LOT)
+    drives = [
+        design.with_changes({"tolerances.seed": seed}) for seed in range(int(count))
+    ]
+    perfect = _perfect_positions()
+    begin = time.process_time()
+    sample_lot(drives, perfect)
+    return {"model": "2d", "seconds": time.process_time() - begin}
+
+
+@cache
+def _perfect_positions() -> list[Rest]:
+    """The perfect drive of the lot, which all sizes share."""
+    return perfect_positions(Design.load(LOT))

@@ -2,10 +2,10 @@
 
 The benchmark measures time steps of chains of driven joints, of batches of arms and of
 a joint whose map has more and more harmonics. It also measures evaluations of the map
-in Python, and positions of the 2D finite-element model over teeth, nodes, torque and
-number of positions. Times are CPU times. An exponent p is fitted to time ~ size^p. For
-chains, harmonics and teeth, the fit uses only the larger sizes, where constant overhead
-is negligible.
+in Python, positions of the 2D finite-element model over teeth, nodes, torque and
+number of positions, and lots of drives with tooth errors. Times are CPU times. An
+exponent p is fitted to time ~ size^p. For chains, harmonics and teeth, the fit uses
+only the larger sizes, where constant overhead is negligible.
 """
 
 from __future__ import annotations
@@ -106,6 +106,13 @@ SWEEPS = (
         per="run",
         sizes=(2, 8, 32),
         measure=scaling_fe.angles,
+    ),
+    SizeSweep(
+        name="lot",
+        label="drives of a lot",
+        per="lot",
+        sizes=(4, 16, 64),
+        measure=scaling_fe.lot,
     ),
 )
 

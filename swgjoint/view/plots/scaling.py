@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isqrt
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
     """
     from matplotlib.figure import Figure
 
-    columns = min(4, len(labels))
+    columns = min(4, isqrt(max(len(labels) - 1, 0)) + 1)
     lines = -(-len(labels) // columns)
     figure = Figure(figsize=(3.6 * columns, 3.3 * lines), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
@@ -36,7 +37,7 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
         if rows:
             ax.set_title(f"{sweep}: time per {rows[0]['per']}", fontsize=9)
             sizes = [row["size"] for row in rows]
-            ax.set_xticks(sizes, [f"{size:.3g}" for size in sizes], fontsize=7)
+            ax.set_xticks(sizes, [f"{size:.4g}" for size in sizes], fontsize=7)
         ax.xaxis.minorticks_off()
         ax.tick_params(axis="y", which="both", labelsize=7)
         ax.grid(alpha=0.3)
