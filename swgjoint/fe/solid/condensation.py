@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 from swgjoint.fe.solid.linearise import SolidLinearised
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Array
 
@@ -45,6 +45,7 @@ def condense(
     model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
+    tangent: SolidTangent,
     found: ToothRows | None,
     rotation: float | None = None,
 ) -> Condensed:
@@ -54,6 +55,7 @@ def condense(
         model: The 3D model.
         state: State at which the ring is linearised.
         linear: The linearised ring.
+        tangent: Its factorised tangent, or that of a state nearby.
         found: Tooth contacts; None if there are none.
         rotation: Rotation of the bore of the diaphragm to which its unknown is relative
             [rad]; None for the rotation of the state.
@@ -105,29 +107,17 @@ def condense(
     out_of = linear.gradient + linear.pushed
     columns = np.zeros((n_sectors, size, n + 2))
     columns[:, :, 0] = -out_of
-    columns[:, :, [0, n + 1]] -= linear.hessian @ value
+    columns[:, :, [0, n + 1]] -= tangent.by_held @ value[:, held]
     if found is not None and n:
         columns[found.contacts.sector, :, 1 + np.arange(n)] = rows
-    matrix = linear.hessian.copy()
-    scale = float(np.mean(np.einsum("sii->si", matrix)))
-    matrix[:, held] = 0.0
-    matrix[:, :, held] = 0.0
-    matrix[:, held, held] = scale
-    columns[:, held] = 0.0
-    if linear.race is not None:
-        fixed = np.zeros((n_sectors, size), dtype=bool)
-        fixed[:, model.race_dofs] = linear.race.fixed
-        matrix[fixed], columns[fixed] = 0.0, 0.0
-        matrix.transpose(0, 2, 1)[fixed] = 0.0
-        matrix.reshape(n_sectors, -1)[:, :: size + 1][fixed] = scale
-    solved = _solve_sectors(model, matrix, columns)
+    solved = tangent.solve(columns, bore)
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
 
     # gaps, and the moments of the bore of the diaphragm and of the circular spline
     system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     lever = value[:, held, 1]
-    into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
+    into = np.einsum("sh,sih->si", lever, tangent.by_held)
     system[n, : n + 1] = np.einsum("si,sik->k", into, response)
     offset[n] = np.sum(lever * out_of[:, held]) + np.sum(into * base)
     if found is not None and n:
@@ -141,15 +131,3 @@ def condense(
     return Condensed(
         system=system, offset=offset, coupling=coupling, base=base, response=response
     )
-
-
-def _solve_sectors(model: SolidSectorModel, matrix: Array, columns: Array) -> Array:
-    """Solve the ring; a half model is closed by the factors of its last face."""
-    sign = model.face_closure
-    size = len(sign)
-    matrix[-1, -size:] *= sign[:, None]
-    matrix[-1, :, -size:] *= sign
-    columns[-1, -size:] *= sign[:, None]
-    solved = DenseCyclicFactor(matrix, size).solve(columns)
-    solved[-1, -size:] *= sign[:, None]
-    return solved

@@ -3,7 +3,8 @@
 The corotational strips are solved by Newton's method. Contact with the wave generator
 is treated by a primal-dual active-set method and condensed in every sector. In every
 iteration the tooth forces and the rotation of the output solve a small complementarity
-problem for the current tangent, as in the 2D model.
+problem for the current tangent, as in the 2D model. Close to the solution the tangent
+is factorised only once, see :mod:`swgjoint.fe.solid.tangent`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from swgjoint.fe.solid.corotation import energies
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
@@ -28,6 +30,9 @@ from swgjoint.typing import Array
 RELEASES = 6
 """Number of times that a line of bore nodes may return from contact in several planes
 to contact at a vertex. Without this limit some lines would alternate for ever."""
+NARROW, WIDE = 0.02, 0.1
+"""Largest gaps of candidates of tooth contact, in lobe heights [-]. The limit follows
+the last displacement increment between these two."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +70,13 @@ class SolidSolver:
     thorough_below: float = 1e-7
     """Largest displacement increment below which tooth contact is also searched between
     the nodes [m]."""
+    keep_below: float = 1e-6
+    """Largest displacement increment below which the tangent of the last iteration is
+    kept [m]. The tangent of a state so close reduces the error as much as that of the
+    last state."""
+    slowest: float = 0.5
+    """Ratio of the displacement increments of two iterations above which the tangent
+    is computed anew [-]."""
     stride: float = 0.2
     """Limit of the displacement increment of an iteration, in lobe heights [-]; larger
     increments are damped because the contacts change on the way."""
@@ -87,18 +99,30 @@ class SolidSolver:
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
-        settled, thorough = False, False
+        settled = False
         last: Array | None = None
+        tangent: SolidTangent | None = None
+        # a state whose teeth carry force is close to the solution
+        thorough = start.held is not None and len(start.held) > 0
+        reach = (NARROW if thorough else WIDE) * model.lobe_height
         released = np.zeros(start.shared.shape, int)
         try:
-            for iteration in range(self.max_iterations):
-                linear = linearise(model, state, kept=released >= RELEASES)
-                reach = (0.02 if iteration > 2 else 0.1) * model.lobe_height
+            for _ in range(self.max_iterations):
+                anew = tangent is None or not self._keeps_tangent(history)
+                linear = linearise(
+                    model, state, kept=released >= RELEASES, tangent=anew
+                )
+                if tangent is None or anew:
+                    tangent = SolidTangent(model, linear)
                 # once the search is thorough it remains so: contacts that only this
                 # search finds would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
-                step = _solve_linear(model, state, linear, load, reach, thorough)
+                step = _solve_linear(
+                    model, state, linear, tangent, load, reach, thorough
+                )
                 history.append(step.largest)
+                limits = NARROW * model.lobe_height, WIDE * model.lobe_height
+                reach = min(max(step.largest, limits[0]), limits[1])
                 if not step.largest < self.largest_step:
                     return replace(
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
@@ -127,6 +151,12 @@ class SolidSolver:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
         return _finished(model, state, outcome, history)
+
+    def _keeps_tangent(self, history: list[float]) -> bool:
+        """Whether the next iteration can use the tangent of the last one."""
+        if not history or not history[-1] < self.keep_below:
+            return False
+        return len(history) < 2 or history[-1] < self.slowest * history[-2]
 
 
 def _takes_back(increment: Array, last: Array | None) -> bool:
@@ -178,6 +208,7 @@ def _solve_linear(
     model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
+    tangent: SolidTangent,
     load: SolidLoad,
     reach: float,
     thorough: bool,
@@ -195,7 +226,7 @@ def _solve_linear(
             thorough=thorough,
             circular_spline_rotation=state.circular_spline_rotation,
         )
-    condensed = condense(model, state, linear, candidates, load.rotation)
+    condensed = condense(model, state, linear, tangent, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
     # unknowns: forces of the candidates and, under a torque, the output rotation
     n = 0 if candidates is None else len(candidates)

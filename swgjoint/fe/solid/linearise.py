@@ -30,8 +30,8 @@ from swgjoint.fe.solid.corotation import (
     project_to_frames,
     rotate_to_global,
     spin,
-    tangent,
 )
+from swgjoint.fe.solid.corotation import tangent as stiffness
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.typing import Array, Index, Mask
@@ -103,9 +103,9 @@ class SolidLinearised:
     """Frames of the segments, in the order of the strip."""
     gradient: Array
     """Derivative of the strain energy by the coordinates (N, n) [N]."""
-    hessian: Array
-    """Tangent, including the condensed contact of the wave generator (N, n, n) [N/m].
-    """
+    hessian: Array | None
+    """Tangent, including the condensed contact of the wave generator (N, n, n) [N/m];
+    None if it was not asked for."""
     pushed: Array
     """Contribution B^T W^-1 g of this contact to the gradient if the coordinates do not
     move: the negative forces of the wave generator on the coordinates (N, n) [N]."""
@@ -115,7 +115,11 @@ class SolidLinearised:
 
 
 def linearise(
-    model: SolidSectorModel, state: SolidState, *, kept: Mask | None = None
+    model: SolidSectorModel,
+    state: SolidState,
+    *,
+    kept: Mask | None = None,
+    tangent: bool = True,
 ) -> SolidLinearised:
     """Linearise a ring at a state.
 
@@ -125,11 +129,12 @@ def linearise(
         kept: Mask of the lines whose contact remains shared by several planes if it is
             shared in the state, see ``shared`` of :class:`SolidState` (N, L); None for
             all lines.
+        tangent: Whether the tangent is computed.
     """
     frames = model.frames(state)
     n = model.size
     gradient, pushed = np.zeros((2, model.sectors, n))
-    hessian = np.zeros((model.sectors, n, n))
+    hessian = np.zeros((model.sectors, n, n)) if tangent else None
     bore = bore_contact(model, state, frames[0], kept=kept)
     loads = model.loads(state)
     for number, (segment, frame) in enumerate(
@@ -141,12 +146,13 @@ def linearise(
         if number == 0:
             total = elastic - loads @ segment.loaded_from_masters
         gradient[:, dofs] += rotate_to_global(frame, project_to_frames(frame, elastic))
-        local = matrices_in_global(frame, tangent(segment, frame, total))
-        hessian[:, dofs[:, None], dofs] += local
-        if number == 0:
-            into, held = model.contact_dofs, bore.inverse @ bore.rows
-            hessian[:, into[:, None], into] += bore.rows.transpose(0, 2, 1) @ held
-            pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
+        if hessian is not None:
+            local = matrices_in_global(frame, stiffness(segment, frame, total))
+            hessian[:, dofs[:, None], dofs] += local
+    into, held = model.contact_dofs, bore.inverse @ bore.rows
+    pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
+    if hessian is not None:
+        hessian[:, into[:, None], into] += bore.rows.transpose(0, 2, 1) @ held
     race = None
     if model.race is not None and state.race is not None:
         race, dofs = (
@@ -154,7 +160,8 @@ def linearise(
             model.race_dofs,
         )
         gradient[:, dofs] += race.gradient
-        hessian[:, dofs[:, None], dofs] += race.hessian
+        if hessian is not None:
+            hessian[:, dofs[:, None], dofs] += race.hessian
     return SolidLinearised(
         frames=frames,
         gradient=gradient,
@@ -198,19 +205,20 @@ def bore_contact(
     vertex, found, bend, covered = _vertices(model, gap, state, kept)
     # derivative by the masters in the frame: deformation and rotation of the frame
     carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
-    carried = np.einsum("spi,pim->spm", normal, carry)
+    by_point = normal.transpose(1, 0, 2)
+    carried = np.ascontiguousarray((by_point @ carry).transpose(1, 0, 2))
     m = frame.position.shape[1]
     middle = local - frame.centre[:, None] - teeth.position.mean(axis=0)
     turning = np.cross(middle, normal)
     s = -spin(frame.position).reshape(n, 3 * m, 3)
-    turning -= np.einsum("spm,smw->spw", carried, s)
-    rows = carried + np.einsum("spw,swm->spm", turning, frame.gradient)
-    rows = np.einsum("sij,spaj->spai", frame.turn, rows.reshape(n, b, m, 3))
+    turning -= carried @ s
+    rows = carried + turning @ frame.gradient
+    rows = rows.reshape(n, b * m, 3) @ frame.turn.transpose(0, 2, 1)
     rows = np.concatenate([rows.reshape(n, b, 3 * m), by_race], axis=2)
     # compliance W of nodes, vertices and slopes
-    compliance = teeth.compliance[first:, first:].reshape(b, 3, b, 3)
-    seen = np.einsum("iajb,sjb->siaj", compliance, normal)
-    nodal = np.einsum("sia,siaj->sij", normal, seen)
+    compliance = teeth.compliance[first:, first:].reshape(b, 3, 3 * b)
+    seen = (by_point @ compliance).reshape(b, n, b, 3)
+    nodal = np.einsum("isjb,sjb->sij", seen, normal)
     p = b + vertex.shape[1]
     w = np.zeros((n, p, p))
     w[:, :b, :b], w[:, b:, :b] = nodal, vertex @ nodal
@@ -232,10 +240,10 @@ def bore_contact(
     # gaps without the previous forces, and the inverse over the active points
     moved = model.loads(state) @ teeth.compliance[:, first:]
     free = gap - np.einsum("spi,spi->sp", normal, moved.reshape(n, b, 3))
-    on = active[:, :, None] & active[:, None, :]
-    size = np.mean(np.einsum("spp->sp", w))
-    safe = np.where(on, w, 0.0) + np.where(active, 0.0, size)[:, :, None] * np.eye(p)
-    inverse = np.where(on, np.linalg.inv(safe), 0.0)
+    inverse = np.zeros_like(w)
+    for k in np.flatnonzero(active.any(axis=1)):
+        on = np.ix_(active[k], active[k])
+        inverse[k][on] = np.linalg.inv(w[k][on])
 
     def with_vertices(of_nodes: Array) -> Array:
         return np.concatenate([of_nodes, vertex @ of_nodes], axis=1)

@@ -14,6 +14,7 @@ from swgjoint.fe.solid.condensation import condense
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Mask
 
@@ -49,7 +50,7 @@ def influence(
     linear = linearise(model, state)
     contacts, carries = _tooth_contacts(model, linear, state)
     n = len(contacts)
-    condensed = condense(model, state, linear, contacts)
+    condensed = condense(model, state, linear, SolidTangent(model, linear), contacts)
     # the member that is not the output is fixed
     used = np.append(np.arange(n), n + 1 if circular_spline_is_output else n)
     offset = condensed.offset[used]

@@ -121,7 +121,7 @@ def small_pattern(few_masters_everywhere, kept_once):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sampling, "solve_mesh_cycle", pattern)
         patch.setattr(sampling, "LEVELS", (0.1, 0.35, 1.0))
-        patch.setattr(sampling, "FIXED_SOLVES", 4)
+        patch.setattr(sampling, "FIXED_SOLVES", 8)
         yield sample
 
 

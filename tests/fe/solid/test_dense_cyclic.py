@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.common.cyclic import CyclicFactor, SingularCyclicError
+from swgjoint.fe.solid.cholesky_cyclic import (
+    CholeskyCyclicFactor,
+    IndefiniteCyclicError,
+    factorise_ring,
+)
 from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 
 
@@ -35,3 +40,32 @@ def test_singular_ring_is_reported():
     """A ring without any stiffness."""
     with pytest.raises(SingularCyclicError):
         DenseCyclicFactor(np.zeros((4, 5, 5)), 2)
+
+
+@pytest.mark.parametrize(("sectors", "inside"), [(3, 2), (4, 0), (7, 2)])
+def test_cholesky_factor_solves_the_same_ring(sectors, inside):
+    """Positive definite rings, many right-hand sides; the matrix is not changed."""
+    matrix = blocks(sectors, 3, inside) + 30.0 * np.eye(6 + inside)
+    before = matrix.copy()
+    rhs = np.random.default_rng(2).normal(size=(sectors, 6 + inside, 5))
+    ours = CholeskyCyclicFactor(matrix, 3).solve(rhs)
+    expected = DenseCyclicFactor(matrix, 3).solve(rhs)
+    assert ours == pytest.approx(expected, rel=1e-11, abs=1e-13)
+    assert (matrix == before).all()
+
+
+def test_indefinite_ring_is_factorised_with_pivoting():
+    """Cholesky's factor does not exist; the solution does."""
+    matrix = blocks(5, 3, 2)
+    with pytest.raises(IndefiniteCyclicError):
+        CholeskyCyclicFactor(matrix, 3)
+    factor = factorise_ring(matrix, 3)
+    assert isinstance(factor, DenseCyclicFactor)
+    definite = factorise_ring(matrix + 30.0 * np.eye(8), 3)
+    assert isinstance(definite, CholeskyCyclicFactor)
+
+
+def test_singular_ring_is_reported_by_either():
+    """A ring without any stiffness."""
+    with pytest.raises(SingularCyclicError):
+        factorise_ring(np.zeros((4, 5, 5)), 2)
