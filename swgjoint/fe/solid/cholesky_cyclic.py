@@ -80,15 +80,7 @@ class CholeskyCyclicFactor:
         _factorise(self._factor[last])
 
     def solve(self, rhs: Array) -> Array:
-        """Solve for k right-hand sides.
-
-        Args:
-            rhs: Right-hand sides by sector (N, n, k); contributions of two sectors to
-                their shared face are added.
-
-        Returns:
-            Solution at the degrees of freedom of each sector (N, n, k).
-        """
+        """Solve for k right-hand sides (N, n, k), see :class:`DenseCyclicFactor`."""
         face, last = self._face, self._last
         loads = np.ascontiguousarray(rhs.transpose(0, 2, 1))
         inside = np.ascontiguousarray(loads[:, :, self._inner])
