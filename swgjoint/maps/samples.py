@@ -67,6 +67,21 @@ class ToleranceSamples:
             table = frozen_array(getattr(self, key), key, shape=shape)
             object.__setattr__(self, key, table)
 
+    @property
+    def zero(self) -> int:
+        """Row of zero torque."""
+        return int(np.flatnonzero(self.torque == 0.0)[0])
+
+    @property
+    def has_onsets(self) -> bool:
+        """Whether the rows next to zero torque are the ends of a clearance.
+
+        The torque there is a tiny fraction of the next one, see
+        :func:`swgjoint.fe.common.clearance.across_clearance`.
+        """
+        positive = self.torque[self.zero + 1 :]
+        return positive.size > 1 and bool(positive[0] < 1e-6 * positive[1])
+
     def in_series(self, compliance: float) -> ToleranceSamples:
         """The samples of the drive in series with an output spring.
 

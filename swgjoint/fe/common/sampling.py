@@ -94,8 +94,7 @@ def sample_map(
     torques are the mirror image of those under positive ones. Both properties are
     checked at rated torque and recorded. If a solve fails, its torque and all larger
     ones are omitted, and the samples are marked as truncated. Manufacturing errors are
-    superposed, see :mod:`swgjoint.fe.tolerances.sampling`; the wave generator is then
-    rigid.
+    superposed, see :mod:`swgjoint.fe.tolerances.sampling`.
 
     In the 2D model the balls of a bearing are held at fixed positions on the cam, the
     first one on the major axis. Balls and teeth pass at different rates, so the drive
@@ -279,7 +278,7 @@ def _label(design: Design, model: str) -> dict[str, Any]:
         if plane and design.cup is not None
         else None,
         "bearing": "balls at rest on the cam, their passage left out"
-        if plane and maps_bearing(design)
+        if plane and carries_bearing(design)
         else None,
         "stress_state": stress_state_label(design) if plane else None,
         "springs_Nm_rad": springs_of(design),
@@ -287,7 +286,7 @@ def _label(design: Design, model: str) -> dict[str, Any]:
         if design.friction.tooth_coefficient
         else None,
         "tolerances": _named(design),
-        "left_out": unmodelled_parts(design, model, bearing=maps_bearing(design)),
+        "left_out": unmodelled_parts(design, model),
     }
 
 
@@ -330,14 +329,9 @@ def effort_of(
 
 def follower_in_plane(design: Design) -> Continuation:
     """Solver of the 2D drive that maps sample, without errors and friction."""
-    perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
         model=sector_model(
-            perfect,
-            half="auto",
-            friction=False,
-            bearing=bearing,
-            cage_held=True,
+            without_errors(design), half="auto", friction=False, cage_held=True
         ),
         ratio=design.ratio,
         layout=design.drive.layout,
@@ -353,15 +347,6 @@ def _follower_3d(design: Design) -> SolidContinuation:
         ratio=design.ratio,
         layout=design.drive.layout,
     )
-
-
-def maps_bearing(design: Design) -> bool:
-    """Whether a 2D map includes the bearing of the wave generator.
-
-    A map with manufacturing errors does not include it, because they are superposed on
-    a drive with a rigid wave generator.
-    """
-    return carries_bearing(design) and not has_errors(design)
 
 
 def _named(design: Design) -> dict[str, float] | None:

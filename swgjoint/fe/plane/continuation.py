@@ -154,8 +154,8 @@ class Continuation(Follower[State]):
     def influence(self, state: State) -> Influence:
         """Influence of every tooth gap on the output, linearised at an equilibrium.
 
-        The model must be that of the whole drive with a rigid wave generator, without
-        friction and without tooth errors.
+        The model must be that of the whole drive, without friction and without tooth
+        errors. Balls of a bearing keep their state: pressed or free.
         """
         return influence(
             self.model, state, circular_spline_is_output=self.circular_spline_is_output

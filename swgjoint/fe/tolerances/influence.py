@@ -33,8 +33,9 @@ def influence(
     """Influence of every tooth gap on the output, linearised at an equilibrium.
 
     Args:
-        model: 2D model of the whole drive with an elastic circular spline and a rigid
-            wave generator, without tooth errors and friction.
+        model: 2D model of the whole drive with an elastic circular spline, without
+            tooth errors and friction. Balls of a bearing keep their state: pressed or
+            free.
         state: The equilibrium.
         circular_spline_is_output: Whether the circular spline is the output.
 
@@ -49,8 +50,6 @@ def influence(
             "the influence needs a model of the whole drive, without friction and"
             " without tooth errors"
         )
-    if model.race is not None:
-        raise ValueError("the influence needs a rigid wave generator")
     assert model.circular_spline.compliance is not None
     linear = linearise(
         model, state, None if circular_spline_is_output else state.torque

@@ -69,7 +69,9 @@ def perfect_positions(design: Design, phases: int = PHASES) -> list[Rest]:
         ComputationError: If a position cannot be solved.
     """
     check_modelled(design, "2d")
-    return influences(without_errors(design), phases=phases)[1]
+    # the outlines of the wave generators differ; these errors are superposed where they
+    # touch the bore, from which a bearing would separate them
+    return influences(without_errors(design), phases=phases, bearing=False)[1]
 
 
 def sample_lot(
@@ -143,7 +145,7 @@ def superposition_error(
     """
     turn = round(2.0 * np.pi * abs(drive.ratio) / pitch_of(drive))
     pitch = np.arange(positions) * turn // positions
-    follow, rests = influences(with_perfect_teeth(drive), phases=1)
+    follow, rests = influences(with_perfect_teeth(drive), phases=1, bearing=False)
     solved = full_solves(drive, follow, rests, pitch, (0.0,))
     at = np.round(solved.input_angle / pitch_of(drive)).astype(np.int64)
     if not at.size:

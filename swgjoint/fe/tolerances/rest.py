@@ -26,18 +26,23 @@ SMALL = 0.01
 clearance is midway between its positions under this torque and its opposite."""
 
 
-def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
+def perfect_drive(
+    design: Design, model: str = "2d", *, bearing: bool = True
+) -> Follower[Any]:
     """Solver of the whole drive with perfect teeth and axis and without friction.
 
     Args:
         design: The drive; errors of its wave generator are kept.
         model: Fidelity, ``2d`` or ``3d``.
+        bearing: Whether a 2D model includes the bearing of the wave generator, with its
+            balls at rest on the cam, in designs for which
+            :func:`swgjoint.fe.plane.drive2d.carries_bearing` is true.
     """
     perfect, layout = with_perfect_teeth(design), design.drive.layout
     if model == "3d":
         solid = solid_sector_model(perfect)
         return SolidContinuation(model=solid, ratio=design.ratio, layout=layout)
-    plane = sector_model(perfect, friction=False, bearing=False)
+    plane = sector_model(perfect, friction=False, bearing=bearing, cage_held=True)
     return Continuation(model=plane, ratio=design.ratio, layout=layout)
 
 
@@ -105,6 +110,7 @@ def influences(
     *,
     phases: int = PHASES,
     model: str = "2d",
+    bearing: bool = True,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Follower[Any], list[Rest]]:
     """Unloaded drive with perfect teeth, linearised at positions within a pitch.
@@ -115,6 +121,8 @@ def influences(
         design: The drive; errors of its wave generator are kept.
         phases: Number of positions, equally spaced over a pitch.
         model: Fidelity, ``2d`` or ``3d``.
+        bearing: Whether a 2D model includes the bearing of the wave generator, see
+            :func:`perfect_drive`.
         tick: Called after every position.
 
     Returns:
@@ -124,7 +132,7 @@ def influences(
         ComputationError: If the unloaded drive cannot be solved.
     """
     period, small = pitch_of(design), SMALL * ratings_of(design).rated_torque
-    follow = perfect_drive(design, model)
+    follow = perfect_drive(design, model, bearing=bearing)
     state = follow.engage(follow.deflect())
     rest = Unloaded(state=state, small=small)
     positions = []

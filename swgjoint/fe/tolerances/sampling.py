@@ -111,7 +111,7 @@ def sample_tolerances(
     if has_play:
         levels = np.append(small, levels)
     # in 3D a linearisation takes minutes, so that only the unloaded one is used
-    under_load = levels if model == "2d" and not has_play else levels[:0]
+    under_load = levels if model == "2d" else levels[:0]
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
     steps = loads * -(-pitches.size // CHUNK)  # number of chunks, rounded up

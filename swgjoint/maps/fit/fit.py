@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit_checks import (
@@ -28,11 +27,16 @@ from swgjoint.maps.fit.fit_checks import (
     residual,
     stiffness_range,
 )
-from swgjoint.maps.fit.tolerance_modes import Combined, combine_modes
+from swgjoint.maps.fit.knots import common_knots
+from swgjoint.maps.fit.tolerance_modes import (
+    Combined,
+    combine_modes,
+    register_by_torque,
+)
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.fit.validation import validation
 from swgjoint.maps.quartic import quartic_chain
-from swgjoint.maps.samples import MapSamples, ToleranceSamples
+from swgjoint.maps.samples import MapSamples
 from swgjoint.typing import Array
 
 KEEP = 0.005
@@ -43,11 +47,6 @@ BETWEEN = (0.05, 0.15, 0.35, 0.65)
 """Additional fractions of the repeated peak torque at which harmonics are compared. The
 contact moves with the torque, so other harmonics dominate at other torques."""
 
-END_STEPS = 6
-"""Newton steps to the torsion at which the mean torque is the largest sampled one."""
-LADDER = 12
-"""Largest number of knot intervals across the end of a clearance."""
-
 
 def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     """The map fitted to samples; its ``info`` contains residuals and the energy check.
@@ -56,7 +55,9 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         samples: Equilibria over one period of the pattern, with tolerances or without.
         keep: Threshold for harmonics [-], see :data:`KEEP`; zero keeps all.
     """
-    knots, pattern = _pattern_harmonics(samples)
+    if samples.tolerances is not None:
+        samples = replace(samples, tolerances=register_by_torque(samples))
+    knots, coarse, pattern = _pattern_harmonics(samples)
     if samples.tolerances is None:
         full = _map_of(samples, knots, pattern)
         fitted, record = _select_harmonics(full, samples, keep)
@@ -66,7 +67,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
             knots,
             pattern.potential,
             pattern.error,
-            coarse=_coarse(samples),
+            coarse=coarse,
             keep=keep,
         )
         fitted = _map_of(samples, knots, combined)
@@ -78,20 +79,23 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     return replace(fitted, info=info)
 
 
-def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
-    """Knots [rad] and all harmonics of the pattern of perfect teeth."""
+def _pattern_harmonics(
+    samples: MapSamples,
+) -> tuple[Array, NDArray[np.bool_], Combined]:
+    """Knots [rad], the coarse ones among them, and all harmonics of perfect teeth."""
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     unloaded = samples.output_error[zero]
     e0 = unloaded - unloaded.mean()
     torsion = unloaded - samples.output_error  # (n_torques, n_angles)
     energy = samples.energy - samples.energy[zero].mean()
 
-    knots = _knots(samples, torsion)
+    knots, coarse = common_knots(samples, torsion)
     torque = np.broadcast_to(samples.torque[:, None], torsion.shape)
     curve = np.stack([energy, torque, 1.0 / samples.compliance])
     modes = _modes(interpolate_on_knots(torsion, curve, knots))
     return (
         knots,
+        coarse,
         Combined(
             orders=np.arange(len(modes))[:, None] * np.array([samples.order]),
             potential=modes,  # (n_modes, 2, 3, n_knots)
@@ -164,90 +168,6 @@ def _ranges(drive: DriveMap, samples: MapSamples) -> dict[str, list[float]]:
         "torque_range_Nm": [float(v) for v in drive.torque_range],
         "sampled_torque_Nm": [float(v) for v in samples.torque[[0, -1]]],
     }
-
-
-def _knots(samples: MapSamples, torsion: Array) -> Array:
-    """Common torsion knots of the curves at all angles [rad]. Shape (n_knots,)."""
-    zero = at = int(np.flatnonzero(samples.torque == 0.0)[0])
-    tolerances = samples.tolerances
-    if tolerances is None:
-        # the mean torsions, with both ends inside the sampled range of every angle
-        knots = torsion.mean(axis=1)
-        knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
-        # the range of stiff angles may end before the mean torsion of the last torques
-        least = 0.3 * np.abs(np.diff(torsion.mean(axis=1))[[0, -1]])
-        inside = (knots > knots[0] + least[0]) & (knots < knots[-1] - least[1])
-        inside[[0, -1]] = True
-        at -= int((~inside[:zero]).sum())
-        knots = knots[inside]
-    else:
-        # with tooth errors the stiffness varies so much that the range common to all
-        # positions would end far below the largest torque, so that the curves of stiff
-        # positions are extrapolated instead
-        error = tolerances.table[0]
-        rest = error[int(np.flatnonzero(tolerances.torque == 0.0)[0])]
-        mean = PchipInterpolator(tolerances.torque, (rest - error).mean(axis=1))
-        ends = tolerances.torque[[0, -1]]
-        knots = mean(np.clip(samples.torque, *ends))
-        _end_at_largest_torque(knots, tolerances, rest - error)
-    knots[at] = 0.0
-    if tolerances is None and samples.free:
-        up = _clearance_knots(knots[at + 3 :], torsion[zero + 1 : zero + 3])
-        down = _clearance_knots(-knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1])
-        knots = np.concatenate([-down[::-1], [0.0], up])
-    return np.asarray(knots)
-
-
-def _end_at_largest_torque(
-    knots: Array, tolerances: ToleranceSamples, torsion: Array
-) -> None:
-    """Scale the knots of each sign in place to end at the largest sampled torque.
-
-    The extrapolated curves of stiff positions raise the mean torque, so it reaches the
-    largest sampled torque at less than the mean torsion.
-    """
-    torque = np.broadcast_to(tolerances.torque[:, None], torsion.shape)
-    curve = np.stack([tolerances.table[1], torque, 1.0 / tolerances.table[2]])
-    for end, sign in ((0, -1.0), (-1, 1.0)):
-        last = knots[[end]].copy()
-        for _ in range(END_STEPS):
-            _, reached, slope = interpolate_on_knots(torsion, curve, last).mean(axis=0)
-            last += (tolerances.torque[end] - reached) / slope
-        side = knots * sign > 0.0
-        knots[side] *= last / knots[end]
-
-
-def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
-    """Mask of the knots for tooth errors, sampled at fewer torques (n_knots,)."""
-    assert samples.solved is not None
-    coarse = np.array(samples.solved)
-    if samples.free:  # the ends of the clearance
-        zero = int(np.flatnonzero(samples.torque == 0.0)[0])
-        coarse[zero - 2 : zero + 3] = True
-    coarse[[0, -1]] = True
-    return coarse
-
-
-def _clearance_knots(beyond: Array, ends: Array) -> Array:
-    """Knots of one side, with equal steps across the end of the clearance [rad].
-
-    The torsion at which the clearance ends varies with the angle by more than the
-    elastic torsion of a stiff drive. The steps extend from the torsion where no angle
-    has left the clearance to the one where all have left it. Each is about as long as
-    the transition at a single angle; there are at most :data:`LADDER`.
-
-    Args:
-        beyond: Usual knots, from the first torque after the one that takes up the
-            clearance [rad]. Shape (n,).
-        ends: Torsion at the end of the clearance, and under the torque that takes it up
-            [rad]. Shape (2, n_angles).
-    """
-    first, last = float(ends[0].min()), float(ends[1].max())
-    step = float((ends[1] - ends[0]).mean())
-    count = min(LADDER, int(np.ceil((last - first) / step)))
-    ladder = np.linspace(first, last, count + 1)
-    kept = beyond[beyond > last + 0.5 * (ladder[1] - ladder[0])]
-    return np.concatenate([ladder, kept])
 
 
 def _modes(values: Array) -> Array:

@@ -8,7 +8,7 @@ the cycle cannot be distinguished in it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.quartic import evaluate, quartic_chain
-from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.samples import MapSamples, ToleranceSamples
 from swgjoint.typing import Array, Index
 
 KEEP_TORQUE = 0.05
@@ -50,12 +50,12 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
     """All harmonics that tooth errors add over the cycle of the teeth.
 
     Args:
-        samples: Samples with tolerances.
+        samples: Samples whose tolerances are registered by torque.
         knots: Torsion of the knots [rad]. Shape (n_knots,).
     """
     tolerances = samples.tolerances
     assert tolerances is not None
-    zero = int(np.flatnonzero(tolerances.torque == 0.0)[0])
+    zero = tolerances.zero
 
     def tabulated(table: Array) -> Array:
         """Curves at the knots and unloaded error by angle (n_angles, 3 n_knots + 1)."""
@@ -70,9 +70,8 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
 
-    table, perfect = register_by_torque(samples)
-    change = tabulated(table)
-    change -= np.tile(tabulated(perfect), (tolerances.pitches, 1))
+    change = tabulated(tolerances.table)
+    change -= np.tile(tabulated(tolerances.perfect), (tolerances.pitches, 1))
     spectrum = np.fft.rfft(change, axis=0)[: (len(change) + 1) // 2] / len(change)
     spectrum[1:] *= 2.0
     modes = np.stack([spectrum.real, -spectrum.imag], axis=1)
@@ -85,8 +84,8 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
     )
 
 
-def register_by_torque(samples: MapSamples) -> tuple[Array, Array]:
-    """Tables with tooth errors and without, both based on the nonlinear solves.
+def register_by_torque(samples: MapSamples) -> ToleranceSamples:
+    """Samples with tooth errors and without, both based on the nonlinear solves.
 
     Tooth errors are superposed on a linearised drive. Its stiffness differs from that
     of the nonlinear drive, the more so the larger the torque. The changes due to the
@@ -96,9 +95,8 @@ def register_by_torque(samples: MapSamples) -> tuple[Array, Array]:
         samples: Samples with tolerances.
 
     Returns:
-        Output error [rad], strain energy [J] and compliance [rad/(N·m)] with errors (3,
-        n_torques, pitches * phases) and without (3, n_torques, phases). They are those
-        of the linearised drive if only one of both drives has clearance.
+        The samples with both tables changed. They are returned as they are, of the
+        linearised drive, if only one of both drives has clearance.
     """
     tolerances = samples.tolerances
     assert tolerances is not None
@@ -120,11 +118,13 @@ def register_by_torque(samples: MapSamples) -> tuple[Array, Array]:
     )
     ratio = nonlinear[2] / tolerances.perfect[2]
     if not ((ratio > 1.0 / ALIKE) & (ratio < ALIKE)).all():
-        return tolerances.table, tolerances.perfect
+        return tolerances
     per_pitch = (3, at.size, tolerances.pitches, tolerances.phases)
     moved = (nonlinear - tolerances.perfect)[:, :, None]
     table = tolerances.table.reshape(per_pitch) + moved
-    return table.reshape(tolerances.table.shape), nonlinear
+    return replace(
+        tolerances, table=table.reshape(tolerances.table.shape), perfect=nonlinear
+    )
 
 
 def _at_phases(values: Array, phases: int) -> Array:

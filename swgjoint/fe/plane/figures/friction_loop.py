@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.sampling import SYMMETRIC, maps_bearing
+from swgjoint.fe.common.sampling import SYMMETRIC
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.state import State
@@ -90,8 +90,7 @@ def friction_loops(
     parts = (np.arange(positions) + 0.5) / positions
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]
-    bearing = maps_bearing(design)
-    model = sector_model(perfect, half="auto", bearing=bearing, cage_held=True)
+    model = sector_model(perfect, half="auto", cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
     torque = loop_torques(top, steps)
