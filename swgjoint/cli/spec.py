@@ -250,6 +250,8 @@ def _source(result: dict[str, Any]) -> str:
         )
     if "stress_state" in validity:
         text += f"; {validity['stress_state']}"
+    if validity.get("left_out"):
+        text += f"; without {validity['left_out']}"
     if "manufacturing_errors" in validity:
         text += "; without manufacturing errors"
     return text

@@ -197,8 +197,10 @@ def _validity(
     if "manufacturing_errors" in drive.info:
         valid_for["manufacturing_errors"] = drive.info["manufacturing_errors"]
     label = drive.info.get("label")
-    if isinstance(label, dict) and label.get("stress_state"):
-        valid_for["stress_state"] = label["stress_state"]
+    if isinstance(label, dict):
+        for key in ("stress_state", "left_out"):
+            if label.get(key):
+                valid_for[key] = label[key]
     stated = drive.info.get("stated")
     return {
         "validity": valid_for,

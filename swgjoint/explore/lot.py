@@ -20,7 +20,7 @@ from scipy.stats import binomtest
 
 from swgjoint.code_hash import code_hash
 from swgjoint.errors import DesignError
-from swgjoint.fe.plane.drive2d import unmodelled_parts
+from swgjoint.fe.plane.drive2d import in_plane, unmodelled_parts
 from swgjoint.fe.tolerances.lot import (
     Lot,
     perfect_positions,
@@ -161,10 +161,12 @@ def run_lot(
         ComputationError: If the drive without errors cannot be solved.
     """
     begin = time.perf_counter()
-    if not has_errors(design):
+    modelled = in_plane(design)
+    if not has_errors(modelled):
         raise DesignError(
-            f"{design.drive.name}: all tolerances are zero; accepted: a positive value"
-            " of at least one key of [tolerances]"
+            f"{design.drive.name}: all tolerances that a 2D model has are zero;"
+            " accepted: a positive value of at least one key of [tolerances] besides"
+            " misalignment_arcmin"
         )
     name = design.drive.name
     parts = {
@@ -176,14 +178,14 @@ def run_lot(
     @cache
     def rests() -> Sequence[Rest]:
         progress(f"{name}: drive without errors", 0, 1)
-        found = perfect_positions(design)
+        found = perfect_positions(modelled)
         progress(f"{name}: drive without errors", 1, 1)
         return found
 
     def judged() -> _Judged:
         perfect = rests()
         progress(f"{name}: full solves", 0, 1)
-        error = superposition_error(draw(design, seed, sizes), perfect)
+        error = superposition_error(draw(modelled, seed, sizes), perfect)
         progress(f"{name}: full solves", 1, 1)
         return _Judged(error=error)
 
@@ -199,7 +201,7 @@ def run_lot(
     tasks = [
         _Task(
             rests=rests(),
-            drives=tuple(draw(design, one, sizes) for one in seeds),
+            drives=tuple(draw(modelled, one, sizes) for one in seeds),
             paths=tuple(paths[one] for one in seeds),
         )
         for seeds in (left[k : k + CHUNK] for k in range(0, len(left), CHUNK))

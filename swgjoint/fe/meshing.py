@@ -11,7 +11,13 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import Half, can_halve, check_modelled, sector_model
+from swgjoint.fe.plane.drive2d import (
+    Half,
+    can_halve,
+    check_modelled,
+    in_plane,
+    sector_model,
+)
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima
@@ -99,7 +105,7 @@ def simulate_meshing(
     check_modelled(design, model)
     begin = time.perf_counter()
     drive = sector_model(
-        design,
+        in_plane(design),
         half=half,
         nonlinear=nonlinear,
         elastic_circular_spline=elastic_circular_spline,

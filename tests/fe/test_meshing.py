@@ -245,17 +245,16 @@ def test_linear_level_runs_and_differs():
     assert np.isfinite(total).all()
 
 
-def test_what_is_not_modelled_is_refused():
-    """A key that the model cannot honour is named, with the reason, not ignored."""
-    changes = {"tolerances.misalignment_arcmin": 0.5}
-    design = Design.load("reference-2d").with_changes(changes)
-    with pytest.raises(
-        DesignError,
-        match=naming(
-            "reference-2d", "tolerances.misalignment_arcmin", "0.5", "2d", "0"
-        ),
-    ):
-        simulate_meshing(design, torque=1.0, steps=1)
+def test_what_is_not_modelled_is_named():
+    """A key that the model cannot honour is in the label, and changes nothing."""
+    leaning = coarse(**{"tolerances.misalignment_arcmin": 0.5})
+    found, plain = (
+        simulate_meshing(design, torque=1.0, steps=1, half=True)
+        for design in (leaning, coarse())
+    )
+    label = found.to_json()["label"]
+    assert label["left_out"] == "tolerances.misalignment_arcmin"
+    assert found.steps[-1].state.rotation == plain.steps[-1].state.rotation
 
 
 def test_half_model_of_odd_teeth_is_refused():

@@ -8,6 +8,8 @@ from messages import naming
 from solved import coarse
 
 from swgjoint.errors import DesignError
+from swgjoint.explore.lot import run_lot
+from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
 from swgjoint.fe.tolerances.lot import (
     outline_change,
@@ -17,6 +19,7 @@ from swgjoint.fe.tolerances.lot import (
 )
 from swgjoint.fe.tolerances.rest import influences
 from swgjoint.fe.tolerances.sampling import full_solves
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 
 pytestmark = pytest.mark.fe
@@ -101,13 +104,19 @@ def test_error_of_the_superposition_is_told(rests):
     assert told is None or told > 0.02
 
 
-def test_an_axis_that_leans_is_refused():
-    """A plane has none; silence would count it as nothing."""
+def test_an_axis_that_leans_counts_for_nothing_and_is_named(rests):
+    """A plane has none: the same figures, and the label names what is left out."""
     leaning = DESIGN.with_changes({"tolerances.misalignment_arcmin": 5.0})
-    with pytest.raises(
-        DesignError, match=naming("tolerances.misalignment_arcmin", "5", "2d", "0")
-    ):
-        perfect_positions(leaning, phases=1)
+    assert superposition_error(leaning, rests, positions=2) == superposition_error(
+        DESIGN, rests, positions=2
+    )
+    assert "tolerances.misalignment_arcmin" in unmodelled_parts(leaning)
+    assert unmodelled_parts(leaning, "3d") == unmodelled_parts(DESIGN, "3d")
+    alone = Design.load("reference-2d").with_changes(
+        {"tolerances.misalignment_arcmin": 5.0}
+    )
+    with pytest.raises(DesignError, match=naming("reference-2d", "misalignment_arcmin")):
+        run_lot(alone, count=1)
 
 
 def test_cup_adds_its_torsion_alone(rests):

@@ -13,7 +13,12 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import carries_bearing, sector_model, unmodelled_parts
+from swgjoint.fe.plane.drive2d import (
+    carries_bearing,
+    in_plane,
+    sector_model,
+    unmodelled_parts,
+)
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.shape_fields import (
     SectorFields,
@@ -115,11 +120,14 @@ def sample_map(
         Samples of the map.
 
     Raises:
-        DesignError: If the design cannot be built or has features that the model lacks.
+        DesignError: If the design cannot be built.
         ComputationError: If the unloaded drive or small torques cannot be solved.
     """
     begin = time.perf_counter()
     drive, ratings = design.drive, ratings_of(design)
+    given = design
+    if model == "2d":
+        design = in_plane(design)
     symmetric = design.wave_generator.kind in SYMMETRIC
     effort = effort_of(
         model, angles, both_signs=not symmetric, errors=has_errors(design)
@@ -173,8 +181,8 @@ def sample_map(
         fields=drive_fields(design, states, shown, surface, symmetric=symmetric),
         info=pattern.info
         | {
-            "design_hash": design.content_hash(),
-            "label": _label(design, model),
+            "design_hash": given.content_hash(),
+            "label": _label(given, model),
             "ratings_source": ratings.source,
             "truncated": pattern.truncated,
             "solves": done,
@@ -282,7 +290,7 @@ def _label(design: Design, model: str) -> dict[str, Any]:
         else None,
         "stress_state": stress_state_label(design) if plane else None,
         "springs_Nm_rad": springs_of(design),
-        "friction": "left out of the potential"
+        "friction": "left out of the potential; hysteresis of the 2d model"
         if design.friction.tooth_coefficient
         else None,
         "tolerances": _named(design),

@@ -82,7 +82,7 @@ def carries_bearing(design: Design) -> bool:
 
 
 def check_modelled(design: Design, model: str) -> None:
-    """Reject unknown models and designs that a 2D model cannot represent.
+    """Reject unknown models.
 
     Args:
         design: The drive.
@@ -90,20 +90,22 @@ def check_modelled(design: Design, model: str) -> None:
             and ``3d`` separately.
 
     Raises:
-        DesignError: If the model is not ``2d`` or the axes are misaligned; the message
-            has one line per fault.
+        DesignError: If the model is not ``2d``.
     """
-    drive, tolerances = design.drive, design.tolerances
-    faults = []
     if model != "2d":
-        faults.append(f"model = {model!r}: expected 'ring', '2d' or '3d'")
-    if tolerances.misalignment_arcmin:
-        faults.append(
-            f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: "
-            "expected 0, because a 2D model cannot tilt its axes"
-        )
-    if faults:
-        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
+        name = design.drive.name
+        raise DesignError(f"{name}: model = {model!r}: expected 'ring', '2d' or '3d'")
+
+
+def in_plane(design: Design) -> Design:
+    """The design as a 2D model represents it: with parallel axes.
+
+    Micro-geometry, the other feature that a 2D model lacks, needs no change: the model
+    does not read it. :func:`unmodelled_parts` names what is left out.
+    """
+    if not design.tolerances.misalignment_arcmin:
+        return design
+    return design.with_changes({"tolerances.misalignment_arcmin": 0.0})
 
 
 def unmodelled_parts(
@@ -125,6 +127,8 @@ def unmodelled_parts(
         "wave_generator.bearing": design.wave_generator.bearing is not None
         and (model == "3d" or (model == "2d" and not carried)),
         "micro_geometry": model != "3d" and any(shapes.values()),
+        "tolerances.misalignment_arcmin": model != "3d"
+        and design.tolerances.misalignment_arcmin > 0.0,
         "tooth passage": model == "ring",
         "rim of the circular spline": model == "ring",
         "tooth contact narrower than a contact patch": model != "2d",

@@ -167,20 +167,13 @@ def check_bearing(design: Design, *, half: bool) -> None:
 def check_modelled(design: Design) -> None:
     """Reject designs to which the 3D model does not apply.
 
+    The model has no tooth friction; that of a design is left out.
+
     Raises:
-        DesignError: If the design has no ``[cup]`` or has tooth friction; the message
-            has one line per key.
+        DesignError: If the design has no ``[cup]``.
     """
-    drive = design.drive
-    faults = []
     if design.cup is None:
-        faults.append(
-            "the 3d model needs a [cup] table; accepted without it: --model 2d"
+        raise DesignError(
+            f"{design.drive.name}: the 3d model needs a [cup] table; accepted without"
+            " it: --model 2d"
         )
-    if design.friction.tooth_coefficient:
-        faults.append(
-            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g}: the"
-            " 3d model has no friction; accepted: 0"
-        )
-    if faults:
-        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))

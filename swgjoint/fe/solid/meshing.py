@@ -94,7 +94,10 @@ class SolidRun(Positions):
         elastic = self.model.teeth.elastic_circular_spline is not None
         gear = f"elastic, outside {self.design.circular_spline.outer_rim}"
         shapes = self.design.micro_geometry.model_dump(exclude={"crowning_kind"})
-        bearing = self.design.wave_generator.bearing is not None
+        missing = {
+            "wave_generator.bearing": self.design.wave_generator.bearing is not None,
+            "friction.tooth_coefficient": self.design.friction.tooth_coefficient > 0.0,
+        }
         return {
             "design": self.design.drive.name,
             "label": {
@@ -108,7 +111,7 @@ class SolidRun(Positions):
                 "micro_geometry": any(shapes.values()),
                 "stress": "largest nodal value; at edges and at the step from rim to"
                 " cup it does not converge with mesh refinement",
-                "left_out": "wave_generator.bearing" if bearing else None,
+                "left_out": " and ".join(k for k, v in missing.items() if v) or None,
                 "positions": self.unspread,
             },
             "torque_Nm": self.torque,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.common.influence import Influence
-from swgjoint.fe.plane.drive2d import check_modelled
+from swgjoint.fe.plane.drive2d import in_plane
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.fe.tolerances.sampling import full_solves
@@ -68,7 +68,6 @@ def perfect_positions(design: Design, phases: int = PHASES) -> list[Rest]:
         DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If a position cannot be solved.
     """
-    check_modelled(design, "2d")
     # the outlines of the wave generators differ; these errors are superposed where they
     # touch the bore, from which a bearing would separate them
     return influences(without_errors(design), phases=phases, bearing=False)[1]
@@ -84,7 +83,8 @@ def sample_lot(
     cup in closed form, is added.
 
     Args:
-        drives: Drives that differ only in their ``tolerances``.
+        drives: Drives that differ only in their ``tolerances``. Misalignment of their
+            axes is left out.
         rests: Unloaded positions of the perfect drive, see :func:`perfect_positions`.
         positions: Number of input angles. One output turn is divided into as many equal
             parts, and one angle is placed in each of them, at random but with a fixed
@@ -143,6 +143,7 @@ def superposition_error(
     Returns:
         Relative deviation [-]; None if no full solve succeeds.
     """
+    drive = in_plane(drive)
     turn = round(2.0 * np.pi * abs(drive.ratio) / pitch_of(drive))
     pitch = np.arange(positions) * turn // positions
     follow, rests = influences(with_perfect_teeth(drive), phases=1, bearing=False)

@@ -240,6 +240,10 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
             else f"not at level {attached.level}; use joints.*.level = 'full'"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
+    label = transmission.drive.info.get("label")
+    if isinstance(label, dict) and (parts := label.get("left_out")):
+        reason = f"not in maps of the model {label.get('model')}"
+        items.append({"part": str(parts), "reason": reason})
     lossless = f"not at level {attached.level}; use level native or full"
     if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
