@@ -251,7 +251,7 @@ def _source(result: dict[str, Any]) -> str:
     if "stress_state" in validity:
         text += f"; {validity['stress_state']}"
     if validity.get("left_out"):
-        text += f"; without {validity['left_out']}"
+        text += f"; without {validity['left_out'].replace(' and ', ', ')}"
     if "manufacturing_errors" in validity:
         text += "; without manufacturing errors"
     return text
