@@ -180,10 +180,11 @@ def _details(result: dict[str, Any]) -> list[str]:
         )
     if slow := result.get("running"):
         lines.append(
-            "running and starting torque: a lower bound for slow rotation, from Coulomb"
-            f" friction ({slow['coefficient']:g}) at the teeth"
-            f" ({100.0 * slow['teeth_share']:.3g} %) and between rim and race; not"
-            f" included: {slow['left_out']}"
+            "running and starting torque: a lower bound, from Coulomb friction"
+            f" ({slow['coefficient']:g}) at the teeth"
+            f" ({100.0 * slow['teeth_share']:.3g} %) and between rim and race, and from"
+            f" balls that roll under {slow['lobe_force_N']:.3g} N at each lobe (a"
+            f" bearing maker's model); not included: {slow['left_out']}"
         )
     if fatigue := result.get("fatigue"):
         worst, middle = fatigue["worst_section"], fatigue["mid_face"]

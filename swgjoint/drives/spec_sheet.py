@@ -269,10 +269,10 @@ class _Figures:
             )
 
     def add_running(self, design: Design, keys: tuple[str, ...]) -> None:
-        """Report the torque of tooth and race friction as a bound on no-load torque.
+        """Report the friction of teeth, race and balls as a bound on no-load torque.
 
-        This torque is a lower bound and only a small part of the no-load torque of a
-        drive. It is therefore stated in the reason why the figure is missing.
+        It is a lower bound and only a part of the no-load torque of a drive. It is
+        therefore stated in the reason why the figure is missing.
         """
         wanted = [key for key in SLOW_KEYS if key in keys]
         if not wanted:
@@ -289,11 +289,13 @@ class _Figures:
         if running is None:
             self.reasons |= dict.fromkeys(wanted, f"{why}; {without_friction(design)}")
             return
-        self.details["running"] = running.as_dict(mu)
-        figures = (running.running_torque(mu), running.starting_torque(mu))
-        for key, figure in zip(SLOW_KEYS, figures, strict=True):
+        figures = self.details["running"] = running.as_dict(mu)
+        low, high = figures["base_oil_mm2_s"]
+        oil = f" at 2000 rpm with {low:g} to {high:g} mm2/s of base oil, assumed"
+        keys_of = ("running_torque_Nm", "starting_torque_Nm")
+        for key, figure, how in zip(SLOW_KEYS, keys_of, (oil, ""), strict=True):
             if key in wanted:
                 self.reasons[key] = (
-                    f"more than {figure:.3g} N·m (friction of teeth and race, a lower"
-                    f" bound); not modelled: {LEFT_OUT}"
+                    f"more than {figures[figure]:.3g} N·m (friction of teeth, race and"
+                    f" rolling balls{how}; a lower bound); not modelled: {LEFT_OUT}"
                 )

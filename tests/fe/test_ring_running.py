@@ -18,6 +18,7 @@ from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.running import STEP, RunningFriction, running_friction
 from swgjoint.fe.rings.sliding import weighted_median
+from swgjoint.gear.bearing.rolling_friction import GreasedBearing
 from swgjoint.gear.design.design import Design
 
 ANGLE = 0.3
@@ -186,8 +187,9 @@ def test_rings_that_bend_without_stretching(design):
 
 def test_without_coefficient_nothing_and_with_it_in_proportion(free):
     """Zero at mu = 0, linear in mu, both parts count; a start needs the worst angle."""
-    assert free.running_torque(0.0) == 0.0
-    assert free.running_torque(0.1) == pytest.approx(0.1 * (free.teeth + free.race)[0])
+    assert free.running_torque(0.0, 0.0, 1e-4) == free.ball_torque(0.0, 1e-4)[0]
+    more = free.running_torque(0.1, 0.0, 1e-4) - free.running_torque(0.0, 0.0, 1e-4)
+    assert more == pytest.approx(0.1 * (free.teeth + free.race)[0])
     assert free.teeth_share == 0.0
     made = RunningFriction(
         input_angle=np.arange(3.0),
@@ -195,11 +197,30 @@ def test_without_coefficient_nothing_and_with_it_in_proportion(free):
         teeth=np.array([1.0, 3.0, 2.0]),
         race=np.array([3.0, 5.0, 4.0]),
         tooth_pairs=np.zeros(3),
+        lobe_force=np.zeros((3, 2)),
+        bearing=free.bearing,
     )
-    assert made.running_torque(0.1) == pytest.approx(0.6)
+    assert made.running_torque(0.1, 200.0, 1e-4) == pytest.approx(0.6)
     assert made.teeth_share == pytest.approx(1.0 / 3.0)
     assert made.starting_torque(0.1) == pytest.approx(0.8)
     assert made.starting_torque(0.01) == pytest.approx(0.34)
+
+
+def test_lobes_push_alike_and_roll_as_two_bearings(design, free):
+    """Balls in balance; twice the moment of one lobe, which load makes larger."""
+    one, other = free.lobe_force[0]
+    # an odd number of balls does not press both lobes at the same places
+    assert one == pytest.approx(other, rel=0.02)
+    model = thin_ring(design)
+    state = without_torque(model, ANGLE)
+    assert 0.8 * state.ball_force.sum() < one + other < state.ball_force.sum()
+    speed, oil = 200.0, 1e-4
+    bearing = GreasedBearing.from_bearing(free.bearing, oil)
+    twice = 2.0 * bearing.friction_torque(0.5 * (one + other), speed)
+    assert free.ball_torque(speed, oil)[0] == pytest.approx(twice, rel=1e-3)
+    loaded = running_friction(design, torque=TORQUE, angles=[ANGLE])
+    assert loaded.lobe_force.sum() > free.lobe_force.sum()
+    assert loaded.ball_torque(speed, oil) > free.ball_torque(speed, oil)
 
 
 def test_without_friction_the_input_balances_the_load(design):

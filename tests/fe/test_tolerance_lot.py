@@ -115,7 +115,9 @@ def test_an_axis_that_leans_counts_for_nothing_and_is_named(rests):
     alone = Design.load("reference-2d").with_changes(
         {"tolerances.misalignment_arcmin": 5.0}
     )
-    with pytest.raises(DesignError, match=naming("reference-2d", "misalignment_arcmin")):
+    with pytest.raises(
+        DesignError, match=naming("reference-2d", "misalignment_arcmin")
+    ):
         run_lot(alone, count=1)
 
 

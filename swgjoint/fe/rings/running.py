@@ -17,8 +17,9 @@ flank; the friction at that flank is of second order.
 
 The coefficient mu is the same between tooth flanks and between rim and race, as in
 :mod:`swgjoint.fe.rings.friction`. Only friction holds the race, which therefore creeps
-in the bore. Balls roll without loss, and seals and grease are not included, so the
-result is a lower bound.
+in the bore. The loss of the rolling balls follows from the forces at the lobes, see
+:mod:`swgjoint.gear.bearing.rolling_friction`. Seals and churning grease are not
+included, so the result is a lower bound.
 """
 
 from __future__ import annotations
@@ -34,8 +35,12 @@ from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.sliding import sliding_sums
 from swgjoint.fe.rings.state import ThinRingState
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.bearing.rolling_friction import BASE_OILS, GreasedBearing
 from swgjoint.gear.design.design import Design
+from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 from swgjoint.typing import Array
+from swgjoint.units import mm, rpm
 
 POSITIONS = 8
 """Number of wave-generator angles in a mean."""
@@ -43,7 +48,7 @@ STEP = 1e-3
 """Step of the input angle over which the sliding is evaluated [rad]."""
 COEFFICIENT = "friction.tooth_coefficient"
 """Key of the coefficient of friction in the design file."""
-LEFT_OUT = "churning of grease, seals, balls and their cage, bending loss of the rim"
+LEFT_OUT = "churning of grease, seals, cage, bending loss of the rim"
 """Losses of a real drive that the model omits."""
 
 
@@ -61,6 +66,10 @@ class RunningFriction:
     """Friction torque at the input due to the rim on the race, per mu (n,) [N·m]."""
     tooth_pairs: Array
     """Number of loaded tooth contacts, mean over the step (n,)."""
+    lobe_force: Array
+    """Resultant force of the balls at each lobe (n, lobes) [N]."""
+    bearing: BallBearing
+    """Bearing of the wave generator."""
 
     @property
     def per_mu(self) -> Array:
@@ -73,13 +82,30 @@ class RunningFriction:
         total = float(self.per_mu.sum())
         return float(self.teeth.sum()) / total if total > 0.0 else 0.0
 
-    def running_torque(self, mu: float) -> float:
+    def ball_torque(self, speed: float, viscosity: float) -> Array:
+        """Torque that the rolling balls of all lobes require (n,) [N·m].
+
+        Args:
+            speed: Speed of the input, of either sign [rad/s].
+            viscosity: Kinematic viscosity of the base oil [m2/s].
+        """
+        greased = GreasedBearing.from_bearing(self.bearing, viscosity)
+        return np.array(
+            [
+                sum(greased.friction_torque(force, speed) for force in lobes)
+                for lobes in self.lobe_force.tolist()
+            ]
+        )
+
+    def running_torque(self, mu: float, speed: float, viscosity: float) -> float:
         """Mean friction torque at the input [N·m].
 
         Args:
             mu: Coefficient of friction [-].
+            speed: Speed of the input [rad/s].
+            viscosity: Kinematic viscosity of the base oil [m2/s].
         """
-        return mu * float(self.per_mu.mean())
+        return float((mu * self.per_mu + self.ball_torque(speed, viscosity)).mean())
 
     def starting_torque(self, mu: float) -> float:
         """Smallest input torque that keeps the drive turning at all angles [N·m].
@@ -89,18 +115,27 @@ class RunningFriction:
         Args:
             mu: Coefficient of friction [-].
         """
-        return float((self.elastic + mu * self.per_mu).max())
+        balls = self.ball_torque(0.0, BASE_OILS[0])
+        return float((self.elastic + mu * self.per_mu + balls).max())
 
     def as_dict(self, mu: float) -> dict[str, Any]:
         """Running and starting torque, their parts and the omitted losses, for JSON.
 
+        The running torque is the smaller one of those with both base oils.
+
         Args:
             mu: Coefficient of friction [-].
         """
+        speed = RUNNING_SPEED
+        balls = [float(self.ball_torque(speed, oil).mean()) for oil in BASE_OILS]
         return {
             "coefficient": mu,
-            "running_torque_Nm": self.running_torque(mu),
+            "running_speed_rpm": speed / rpm,
+            "base_oil_mm2_s": [oil / mm**2 for oil in BASE_OILS],
+            "running_torque_Nm": mu * float(self.per_mu.mean()) + min(balls),
             "starting_torque_Nm": self.starting_torque(mu),
+            "balls_Nm": balls,
+            "lobe_force_N": float(self.lobe_force.mean()),
             "teeth_Nm": mu * float(self.teeth.mean()),
             "race_Nm": mu * float(self.race.mean()),
             "teeth_share": self.teeth_share,
@@ -142,16 +177,39 @@ def running_friction(
                 teeth / STEP,
                 race / STEP,
                 0.5 * (first.loaded_teeth + last.loaded_teeth),
+                *lobe_forces(model, first),
             ]
         )
-    elastic, teeth_torque, race_torque, pairs = np.array(rows).T
+    elastic, teeth_torque, race_torque, pairs, *lobes = np.array(rows).T
     return RunningFriction(
         input_angle=theta,
         elastic=elastic,
         teeth=teeth_torque,
         race=race_torque,
         tooth_pairs=pairs,
+        lobe_force=np.array(lobes).T,
+        bearing=model.bearing,
     )
+
+
+def lobe_forces(model: ThinRing, state: ThinRingState) -> Array:
+    """Resultant force of the balls at each lobe of the wave generator (lobes,) [N].
+
+    Each ball counts to the nearest lobe.
+
+    Args:
+        model: The rings.
+        state: Their equilibrium.
+    """
+    assert state.ball_force is not None
+    alpha = state.alpha
+    centres = model.balls(alpha, state.phase)[0]
+    direction = centres / np.hypot(*centres.T)[:, None]
+    around = np.arctan2(-centres[:, 0], centres[:, 1]) - alpha
+    count = model.cam.lobes
+    lobe = np.round(around * count / (2.0 * np.pi)).astype(int) % count
+    pushed = state.ball_force[:, None] * direction
+    return np.array([np.hypot(*pushed[lobe == k].sum(axis=0)) for k in range(count)])
 
 
 def _standing(

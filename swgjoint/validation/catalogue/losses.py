@@ -1,7 +1,7 @@
 """No-load running torque and starting torque compared with the catalogue.
 
-Our values include only the friction of sliding teeth and of the rim on its race. The
-catalogue values also include grease, seals and rolling balls. Our values should
+Our values include the friction of sliding teeth, of the rim on its race and of rolling
+balls. The catalogue values also include churning grease and seals. Our values should
 therefore be lower bounds; the summary reports whether they are.
 """
 
@@ -12,9 +12,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from swgjoint.fe.rings.running import LEFT_OUT, RunningFriction
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.bearing.rolling_friction import BASE_OILS
 from swgjoint.gear.catalogue import CatalogueRow
 from swgjoint.gear.catalogue_stated import LOSS_CONDITIONS, stated_losses
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.friction_bending import bending_torque
+from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
+from swgjoint.units import mm
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import catalogue_row
 from swgjoint.validation.catalogue.rows import bracket_row
@@ -50,14 +55,21 @@ def _name(size: int, ratio: int, flank: float) -> str:
     return f"running {size} {ratio} {flank:g}"
 
 
-def running_of(found: Found) -> RunningFriction:
-    """Convert a result of kind ``running`` to :class:`RunningFriction`."""
+def running_of(found: Found, design: Design) -> RunningFriction:
+    """Convert a result of kind ``running`` to :class:`RunningFriction`.
+
+    Args:
+        found: The result.
+        design: The drive.
+    """
     return RunningFriction(
         input_angle=np.array(found["input_angles_rad"]),
         elastic=np.array(found["elastic_Nm"]),
         teeth=np.array(found["teeth_per_mu_Nm"]),
         race=np.array(found["race_per_mu_Nm"]),
         tooth_pairs=np.array(found["tooth_pairs"]),
+        lobe_force=np.array(found["lobe_forces_N"]),
+        bearing=BallBearing.from_design(design),
     )
 
 
@@ -66,7 +78,7 @@ def loss_rows(
 ) -> list[Row]:
     """Rows of no-load running torque and starting torque of a drive.
 
-    Their brackets cover all flank angles and friction coefficients.
+    Their brackets cover all flank angles, friction coefficients and base oils.
 
     Args:
         study: Study file.
@@ -86,22 +98,28 @@ def loss_rows(
         if "fault" in one:
             faults.append(f"{flank:g} deg: {one['fault']}")
             continue
-        slow = running_of(one)
+        slow = running_of(one, variant_design(row.size, row.ratio, study.variants[0]))
         slows.append(slow)
         for mu in study.coefficients:
-            values[RUNNING].append(slow.running_torque(mu) / _MILLI)
             values[STARTING].append(slow.starting_torque(mu) / _MILLI)
+            values[RUNNING] += [
+                slow.running_torque(mu, RUNNING_SPEED, oil) / _MILLI
+                for oil in BASE_OILS
+            ]
     why = list(faults)
     if slows:
         share = 100.0 * max(slow.teeth_share for slow in slows)
         pairs = max(float(slow.tooth_pairs.mean()) for slow in slows)
         bending = bending_torque(variant_design(row.size, row.ratio, study.variants[0]))
         coefficients = " to ".join(f"{mu:g}" for mu in study.coefficients)
+        force = max(float(slow.lobe_force.mean()) for slow in slows)
+        low, high = (oil / mm**2 for oil in BASE_OILS)
         why.append(
-            f"slow rotation, only Coulomb friction {coefficients} of the rim on its"
-            f" race and of the teeth (teeth {share:.3g} %, {pairs:.2g} pairs in"
-            f" contact); not included: {LEFT_OUT} ({bending / _MILLI:.2g} mN·m, loss"
-            " factor assumed)"
+            f"Coulomb friction {coefficients} of the rim on its race and of the teeth"
+            f" (teeth {share:.3g} %, {pairs:.2g} pairs in contact), and balls that roll"
+            f" under {force:.3g} N at each lobe, in grease with a base oil of"
+            f" {low:g} to {high:g} mm2/s; not included: {LEFT_OUT}"
+            f" ({bending / _MILLI:.2g} mN·m, loss factor assumed)"
         )
     printed = {
         RUNNING: (stated.no_load_running, f"2000 rpm, {LOSS_CONDITIONS}"),
@@ -138,7 +156,7 @@ def loss_lines(rows: Sequence[Row]) -> list[str]:
             100.0 * part for part in (min(over.values()), max(over.values()))
         )
         lines.append(
-            f"{quantity}: friction of teeth and race is at most {least:.2g} to"
+            f"{quantity}: friction of teeth, race and balls is at most {least:.2g} to"
             f" {most:.2g} % of the catalogue value; a lower bound in"
             f" {len(over) - len(above)} of {len(over)} cases"
             + f", above the catalogue in {', '.join(above)}"

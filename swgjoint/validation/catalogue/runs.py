@@ -153,6 +153,7 @@ def _running(task: CatalogueTask) -> Found:
         "teeth_per_mu_Nm": found.teeth.tolist(),
         "race_per_mu_Nm": found.race.tolist(),
         "tooth_pairs": found.tooth_pairs.tolist(),
+        "lobe_forces_N": found.lobe_force.tolist(),
     }
 
 

@@ -1,0 +1,68 @@
+"""The friction model of a bearing maker: hand calculation and limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp, pi, sqrt
+
+import pytest
+
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.bearing.rolling_friction import GreasedBearing
+from swgjoint.gear.design.design import Design
+from swgjoint.units import rpm
+
+BEARING = GreasedBearing(pitch_diameter=0.050, section=0.010, viscosity=100e-6)
+"""40 mm bore, 60 mm outside."""
+
+
+def test_hand_calculation():
+    """1 kN at 1000 rpm, every factor on its own, in the units of the catalogue."""
+    rolling, sliding = BEARING.parts(1000.0, 1000.0 * rpm)
+    heating = 1.0 / (1.0 + 1.84e-9 * (1000.0 * 50.0) ** 1.28 * 100.0**0.64)
+    fed = exp(-6e-8 * 100.0 * 1000.0 * (40.0 + 60.0) * sqrt(3.1 / (2.0 * 20.0)))
+    wanted = heating * fed * 4.7e-7 * 50.0**1.96 * 1000.0**0.54 * 1e5**0.6
+    assert 1e3 * rolling == pytest.approx(wanted, rel=1e-12)
+    assert wanted == pytest.approx(34.2, abs=0.1)
+    full_film = 6.5e-3 * 50.0**-0.26 * 1000.0 ** (5.0 / 3.0) * 0.05
+    assert 1e3 * sliding == pytest.approx(full_film, rel=1e-3)
+
+
+def test_at_rest_only_sliding_is_left():
+    """The starting moment: boundary friction, without oil to roll through."""
+    rolling, sliding = BEARING.parts(1000.0, 0.0)
+    assert rolling == 0.0
+    wanted = 0.15 * 6.5e-3 * 50.0**-0.26 * 1000.0 ** (5.0 / 3.0)
+    assert 1e3 * sliding == pytest.approx(wanted, rel=1e-12)
+    assert BEARING.friction_torque(0.0, 200.0) == 0.0
+
+
+def test_powers_of_load_and_speed():
+    """0.54 and 5/3 in load, 0.6 in slow speed; the direction does not matter."""
+    one, double = (BEARING.parts(f, 100.0) for f in (500.0, 1000.0))
+    assert double[0] / one[0] == pytest.approx(2.0**0.54)
+    assert double[1] / one[1] == pytest.approx(2.0 ** (5.0 / 3.0))
+    slow, faster = (BEARING.parts(500.0, n * rpm)[0] for n in (0.1, 0.2))
+    assert faster / slow == pytest.approx(2.0**0.6, rel=1e-3)
+    assert BEARING.parts(500.0, -100.0) == one
+
+
+def test_thick_oil_starves_the_contacts():
+    """Rolling grows with the viscosity, then falls as balls follow too fast."""
+    torques = [
+        replace(BEARING, viscosity=nu * 1e-6).parts(100.0, 2000.0 * rpm)[0]
+        for nu in (10.0, 100.0, 1000.0)
+    ]
+    assert torques[0] < torques[1] > torques[2]
+
+
+def test_dimensions_of_the_bearing_of_a_design():
+    """The circle of ball centres, and the outside that is the bore of the rim."""
+    design = Design.load("size-25-100")
+    bearing = BallBearing.from_design(design)
+    made = GreasedBearing.from_bearing(bearing, 1e-4)
+    inner, outer = bearing.raceways
+    assert made.pitch_diameter == pytest.approx(inner + outer)
+    outside = 0.5 * (made.pitch_diameter + made.section)
+    assert outside == pytest.approx(bearing.bore_radius, rel=1e-3)
+    assert made.friction_torque(84.0, 200.0 * pi / 3.0) > 0.0
