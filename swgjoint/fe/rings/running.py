@@ -131,7 +131,7 @@ class RunningFriction:
         return {
             "coefficient": mu,
             "running_speed_rpm": speed / rpm,
-            "base_oil_mm2_s": [oil / mm**2 for oil in BASE_OILS],
+            "base_oil_mm2_s": [round(oil / mm**2, 9) for oil in BASE_OILS],
             "running_torque_Nm": mu * float(self.per_mu.mean()) + min(balls),
             "starting_torque_Nm": self.starting_torque(mu),
             "balls_Nm": balls,

@@ -113,7 +113,7 @@ def loss_rows(
         bending = bending_torque(variant_design(row.size, row.ratio, study.variants[0]))
         coefficients = " to ".join(f"{mu:g}" for mu in study.coefficients)
         force = max(float(slow.lobe_force.mean()) for slow in slows)
-        low, high = (oil / mm**2 for oil in BASE_OILS)
+        low, high = (round(oil / mm**2, 9) for oil in BASE_OILS)
         why.append(
             f"Coulomb friction {coefficients} of the rim on its race and of the teeth"
             f" (teeth {share:.3g} %, {pairs:.2g} pairs in contact), and balls that roll"
