@@ -142,7 +142,12 @@ def measure_drive(
             more.add_ratcheting(source, keys, progress)
         more.add_running(source, keys)
     sheet = measure_spec(
-        drive_map, ratings=ratings, only=keys, known=more.values, unknown=more.reasons
+        drive_map,
+        ratings=ratings,
+        only=keys,
+        known=more.values,
+        unknown=more.reasons,
+        progress=progress,
     )
     name = source.drive.name if isinstance(source, Design) else source.name
     result: dict[str, Any] = {"design": name, **sheet.as_dict(), **more.details}

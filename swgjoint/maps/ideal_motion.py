@@ -9,8 +9,8 @@ Their effect is linearised in s at each theta:
 
 Where the highest harmonics change more, psi_0 is the solution found so far.
 
-The sums over the harmonics are then matrix products, computed once per position instead
-of once per iteration.
+The sums over the harmonics are then matrix products. They are computed once per
+position and interval of the torsion instead of once per iteration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.potential import Potential
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Index
 
 _NEWTON = 12
 _CLOSER = 3
@@ -35,8 +35,24 @@ _FLAT = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Polynomials:
+    """The potential as a polynomial of the torsion at n positions.
+
+    Each position has one interval of the torsion, in which the polynomial is valid.
+    """
+
+    interval: Index
+    """Number of the interval between two knots (n,)."""
+    coefficients: Array
+    """Coefficients of V_0 [J/rad^k] and V_1 [J/rad^(k+1)], as in a map.
+
+    Shape (2, n, 5).
+    """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class IdealMotion:
-    """Polynomials of the torsion at n input angles, summed over the harmonics."""
+    """Factors of the harmonics at n input angles, and the sums over the harmonics."""
 
     drive: Potential
     """The full map."""
@@ -46,10 +62,9 @@ class IdealMotion:
     """Output angles psi_0 about which the map is linearised [rad]. Shape (n,)."""
     error: Array
     """a [rad] and b [-], which are e0 and de0/dpsi at psi_0. Shape (2, n)."""
-    potential: Array
-    """Coefficients of V_0 [J/rad^k] and V_1 [J/rad^(k+1)], as in a map.
-
-    Shape (2, n, n_knots - 1, 5).
+    factors: Array
+    """Factors of the cosine and sine amplitudes in a value and in its derivative by psi
+    [-]. Shape (2, n, 2 n_harmonics).
     """
     ends: Array
     """V_0'' [N·m/rad] and V_1'' [N·m/rad²] below and above the knots.
@@ -71,35 +86,68 @@ class IdealMotion:
         if about is None:
             about = theta / drive.ratio
         phases = drive.phases(theta, about)
-        cos, sin = np.cos(phases), np.sin(phases)
         n_psi = drive.angle_orders[:, 1]
-        # factors of the cosine and sine amplitudes, for a value and its psi derivative
-        value = np.stack([cos, sin], axis=-1).reshape(theta.size, -1)
-        slope = np.stack([-n_psi * sin, n_psi * cos], axis=-1).reshape(theta.size, -1)
-        both = np.stack([value, slope])
-        shape = drive.potential.shape[2:]
-        table = drive.potential.reshape(value.shape[1], -1)
+        factors = np.empty((2, *phases.shape, 2))
+        value, slope = factors
+        np.cos(phases, out=value[..., 0])
+        np.sin(phases, out=value[..., 1])
+        np.multiply(-n_psi, value[..., 1], out=slope[..., 0])
+        np.multiply(n_psi, value[..., 0], out=slope[..., 1])
+        both = factors.reshape(2, theta.size, -1)
         return cls(
             drive=drive,
             theta=theta,
             about=about,
             error=both @ drive.kinematic_error.ravel(),
-            potential=(both @ table).reshape(2, theta.size, *shape),
-            ends=both @ drive.end_stiffness.reshape(value.shape[1], -1),
+            factors=both,
+            ends=both @ drive.end_stiffness.reshape(both.shape[2], -1),
         )
 
-    def torque(self, shift: Array) -> tuple[Array, Array]:
+    def polynomials(self, interval: Index, known: Polynomials | None) -> Polynomials:
+        """Polynomials of V_0 and V_1 in one interval of the torsion per position.
+
+        The positions of an interval are one matrix product.
+
+        Args:
+            interval: Number of the interval between two knots at each position (n,).
+            known: Polynomials that are kept where their interval is the same; None if
+                there are none.
+        """
+        table = self.drive.potential  # (n_harmonics, 2, n_knots - 1, 5)
+        if known is None:
+            changed = np.arange(interval.size)
+            coefficients = np.empty((2, interval.size, table.shape[-1]))
+        else:
+            changed = np.flatnonzero(interval != known.interval)
+            if not changed.size:
+                return known
+            coefficients = known.coefficients.copy()
+        order = changed[np.argsort(interval[changed], kind="stable")]
+        ends = np.flatnonzero(np.diff(interval[order])) + 1
+        for rows in np.split(order, ends):
+            amplitudes = table[:, :, interval[rows[0]]].reshape(-1, table.shape[-1])
+            coefficients[:, rows] = self.factors[:, rows] @ amplitudes
+        return Polynomials(interval=interval, coefficients=coefficients)
+
+    def torque(
+        self, shift: Array, known: Polynomials | None = None
+    ) -> tuple[Array, Array, Polynomials]:
         """Torque T on the output [N·m] and stiffness -dT/dpsi [N·m/rad]. Shapes (n,).
 
         Args:
             shift: Distance s = psi - psi_0 [rad]. Shape (n,).
+            known: Polynomials of the preceding call; None in the first one.
+
+        Returns:
+            Torque, stiffness, and the polynomials for the next call.
         """
         knots = self.drive.torsion_knots
         a, b = self.error
         x = self.theta / self.drive.ratio - self.about + a + (b - 1.0) * shift
         inside = np.clip(x, knots[0], knots[-1])
         j = np.clip(np.searchsorted(knots, inside, "right") - 1, 0, knots.size - 2)
-        c = np.moveaxis(self.potential[:, np.arange(x.size), j], -1, 0)  # (5, 2, n)
+        there = self.polynomials(j, known)
+        c = np.moveaxis(there.coefficients, -1, 0)  # (5, 2, n)
         d, out = inside - knots[j], x - inside
         v = c[0] + d * (c[1] + d * (c[2] + d * (c[3] + d * c[4])))
         v1 = c[1] + d * (2 * c[2] + d * (3 * c[3] + d * 4 * c[4]))
@@ -109,7 +157,7 @@ class IdealMotion:
         v2 = np.where(out == 0.0, v2, end)
         torque = (1.0 - b) * (v1[0] + shift * v1[1]) - v[1]
         stiffness = (1.0 - b) ** 2 * (v2[0] + shift * v2[1]) - 2.0 * (1.0 - b) * v1[1]
-        return torque, stiffness
+        return torque, stiffness, there
 
     def output_angle(self, torque: float) -> Array:
         """Output angle psi at which the drive exerts a torque [rad]. Shape (n,).
@@ -154,9 +202,9 @@ class IdealMotion:
         """
         drive = self.drive
         settled = 1e-12 * float(np.ptp(drive.torsion_knots))
-        step = np.full(shift.shape, np.inf)
+        step, there = np.full(shift.shape, np.inf), None
         for _ in range(_NEWTON):
-            exerted, stiffness = self.torque(shift)
+            exerted, stiffness, there = self.torque(shift, there)
             missing = exerted - torque
             soft = np.where(stiffness > 0.0, stiffness, np.nan)
             step = np.where(missing == 0.0, 0.0, missing / soft)

@@ -220,12 +220,10 @@ def test_only_what_is_asked_for(monkeypatch, synthetic_map):
         raise AssertionError("not asked for")
 
     with monkeypatch.context() as patch:
-        patch.setattr(sheets, "error_turn", forbidden)
-        patch.setattr(sheets, "ripple_turn", forbidden)
+        patch.setattr(sheets, "measure_turns", forbidden)
         sheet = measure_spec(synthetic_map, only=["K2_Nm_rad", "wall_s"])
         assert list(sheet.figures) == ["K2_Nm_rad"]
     monkeypatch.setattr(sheets, "torque_loop", forbidden)
-    monkeypatch.setattr(sheets, "ripple_turn", forbidden)
     alone = with_angles(DriveMap.linear(1e4), [(4, 0)], [(1e-5, 0)])
     sheet = measure_spec(alone, only=["transmission_accuracy_arcmin"])
     assert list(sheet.turns) == ["no_load"]

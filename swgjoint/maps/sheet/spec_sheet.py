@@ -25,7 +25,8 @@ from swgjoint.maps.sheet.friction_running import (
 from swgjoint.maps.sheet.loop import NO_WIDTH, TorqueLoop, largest_torque, torque_loop
 from swgjoint.maps.sheet.map_validity import Difference, validation_json
 from swgjoint.maps.sheet.spec_validity import judge_figures
-from swgjoint.maps.sheet.turn import Turn, error_turn, ripple_turn, strongest_orders
+from swgjoint.maps.sheet.turn import Turn, measure_turns, strongest_orders
+from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 from swgjoint.units import arcmin, rpm
 
@@ -148,6 +149,7 @@ def measure_spec(
     only: Collection[str] = (),
     known: Mapping[str, float] | None = None,
     unknown: Mapping[str, str] | None = None,
+    progress: Progress = silent,
 ) -> SpecSheet:
     """The requested figures; only the test procedures that they need are run.
 
@@ -168,6 +170,7 @@ def measure_spec(
             :data:`RATCHETING_KEY`.
         unknown: Reasons why such figures are missing, by key; also for those of
             :data:`SLOW_KEYS`.
+        progress: Called while an output turn is evaluated.
 
     Raises:
         InputError: If a key is unknown.
@@ -196,7 +199,7 @@ def measure_spec(
             loop = torque_loop(drive)
             _loop_figures(drive, loop, ratings, values, missing)
         if set(keys) & set(TURN_KEYS):
-            turns = _turns(drive, keys)
+            turns = _turns(drive, keys, progress)
             _turn_figures(drive, turns, values, missing)
         if drive.friction is not None and set(keys) & set(LOSS_KEYS):
             _loss_figures(drive, keys, values, missing)
@@ -248,7 +251,9 @@ def _loop_figures(
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 
 
-def _turns(drive: Potential, keys: Collection[str]) -> dict[str, Turn]:
+def _turns(
+    drive: Potential, keys: Collection[str], progress: Progress
+) -> dict[str, Turn]:
     """Output turns that the keys need; empty if the map has no harmonics."""
     if len(drive.orders) == 1:
         return {}
@@ -258,12 +263,11 @@ def _turns(drive: Potential, keys: Collection[str]) -> dict[str, Turn]:
         "rated": ("transmission_accuracy_rated_arcmin", "orders"),
         "ripple": ("ripple_rms_percent", "ripple_pp_percent", "orders"),
     }
-    build = {
-        "no_load": lambda: error_turn(drive),
-        "rated": lambda: error_turn(drive, rated),
-        "ripple": lambda: ripple_turn(drive, rated),
-    }
-    return {name: build[name]() for name, of in wanted.items() if set(keys) & set(of)}
+    names = [name for name, of in wanted.items() if set(keys) & set(of)]
+    torques = {"no_load": 0.0, "rated": rated}
+    error = {name: torques[name] for name in names if name != "ripple"}
+    ripple = {name: rated for name in names if name == "ripple"}
+    return measure_turns(drive, error, ripple, progress)
 
 
 def _turn_figures(

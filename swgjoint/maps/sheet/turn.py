@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, pi
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError
 from swgjoint.maps.ideal_motion import IdealMotion
 from swgjoint.maps.potential import Potential
+from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 PER_WAVE = 16
@@ -26,7 +28,7 @@ AT_LEAST_PER_WAVE = 4
 """Smallest number of samples per shortest wave, strong or not, to avoid aliasing."""
 AT_LEAST = 64
 """Smallest number of samples per period."""
-CHUNK = 4096
+CHUNK = 256
 """Number of positions evaluated at once."""
 MAX_SAMPLES = 10_000_000
 """Largest number of samples per period."""
@@ -146,10 +148,7 @@ def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
         drive: The map.
         torque: Output torque [N·m].
     """
-    period, theta = _input_angles(drive)
-    error = _along(drive, theta, lambda at: at.output_angle(torque))
-    error -= theta / drive.ratio
-    return Turn(period_turns=period, turns=abs(drive.ratio), signal=error)
+    return measure_turns(drive, {"error": torque})["error"]
 
 
 def ripple_turn(drive: Potential, torque: float) -> Turn:
@@ -162,21 +161,40 @@ def ripple_turn(drive: Potential, torque: float) -> Turn:
         drive: The map.
         torque: Output torque that sets the mean torsion [N·m].
     """
+    return measure_turns(drive, ripple={"ripple": torque})["ripple"]
+
+
+def measure_turns(
+    drive: Potential,
+    error: Mapping[str, float] = MappingProxyType({}),
+    ripple: Mapping[str, float] = MappingProxyType({}),
+    progress: Progress = silent,
+) -> dict[str, Turn]:
+    """Several signals of one output turn, for which the harmonics are summed once.
+
+    Args:
+        drive: The map.
+        error: Output torques [N·m] of the signals of :func:`error_turn`, by key.
+        ripple: Output torques [N·m] of the signals of :func:`ripple_turn`, by key.
+        progress: Called with the number of finished positions and their total.
+    """
     period, theta = _input_angles(drive)
-    back = -drive.mean_torsion(torque)
-    signal = _along(
-        drive, theta, lambda at: at.torque(np.full(at.theta.shape, back))[0]
-    )
-    return Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
-
-
-def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
-    """A quantity at many input angles, evaluated in chunks; ``of`` returns it."""
-    parts = [
-        of(IdealMotion.from_map(drive, theta[k : k + CHUNK]))
-        for k in range(0, theta.size, CHUNK)
-    ]
-    return np.concatenate(parts)
+    signals = {key: np.empty(theta.size) for key in (*error, *ripple)}
+    back = {key: -drive.mean_torsion(torque) for key, torque in ripple.items()}
+    name = f"{drive.name}: output turn"
+    progress(name, 0, theta.size)
+    for k in range(0, theta.size, CHUNK):
+        part = slice(k, k + CHUNK)
+        at = IdealMotion.from_map(drive, theta[part])
+        for key, torque in error.items():
+            signals[key][part] = at.output_angle(torque) - theta[part] / drive.ratio
+        for key, shift in back.items():
+            signals[key][part] = at.torque(np.full(at.theta.shape, shift))[0]
+        progress(name, min(k + CHUNK, theta.size), theta.size)
+    return {
+        key: Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
+        for key, signal in signals.items()
+    }
 
 
 def strongest_orders(turns: dict[str, Turn]) -> list[dict[str, float]]:

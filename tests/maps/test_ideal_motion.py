@@ -1,0 +1,63 @@
+"""The map about its ideal motion, against plain sums over harmonics and intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swgjoint.maps.ideal_motion import IdealMotion
+from swgjoint.maps.sheet.turn import error_turn, measure_turns, ripple_turn
+
+
+def test_polynomials_are_those_of_the_sums_in_all_intervals(synthetic_map):
+    """Each position takes its interval from the table of all intervals."""
+    theta = np.linspace(0.0, 40.0, 57)
+    at = IdealMotion.from_map(synthetic_map, theta)
+    amplitudes = synthetic_map.potential.reshape(at.factors.shape[2], -1)
+    shape = (2, theta.size, *synthetic_map.potential.shape[2:])
+    every = (at.factors @ amplitudes).reshape(shape)
+    intervals = np.random.default_rng(3).integers(0, shape[2], (3, theta.size))
+    # the last third stays in the intervals of the call before
+    intervals[1:, 38:] = intervals[0, 38:]
+    there = None
+    for interval in intervals:
+        there = at.polynomials(interval, there)
+        wanted = every[:, np.arange(theta.size), interval]
+        assert np.array_equal(there.interval, interval)
+        error = np.abs(there.coefficients - wanted).max(axis=(0, 1))
+        assert (error <= 1e-12 * np.abs(wanted).max(axis=(0, 1))).all()
+    assert at.polynomials(intervals[-1], there) is there
+
+
+def test_torque_and_stiffness_are_those_of_the_full_map(synthetic_map):
+    """At psi_0 itself nothing is linearised; the torque has the slope -stiffness."""
+    theta = np.linspace(0.0, 400.0, 101)
+    about = theta / synthetic_map.ratio + np.linspace(-0.004, 0.004, theta.size)
+    at = IdealMotion.from_map(synthetic_map, theta, about)
+    none, step = np.zeros(theta.size), 1e-9
+    torque, stiffness, _ = at.torque(none)
+    wanted = synthetic_map.forces(theta, about)[1]
+    assert np.abs(torque - wanted).max() < 1e-12 * np.abs(wanted).max()
+    change = at.torque(none - step)[0] - at.torque(none + step)[0]
+    assert np.abs(0.5 * change / step / stiffness - 1.0).max() < 1e-5  # differences
+
+
+def test_signals_measured_at_once_are_those_measured_one_by_one(synthetic_map):
+    """Bit for bit, with the number of finished positions reported."""
+    seen = []
+    turns = measure_turns(
+        synthetic_map,
+        error={"free": 0.0, "loaded": 50.0},
+        ripple={"ripple": 50.0},
+        progress=lambda stage, done, total: seen.append((done, total)),
+    )
+    alone = {
+        "free": error_turn(synthetic_map),
+        "loaded": error_turn(synthetic_map, 50.0),
+        "ripple": ripple_turn(synthetic_map, 50.0),
+    }
+    assert set(turns) == set(alone)
+    for key, turn in alone.items():
+        assert np.array_equal(turns[key].signal, turn.signal)
+        assert turns[key].period_turns == turn.period_turns
+    done, total = zip(*seen, strict=True)
+    assert done[0] == 0 and done[-1] == total[-1] and sorted(done) == list(done)
