@@ -71,7 +71,7 @@ class StripProblems:
         tolerance_m: float,
         tries: int,
         singles: int,
-        chained: bool,
+        before: Index,
         active: Mask,
         result: Array,
         approach: Array,

@@ -3,35 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-// Two versions of a loop, chosen when the library is loaded. Both give the same bits,
-// because they add element by element.
-#if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define SWGJOINT_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define SWGJOINT_WIDE
-#endif
+#include "dense_factors.h"
 
 namespace swgjoint {
 
 namespace {
 
-// y += a x
-SWGJOINT_WIDE void add_multiple(double* y, const double* x, double a, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) y[i] += a * x[i];
-}
-
-// y -= a[0] x[0] + a[1] x[1] + ..., one product after another
-SWGJOINT_WIDE void subtract_four(double* y, const double* const* x, const double* a,
-                                 std::size_t n) {
-  const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
-  const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-  for (std::size_t i = 0; i < n; ++i) {
-    y[i] = y[i] - a0 * x0[i] - a1 * x1[i] - a2 * x2[i] - a3 * x3[i];
-  }
-}
-
-constexpr std::size_t kPanel = 4;  // columns that are eliminated at once
+// A new reference is taken after kFewest changes and one per kShare active contacts: then
+// the factors cost less than the extra unknowns.
+constexpr std::size_t kFewest = 4, kShare = 12;
+constexpr double kResidual = 1e-4;  // error of an active equation, in tolerances
 
 }  // namespace
 
@@ -45,8 +26,17 @@ double StripLaw::excess(std::size_t strip, double force, double* derivative) con
 }
 
 StripSolver::StripSolver(const Problem& problem, const StripLaw& law)
-    : p_(problem), law_(law), place_(law.strips), force_(law.strips),
-      derivative_(law.strips), base_(problem.size) {}
+    : p_(problem), law_(law), members_(law.strips), force_row_(problem.size, -1),
+      row_(problem.size, -1), extra_of_(problem.size, -1), place_(law.strips, -1),
+      work_(problem.size), force_(law.strips) {
+  for (std::size_t k = 0; k < p_.size; ++k) {
+    if (p_.strip[k] < 0) continue;
+    members_[p_.strip[k]].push_back(k);
+    if (!p_.closed[k]) continue;
+    force_row_[k] = static_cast<std::int64_t>(forces_.size());
+    forces_.push_back(k);
+  }
+}
 
 bool StripSolver::solve(const double* offset, double tolerance, bool* active,
                         double* result, double* approach, double* slope) {
@@ -55,28 +45,33 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
   int tries = p_.tries;
   // first guess of the forces: the closed contacts alone
   std::fill(force_.begin(), force_.end(), 0.0);
-  for (std::size_t k = 0; k < n; ++k) {
-    if (p_.strip[k] >= 0 && p_.closed[k]) force_[p_.strip[k]] += p_.force_unit[k] * offset[k];
-  }
+  for (const std::size_t k : forces_) force_[p_.strip[k]] += p_.force_unit[k] * offset[k];
+  bool fresh = false;  // whether the reference is the active set itself
+  if (referred_) start(offset);
   while (true) {
-    assemble(offset, active);
-    if (!factorise()) return false;
-    substitute();
-    for (std::size_t j = 0; j < law_.strips; ++j) {
-      approach[j] = place_[j] < 0 ? -law_.offset[j] : right_[inside_.size() + place_[j]];
+    if (!referred_ || !follow(active)) {
+      fresh = true;
+      if (!refer(offset, active) || !follow(active)) return referred_ = false;
     }
-    spread(result);
+    if (!solve_extra(active, false)) {
+      referred_ = false;
+      if (fresh) return false;
+      continue;
+    }
+    const double residual = spread(offset, active, result);
+    for (std::size_t j = 0; j < law_.strips; ++j) {
+      approach[j] = place_[j] < 0 ? -law_.offset[j] : x_[place_[j]];
+    }
 
     // forces of the strips, and the error of their approaches
-    std::fill(force_.begin(), force_.end(), 0.0);
-    for (std::size_t k = 0; k < n; ++k) {
-      if (p_.strip[k] >= 0 && active[k] != p_.closed[k]) {
-        force_[p_.strip[k]] += p_.force_unit[k] * result[k];
-      }
-    }
     double error = 0.0, derivative;
     for (std::size_t j = 0; j < law_.strips; ++j) {
-      error = std::max(error, std::abs(law_.excess(j, force_[j], &derivative) - approach[j]));
+      force_[j] = 0.0;
+      for (const std::size_t k : members_[j]) {
+        if (active[k] != p_.closed[k]) force_[j] += p_.force_unit[k] * result[k];
+      }
+      const double excess = law_.excess(j, force_[j], &derivative);
+      error = std::max(error, std::abs(excess - approach[j]));
     }
 
     std::size_t wrong = 0, last = 0;
@@ -86,7 +81,12 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
         last = k;
       }
     }
+    if (wrong == 0 && !fresh && !(residual <= kResidual * tolerance)) {
+      referred_ = false;
+      continue;
+    }
     if (wrong == 0 && error <= p_.tolerance_m) break;
+    fresh = false;
     if (wrong == 0) {
       if (--tries < -p_.singles) return false;
       continue;
@@ -104,149 +104,260 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
   }
 
   // derivatives by the load, with the tangents of the strips at the solution
-  assemble(offset, active);
-  if (!factorise()) return false;
-  const std::size_t a = inside_.size();
-  std::fill(right_.begin(), right_.end(), 0.0);
-  for (std::size_t i = 0; i < a; ++i) right_[i] = -p_.direction[inside_[i]];
-  for (std::size_t k = 0; k < n; ++k) {
-    if (p_.strip[k] >= 0 && p_.closed[k] && !active[k] && place_[p_.strip[k]] >= 0) {
-      const std::size_t j = p_.strip[k];
-      right_[a + place_[j]] += derivative_[j] * p_.force_unit[k] * p_.direction[k];
-    }
-  }
-  substitute();
+  if (!solve_extra(active, true)) return false;
   *slope = 0.0;
-  for (std::size_t i = 0; i < a; ++i) *slope += p_.by_value[inside_[i]] * right_[i];
-  for (std::size_t l = 0; l < loaded_.size(); ++l) {
-    *slope += p_.by_strip[loaded_[l]] * right_[a + l];
+  for (std::size_t i = 0; i < inside_.size(); ++i) {
+    *slope += p_.by_value[inside_[i]] * work_[i];
+  }
+  for (std::size_t t = 0; t < extra_.size(); ++t) {
+    const std::size_t k = extra_[t].index;
+    if (extra_[t].kind == Kind::kActive) *slope += p_.by_value[k] * x_[t];
+    if (extra_[t].kind == Kind::kStrip) *slope += p_.by_strip[k] * x_[t];
   }
   return true;
 }
 
-void StripSolver::assemble(const double* offset, const bool* active) {
+bool StripSolver::refer(const double* offset, const bool* active) {
   const std::size_t n = p_.size;
   inside_.clear();
-  loaded_.clear();
-  std::fill(place_.begin(), place_.end(), -1);
   for (std::size_t k = 0; k < n; ++k) {
+    row_[k] = active[k] ? static_cast<std::int64_t>(inside_.size()) : -1;
     if (active[k]) inside_.push_back(k);
-    const std::int64_t j = p_.strip[k];
-    if (j >= 0 && active[k] != p_.closed[k] && place_[j] < 0) {
-      place_[j] = static_cast<std::int64_t>(loaded_.size());
-      loaded_.push_back(static_cast<std::size_t>(j));
-    }
+    extra_of_[k] = -1;
   }
-  // strips without force are back at their start
-  std::copy(offset, offset + n, base_.begin());
+  // the strips that carry force or have moved from where the law is linearised
+  extra_.clear();
+  std::fill(place_.begin(), place_.end(), -1);
   for (std::size_t j = 0; j < law_.strips; ++j) {
-    if (place_[j] >= 0 || law_.offset[j] == 0.0) continue;
-    const double* column = p_.strip_columns + n * j;
-    add_multiple(base_.data(), column, -law_.offset[j], n);
+    bool there = law_.offset[j] != 0.0;
+    for (const std::size_t k : members_[j]) there = there || active[k] != p_.closed[k];
+    if (!there) continue;
+    place_[j] = static_cast<std::int64_t>(extra_.size());
+    extra_.push_back({Kind::kStrip, j});
   }
-
-  const std::size_t a = inside_.size(), size = a + loaded_.size();
-  matrix_.assign(size * size, 0.0);
-  right_.assign(size, 0.0);
-  for (std::size_t c = 0; c < size; ++c) {
+  const std::size_t a = inside_.size(), count = extra_.size(), width = a + count + 2;
+  system_.resize(a * width);
+  for (std::size_t c = 0; c < width - 2; ++c) {
     const double* column = c < a ? p_.columns + n * inside_[c]
-                                 : p_.strip_columns + n * loaded_[c - a];
-    for (std::size_t i = 0; i < a; ++i) matrix_[i * size + c] = column[inside_[i]];
+                                 : p_.strip_columns + n * extra_[c - a].index;
+    for (std::size_t i = 0; i < a; ++i) system_[i * width + c] = column[inside_[i]];
   }
-  for (std::size_t i = 0; i < a; ++i) right_[i] = -base_[inside_[i]];
-  for (std::size_t l = 0; l < loaded_.size(); ++l) {
-    const std::size_t j = loaded_[l];
-    const double excess = law_.excess(j, force_[j], &derivative_[j]);
-    matrix_[(a + l) * (size + 1)] = 1.0;
-    right_[a + l] = excess - derivative_[j] * std::max(force_[j], 0.0);
-  }
-  // the force of a strip: unknowns of its open contacts, slacks of its closed ones
   for (std::size_t i = 0; i < a; ++i) {
-    const std::size_t k = inside_[i];
-    if (p_.strip[k] < 0 || p_.closed[k]) continue;
-    const std::size_t j = p_.strip[k];
-    matrix_[(a + place_[j]) * size + i] -= derivative_[j] * p_.force_unit[k];
+    system_[i * width + width - 2] = -p_.direction[inside_[i]];
+    system_[i * width + width - 1] = -offset[inside_[i]];
   }
-  for (std::size_t k = 0; k < n; ++k) {
-    if (p_.strip[k] < 0 || !p_.closed[k] || active[k]) continue;
-    const std::size_t j = p_.strip[k];
-    const double unit = derivative_[j] * p_.force_unit[k];
-    double* row = matrix_.data() + (a + place_[j]) * size;
-    for (std::size_t c = 0; c < size; ++c) {
-      const double* column = c < a ? p_.columns + n * inside_[c]
-                                   : p_.strip_columns + n * loaded_[c - a];
-      row[c] -= unit * column[k];
+  pivots_.resize(a);
+  if (!eliminate(system_.data(), a, width, pivots_.data())) return false;
+  factors_.resize(a * a);
+  into_forces_.resize(a * forces_.size());
+  for (std::size_t i = 0; i < a; ++i) {
+    std::copy_n(system_.data() + i * width, a, factors_.data() + i * a);
+    const double* column = p_.columns + n * inside_[i];
+    double* row = into_forces_.data() + i * forces_.size();
+    for (std::size_t f = 0; f < forces_.size(); ++f) row[f] = column[forces_[f]];
+  }
+  for (std::size_t load = 0; load < 2; ++load) {
+    value_[load].resize(a);
+    for (std::size_t i = 0; i < a; ++i) {
+      value_[load][i] = system_[i * width + width - 1 - load];
     }
-    right_[a + place_[j]] += unit * base_[k];
   }
+  moved_.resize(std::max(moved_.size(), count));
+  forced_.resize(moved_.size());
+  across_.resize(moved_.size());
+  for (std::size_t t = 0; t < count; ++t) {
+    moved_[t].resize(a);
+    for (std::size_t i = 0; i < a; ++i) moved_[t][i] = system_[i * width + a + t];
+    finish(t);
+  }
+  for (std::size_t load = 0; load < 2; ++load) {
+    const double* q = load ? p_.direction : offset;
+    slack_[load].resize(forces_.size());
+    for (std::size_t f = 0; f < forces_.size(); ++f) slack_[load][f] = q[forces_[f]];
+    add_into_forces(value_[load].data(), 1.0, slack_[load].data());
+  }
+  offset_ = offset;
+  return referred_ = true;
 }
 
-bool StripSolver::factorise() {
-  const std::size_t size = right_.size();
-  pivots_.resize(size);
-  for (std::size_t first = 0; first < size; first += kPanel) {
-    const std::size_t end = std::min(first + kPanel, size), rest = size - end;
-    for (std::size_t c = first; c < end; ++c) {
-      std::size_t best = c;
-      for (std::size_t i = c + 1; i < size; ++i) {
-        if (std::abs(matrix_[i * size + c]) > std::abs(matrix_[best * size + c])) best = i;
-      }
-      const double pivot = matrix_[best * size + c];
-      if (!(std::abs(pivot) > 0.0)) return false;
-      pivots_[c] = best;
-      double* own = matrix_.data() + c * size;
-      if (best != c) std::swap_ranges(own, own + size, matrix_.data() + best * size);
-      for (std::size_t i = c + 1; i < size; ++i) {
-        double* row = matrix_.data() + i * size;
-        const double part = row[c] /= pivot;
-        for (std::size_t k = c + 1; k < end; ++k) row[k] -= part * own[k];
-      }
+void StripSolver::start(const double* offset) {
+  const std::size_t a = inside_.size();
+  for (std::size_t i = 0; i < a; ++i) value_[0][i] = -offset[inside_[i]];
+  substitute(factors_.data(), pivots_.data(), a, value_[0].data());
+  for (std::size_t f = 0; f < forces_.size(); ++f) slack_[0][f] = offset[forces_[f]];
+  add_into_forces(value_[0].data(), 1.0, slack_[0].data());
+  offset_ = offset;
+}
+
+bool StripSolver::follow(const bool* active) {
+  std::size_t changes = 0;
+  for (std::size_t k = 0; k < p_.size; ++k) changes += active[k] != (row_[k] >= 0);
+  if (changes > kFewest + inside_.size() / kShare) return false;
+  for (std::size_t k = 0; k < p_.size; ++k) {
+    const bool changed = active[k] != (row_[k] >= 0);
+    if (changed == (extra_of_[k] >= 0)) continue;
+    if (changed) {
+      add(active[k] ? Kind::kActive : Kind::kInactive, k);
+    } else {
+      drop(static_cast<std::size_t>(extra_of_[k]));
     }
-    // the columns after the panel: first in its own rows, then in those below
-    const double* rows[kPanel];
-    for (std::size_t c = first; c < end; ++c) {
-      double* own = matrix_.data() + c * size;
-      rows[c - first] = own + end;
-      for (std::size_t b = first; b < c; ++b) {
-        add_multiple(own + end, rows[b - first], -own[b], rest);
-      }
-    }
-    if (rest == 0) break;
-    for (std::size_t i = end; i < size; ++i) {
-      double* row = matrix_.data() + i * size;
-      subtract_four(row + end, rows, row + first, rest);
+  }
+  for (std::size_t j = 0; j < law_.strips; ++j) {
+    for (const std::size_t k : members_[j]) {
+      if (place_[j] < 0 && active[k] != p_.closed[k]) add(Kind::kStrip, j);
     }
   }
   return true;
 }
 
-void StripSolver::substitute() {
-  double* right = right_.data();
-  const std::size_t size = pivots_.size();
-  for (std::size_t c = 0; c < size; ++c) std::swap(right[c], right[pivots_[c]]);
-  for (std::size_t i = 1; i < size; ++i) {
-    const double* row = matrix_.data() + i * size;
-    double sum = right[i];
-    for (std::size_t j = 0; j < i; ++j) sum -= row[j] * right[j];
-    right[i] = sum;
+void StripSolver::add(Kind kind, std::size_t index) {
+  const std::size_t a = inside_.size(), t = extra_.size();
+  extra_.push_back({kind, index});
+  (kind == Kind::kStrip ? place_ : extra_of_)[index] = static_cast<std::int64_t>(t);
+  if (moved_.size() <= t) {
+    moved_.resize(t + 1);
+    forced_.resize(t + 1);
+    across_.resize(t + 1);
   }
-  for (std::size_t i = size; i-- > 0;) {
-    const double* row = matrix_.data() + i * size;
-    double sum = right[i];
-    for (std::size_t j = i + 1; j < size; ++j) sum -= row[j] * right[j];
-    right[i] = sum / row[i];
+  moved_[t].resize(a);
+  for (std::size_t i = 0; i < a; ++i) moved_[t][i] = coupling(inside_[i], extra_[t]);
+  substitute(factors_.data(), pivots_.data(), a, moved_[t].data());
+  if (kind == Kind::kActive) {
+    across_[t].resize(a);
+    for (std::size_t i = 0; i < a; ++i) {
+      across_[t][i] = p_.columns[p_.size * inside_[i] + index];
+    }
   }
+  finish(t);
 }
 
-void StripSolver::spread(double* result) const {
-  const std::size_t n = p_.size, a = inside_.size();
-  std::copy(base_.begin(), base_.end(), result);
-  for (std::size_t c = 0; c < a + loaded_.size(); ++c) {
-    const double* column = c < a ? p_.columns + n * inside_[c]
-                                 : p_.strip_columns + n * loaded_[c - a];
-    add_multiple(result, column, right_[c], n);
+void StripSolver::finish(std::size_t t) {
+  const std::size_t count = forces_.size();
+  forced_[t].resize(count);
+  for (std::size_t f = 0; f < count; ++f) forced_[t][f] = coupling(forces_[f], extra_[t]);
+  add_into_forces(moved_[t].data(), -1.0, forced_[t].data());
+}
+
+void StripSolver::add_into_forces(const double* value, double sign, double* slack) {
+  columns_.clear();
+  parts_.clear();
+  for (std::size_t i = 0; i < inside_.size(); ++i) {
+    columns_.push_back(into_forces_.data() + i * forces_.size());
+    parts_.push_back(sign * value[i]);
   }
-  for (std::size_t i = 0; i < a; ++i) result[inside_[i]] = right_[i];
+  add_columns(slack, columns_.data(), parts_.data(), parts_.size(), forces_.size());
+}
+
+void StripSolver::drop(std::size_t t) {
+  const std::size_t last = extra_.size() - 1;
+  extra_of_[extra_[t].index] = -1;
+  if (t != last) {
+    extra_[t] = extra_[last];
+    std::swap(moved_[t], moved_[last]);
+    std::swap(forced_[t], forced_[last]);
+    std::swap(across_[t], across_[last]);
+    (extra_[t].kind == Kind::kStrip ? place_ : extra_of_)[extra_[t].index] =
+        static_cast<std::int64_t>(t);
+  }
+  extra_.pop_back();
+}
+
+double StripSolver::coupling(std::size_t k, const Extra& extra) const {
+  if (extra.kind == Kind::kStrip) return p_.strip_columns[p_.size * extra.index + k];
+  if (extra.kind == Kind::kActive) return p_.columns[p_.size * extra.index + k];
+  return extra.index == k ? -1.0 : 0.0;
+}
+
+bool StripSolver::solve_extra(const bool* active, bool by_load) {
+  const std::size_t a = inside_.size(), count = extra_.size(), width = count + 1;
+  const std::vector<double>&value = value_[by_load], &slack = slack_[by_load];
+  const double* q = by_load ? p_.direction : offset_;
+  system_.assign(count * width, 0.0);
+  for (std::size_t r = 0; r < count; ++r) {
+    double* row = system_.data() + r * width;
+    const std::size_t k = extra_[r].index;
+    if (extra_[r].kind == Kind::kActive) {
+      // its slack is zero
+      products(moved_.data(), count, across_[r].data(), a, row);
+      for (std::size_t t = 0; t < count; ++t) row[t] = coupling(k, extra_[t]) - row[t];
+      products(&value, 1, across_[r].data(), a, row + count);
+      row[count] = -q[k] - row[count];
+    } else if (extra_[r].kind == Kind::kInactive) {
+      // its value is zero
+      for (std::size_t t = 0; t < count; ++t) row[t] = moved_[t][row_[k]];
+      row[count] = value[row_[k]];
+    } else {
+      // its approach follows the tangent of the law at the last force
+      bool loaded = false;
+      for (const std::size_t j : members_[k]) {
+        loaded = loaded || active[j] != p_.closed[j];
+      }
+      double d = 0.0;
+      if (loaded) {
+        const double excess = law_.excess(k, force_[k], &d);
+        row[count] = by_load ? 0.0 : excess - d * std::max(force_[k], 0.0);
+      } else {
+        row[count] = by_load ? 0.0 : -law_.offset[k];
+      }
+      for (const std::size_t j : members_[k]) {
+        if (active[j] == p_.closed[j]) continue;
+        const double unit = d * p_.force_unit[j];
+        if (extra_of_[j] >= 0) {
+          row[extra_of_[j]] -= unit;
+        } else if (active[j]) {
+          for (std::size_t t = 0; t < count; ++t) row[t] += unit * moved_[t][row_[j]];
+          row[count] += unit * value[row_[j]];
+        } else {
+          const std::int64_t f = force_row_[j];
+          for (std::size_t t = 0; t < count; ++t) row[t] -= unit * forced_[t][f];
+          row[count] += unit * slack[f];
+        }
+      }
+      row[r] += 1.0;
+    }
+  }
+  order_.resize(count);
+  if (!eliminate(system_.data(), count, width, order_.data())) return false;
+  x_.resize(count);
+  for (std::size_t t = 0; t < count; ++t) x_[t] = system_[t * width + count];
+  std::copy(value.begin(), value.end(), work_.begin());
+  columns_.clear();
+  parts_.clear();
+  for (std::size_t t = 0; t < count; ++t) {
+    columns_.push_back(moved_[t].data());
+    parts_.push_back(-x_[t]);
+  }
+  add_columns(work_.data(), columns_.data(), parts_.data(), count, a);
+  return true;
+}
+
+double StripSolver::spread(const double* offset, const bool* active,
+                           double* result) {
+  const std::size_t n = p_.size;
+  columns_.clear();
+  parts_.clear();
+  for (std::size_t i = 0; i < inside_.size(); ++i) {
+    if (!active[inside_[i]]) continue;
+    columns_.push_back(p_.columns + n * inside_[i]);
+    parts_.push_back(work_[i]);
+  }
+  for (std::size_t t = 0; t < extra_.size(); ++t) {
+    const std::size_t k = extra_[t].index;
+    if (extra_[t].kind == Kind::kInactive) continue;
+    const double* columns =
+        extra_[t].kind == Kind::kStrip ? p_.strip_columns : p_.columns;
+    columns_.push_back(columns + n * k);
+    parts_.push_back(x_[t]);
+  }
+  std::copy(offset, offset + n, result);
+  add_columns(result, columns_.data(), parts_.data(), parts_.size(), n);
+  double residual = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!active[k]) continue;
+    residual = std::max(residual, std::abs(result[k]));
+    result[k] = row_[k] >= 0 ? work_[row_[k]] : x_[extra_of_[k]];
+  }
+  return residual;
 }
 
 }  // namespace swgjoint

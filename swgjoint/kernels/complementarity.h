@@ -50,20 +50,63 @@ class StripSolver {
              double* approach, double* slope);
 
  private:
-  // Matrix and right-hand side in the active unknowns and the loaded strips.
-  void assemble(const double* offset, const bool* active);
-  // LU factors of the matrix with partial pivoting; false if it is singular.
-  bool factorise();
-  // Replace the right-hand side by the solution.
-  void substitute();
-  // Unknowns and slacks from the solution.
-  void spread(double* result) const;
+  // An unknown beyond those of the reference: the approach of a strip, the value of a
+  // contact that has become active, or the slack of one that has become inactive.
+  enum class Kind { kStrip, kActive, kInactive };
+  struct Extra {
+    Kind kind;
+    std::size_t index;  // number of the strip or contact
+  };
+
+  // The factors of the active contacts at one time are kept as a reference. Later active
+  // sets differ from it by few contacts, whose unknowns are extra, like those of the
+  // strips: the reference gives the effect of each extra unknown on all others, and a
+  // small system gives the extra unknowns.
+
+  // Factorise the matrix of the active contacts, which become the reference.
+  bool refer(const double* offset, const bool* active);
+  // Solutions for one offset with the reference alone.
+  void start(const double* offset);
+  // Extra unknowns for all changes since the reference; false if there are too many.
+  bool follow(const bool* active);
+  void add(Kind kind, std::size_t index);
+  void drop(std::size_t t);
+  // Effect of an extra unknown on the slacks of the closed strip contacts
+  void finish(std::size_t t);
+  // slack += sign times the effect of the values of inside_ on forces_
+  void add_into_forces(const double* value, double sign, double* slack);
+  // Derivative of the slack of a contact by an extra unknown
+  double coupling(std::size_t k, const Extra& extra) const;
+  // Values of the extra unknowns; by_load solves for the derivatives by the load.
+  bool solve_extra(const bool* active, bool by_load);
+  // Unknowns and slacks; returns the largest error of an active equation.
+  double spread(const double* offset, const bool* active, double* result);
 
   const Problem& p_;
   const StripLaw& law_;
-  std::vector<std::size_t> inside_, loaded_, pivots_;
-  std::vector<std::int64_t> place_;  // number of each strip in loaded_, or -1
-  std::vector<double> matrix_, right_, force_, derivative_, base_;
+  std::vector<std::vector<std::size_t>> members_;  // contacts of each strip
+  std::vector<std::size_t> forces_;                // strip contacts that are closed
+  std::vector<std::int64_t> force_row_;            // number of a contact in forces_
+  // the reference
+  bool referred_ = false;
+  const double* offset_ = nullptr;        // of the problem that is being solved
+  std::vector<std::size_t> inside_, pivots_;
+  std::vector<std::int64_t> row_;         // number of a contact in inside_, or -1
+  std::vector<double> factors_;           // LU factors
+  std::vector<double> into_forces_;       // matrix from inside_ to forces_
+  // values of inside_ and slacks of forces_ for the offset and for the load
+  std::vector<double> value_[2], slack_[2];
+  // the extra unknowns
+  std::vector<Extra> extra_;
+  std::vector<std::int64_t> extra_of_;    // number of the extra unknown of a contact
+  std::vector<std::int64_t> place_;       // that of a strip
+  std::vector<std::vector<double>> moved_, forced_;  // their effect on values and slacks
+  std::vector<std::vector<double>> across_;  // row of the matrix of an active contact
+  std::vector<double> system_, x_, work_;
+  std::vector<std::size_t> order_;
+  std::vector<const double*> columns_;
+  std::vector<double> parts_;
+  std::vector<double> force_;
 };
 
 }  // namespace swgjoint

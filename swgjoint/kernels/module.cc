@@ -232,9 +232,10 @@ class StripProblems {
             slope.data(),  offset.data(), strips};
   }
 
-  // With chained, every problem but the first starts from the solution before it.
+  // Each problem starts from the solution of an earlier one; if before is -1 or that one
+  // is unsolved, it starts from its own active set.
   void solve(In<2> offset, In<1> tolerance, double tolerance_m, int tries, int singles,
-             bool chained, MasksOut active, Out<2> result, Out<2> approach, Out<1> slope,
+             Index before, MasksOut active, Out<2> result, Out<2> approach, Out<1> slope,
              MaskOut solved) const {
     const std::size_t count = offset.shape(0), n = columns_.shape(0);
     const std::size_t strips = law_.strips;
@@ -246,6 +247,11 @@ class StripProblems {
     require(tolerance.shape(0) == count && slope.shape(0) == count &&
                 solved.shape(0) == count,
             "tolerance, slope, solved: (count,)");
+    require(before.shape(0) == count, "before: (count,)");
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int64_t k = before.data()[i];
+      require(k >= -1 && k < static_cast<std::int64_t>(i), "before: earlier problems");
+    }
     const swgjoint::Problem problem{n,
                                     columns_.data(),
                                     strip_columns_.data(),
@@ -262,7 +268,8 @@ class StripProblems {
     swgjoint::StripSolver solver(problem, law_);
     for (std::size_t i = 0; i < count; ++i) {
       bool* own = active.data() + n * i;
-      if (chained && i > 0 && solved.data()[i - 1]) std::copy(own - n, own, own);
+      const std::int64_t k = before.data()[i];
+      if (k >= 0 && solved.data()[k]) std::copy_n(active.data() + n * k, n, own);
       solved.data()[i] = solver.solve(
           offset.data() + n * i, tolerance.data()[i], own, result.data() + n * i,
           approach.data() + strips * i, slope.data() + i);
@@ -301,7 +308,7 @@ NB_MODULE(compiled, m) {
            nb::arg("law").noconvert())
       .def("solve", &StripProblems::solve, nb::arg("offset").noconvert(),
            nb::arg("tolerance").noconvert(), nb::arg("tolerance_m"), nb::arg("tries"),
-           nb::arg("singles"), nb::arg("chained"), nb::arg("active").noconvert(),
+           nb::arg("singles"), nb::arg("before").noconvert(), nb::arg("active").noconvert(),
            nb::arg("result").noconvert(), nb::arg("approach").noconvert(),
            nb::arg("slope").noconvert(), nb::arg("solved").noconvert());
   nb::class_<swgjoint::Limits>(m, "Limits")

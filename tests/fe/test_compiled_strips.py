@@ -9,7 +9,7 @@ import pytest
 
 from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
-from swgjoint.fe.common.pivot_base import similar_parts
+from swgjoint.fe.common.pivot_base import next_to, similar_parts
 from swgjoint.fe.common.pivoting import exchange
 from swgjoint.fe.common.strip_problems import FEW, PART, StripProblems
 from swgjoint.kernels import kernels
@@ -181,3 +181,52 @@ def test_unsolvable_problems_are_nan(monkeypatch, how):
     found = problems.solve(np.array([[1.0, 1.0], [-1.0, -1.0]]))
     assert found.solved[0] and not found.value[0].any() and not found.active[0].any()
     assert not found.solved[1] and np.isnan(found.slope[1])
+
+
+def test_each_problem_comes_after_the_nearest_that_is_known():
+    """Prim's tree against a search of all pairs; the first row has none before it."""
+    offset = np.random.default_rng(4).normal(size=(23, 5))
+    order, before = next_to(offset)
+    assert sorted(order) == list(range(23)) and order[0] == 0 and before[0] == -1
+    apart = np.linalg.norm(offset[order, None] - offset[order], axis=-1)
+    for k in range(1, 23):
+        known = apart[:k, k:]
+        assert apart[before[k], k] == known.min()
+    assert [one.tolist() for one in next_to(offset[:1])] == [[0], [-1]]
+
+
+def test_offsets_of_a_base_are_those_of_the_exchanged_problems():
+    """The exchanged unknowns and slacks solve the same equations."""
+    one = drive()
+    rng, origin = np.random.default_rng(6), one.problems._origin
+    ends = rng.uniform(size=len(origin.matrix)) < 0.4
+    base = origin.exchange(ends)
+    value = rng.normal(size=(3, ends.size))
+    offset = rng.normal(size=value.shape)
+    slack = offset + value @ origin.matrix.T
+    unknown, result = np.where(ends, slack, value), np.where(ends, value, slack)
+    found = base.offset_of(offset) + unknown @ base.matrix.T
+    assert np.abs(found - result).max() < 1e-12 * np.abs(result).max()
+    assert np.array_equal(origin.offset_of(offset), offset)
+
+
+@pytest.mark.skipif(kernels() is None, reason="built without compiled loops")
+@pytest.mark.parametrize("teeth", [1, 5])
+def test_factors_are_kept_over_many_changes_of_contact(teeth):
+    """Solutions from far starts, with errors of all sizes, are those from near ones."""
+    problems = drive().problems
+    sizes = 10.0 ** np.linspace(-8.0, -5.0, 40)
+    offset = np.concatenate([offsets(drive(), 8, size)[1] for size in sizes])
+    ours = problems.solve(offset)
+    far = np.random.default_rng(teeth).uniform(size=ours.active.shape) < 0.2 * teeth
+    again = problems.solve(offset, far)
+    assert ours.solved.all() and again.solved.all()
+    assert np.array_equal(ours.active, again.active)
+    assert np.ptp(ours.active.sum(axis=1)) > 15
+    scale = np.abs(ours.value).max(axis=1)
+    assert (np.abs(again.value - ours.value).max(axis=1) <= 1e-6 * scale).all()
+    slack = offset + ours.value @ problems.matrix.T
+    slack += ours.approach @ problems.by_strip.T
+    size = np.sqrt(np.diag(problems.matrix))
+    residual = np.abs(np.where(ours.active, slack, 0.0) / size).max(axis=1)
+    assert (residual <= 1e-12 * np.abs(offset / size).max(axis=1)).all()

@@ -39,6 +39,18 @@ class Base:
     slope: float
     """Change of the output per unit of load while all unknowns are inactive."""
 
+    def offset_of(self, offset: Array) -> Array:
+        """Offsets of problems after the exchange.
+
+        Args:
+            offset: Scaled offsets q of the original problems (n_problems, m).
+        """
+        changed = offset.copy()
+        if self.inside.size:
+            changed[:, self.inside] = 0.0
+            changed += offset[:, self.inside] @ self.forward.T
+        return changed
+
     def exchange(self, active: Mask) -> Base:
         """The problems in which the active unknowns have changed places.
 
@@ -101,3 +113,34 @@ def similar_parts(offset: Array, size: int) -> list[Index]:
         return [*halved(order[:half]), *halved(order[half:])]
 
     return halved(np.arange(len(offset)))
+
+
+def next_to(offset: Array) -> tuple[Index, Index]:
+    """Order in which each problem comes after the one that is most similar to it.
+
+    The problems are connected by a tree of smallest total length (Prim (1957),
+    "Shortest connection networks and some generalizations", Bell System Technical
+    Journal 36(6), 1389-1401).
+
+    Args:
+        offset: Offsets q (n_problems, m).
+
+    Returns:
+        Row numbers in this order (n_problems,), and the place in it of the most similar
+        problem before each (n_problems,); -1 for the first.
+    """
+    from_mean = offset - offset.mean(axis=0)
+    size = np.sum(from_mean**2, axis=1)
+    distance = size[:, None] + size - 2.0 * from_mean @ from_mean.T
+    order = np.zeros(len(offset), dtype=np.int64)
+    before = np.full(len(offset), -1)
+    nearest, place = distance[0].copy(), np.zeros(len(offset), dtype=np.int64)
+    nearest[0] = np.inf
+    for k in range(1, len(offset)):
+        row = int(nearest.argmin())
+        order[k], before[k] = row, place[row]
+        closer = distance[row] < nearest
+        closer &= np.isfinite(nearest)  # those that are not in the tree yet
+        nearest[closer], place[closer] = distance[row, closer], k
+        nearest[row] = np.inf
+    return order, before

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.fe.common.indentation import Strips
-from swgjoint.fe.common.pivot_base import Base, similar_parts
+from swgjoint.fe.common.pivot_base import Base, next_to, similar_parts
 from swgjoint.fe.common.pivoting import (
     SINGLES,
     TOLERANCE,
@@ -42,8 +42,12 @@ each of which divides its error by about four."""
 PART = 64
 """Largest number of similar problems that share a base, see :class:`Base`."""
 GROUP = 16
-"""Number of parts that are solved one after another. Without a guess, each problem
-starts from the solution of the one before it."""
+"""Number of parts that are solved one after another. Without a guess, the first problem
+of a part starts from a solution of the part before it."""
+SAMPLES = 12
+"""Number of problems that are solved first to find a base for judging similarity."""
+PROBES = 5
+"""Number of problems of a part whose solutions determine its base."""
 FEW = 48
 """Number of active unknowns up to which a part is solved without a base. With a base,
 what is left to solve for are the differences from it, but a base costs as much as
@@ -263,14 +267,10 @@ class StripProblems:
         result, approach = np.empty((count, m)), np.empty((count, n_strips))
         slope, solved = np.empty(count), np.empty(count, dtype=bool)
 
-        def solve(part: Index, base: Base, problems: Any, chained: bool) -> None:
+        def solve(part: Index, base: Base, problems: Any, before: Index) -> None:
             inside = base.inside
-            own, ends = q[part], active[part]
-            if inside.size:
-                known = own[:, inside]
-                own[:, inside] = 0.0
-                own += known @ base.forward.T
-                ends[:, inside] ^= True
+            own, ends = base.offset_of(q[part]), active[part]
+            ends[:, inside] ^= True
             values, moved = np.empty(own.shape), np.empty((len(part), n_strips))
             slopes, done = np.empty(len(part)), np.empty(len(part), dtype=bool)
             problems.solve(
@@ -279,7 +279,7 @@ class StripProblems:
                 EXACT,
                 TRIES,
                 SINGLES,
-                chained,
+                before,
                 ends,
                 values,
                 moved,
@@ -290,28 +290,56 @@ class StripProblems:
             result[part], active[part], approach[part] = values, ends, moved
             slope[part], solved[part] = slopes + base.slope, done
 
-        def solve_parts(parts: list[Index]) -> None:
-            last = np.zeros(m, bool)
-            for part in parts:
-                if start is not None:
-                    last = active[part].mean(axis=0) > 0.5
-                base, problems = self._origin, self._native_origin
-                if last.sum() > FEW and part.size > 1:
-                    base = self._origin.exchange(last)
-                    problems = self._native(base)
-                if start is None:
-                    active[part[0]] = last
-                solve(part, base, problems, start is None)
-                if solved[part[-1]]:
-                    last = active[part[-1]]
+        def chosen(ends: Mask, size: int) -> tuple[Base, Any]:
+            """Base for problems whose solutions are near an active set."""
+            if ends.sum() <= FEW or size == 1:
+                return self._origin, self._native_origin
+            base = self._origin.exchange(ends)
+            return base, self._native(base)
 
-        parts = similar_parts(q, PART)
-        groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
+        def solve_guessed(parts: list[Index]) -> None:
+            for part in parts:
+                ends = active[part].mean(axis=0) > 0.5
+                base, problems = chosen(ends, part.size)
+                solve(part, base, problems, np.full(part.size, -1))
+
+        def usual(part: Index, otherwise: Mask) -> Mask:
+            """Active set of most of the problems of a part that were solved."""
+            sound = part[solved[part]]
+            return active[sound].mean(axis=0) > 0.5 if sound.size else otherwise
+
+        def solve_unguessed(parts: list[Index]) -> None:
+            """Start from the most similar problem that is solved already."""
+            last = first_ends
+            for part in parts:
+                base, problems = chosen(last, part.size)
+                rows, before = next_to(similar_at[part])
+                part = part[rows]
+                active[part[0]] = last
+                if base.inside.size and part.size > 4 * PROBES:
+                    probes = part[:: -(-part.size // PROBES)]
+                    solve(probes, base, problems, np.arange(probes.size) - 1)
+                    last = usual(probes, last)
+                    base, problems = chosen(last, part.size)
+                    active[part[0]] = last
+                solve(part, base, problems, before)
+                last = usual(part, last)
+
         if start is None:
-            # a solution from which the others of a group start
-            for group in groups:
-                if group[0].size > 1:
-                    group.insert(0, group[0][:1])
+            samples = np.concatenate([p[:1] for p in similar_parts(q, PART)])
+            samples = samples[:: -(-samples.size // SAMPLES)]
+            first, rest = samples[:1], samples[1:]
+            solve(first, self._origin, self._native_origin, np.full(1, -1))
+            active[rest[:1]] = active[first]
+            base, problems = chosen(active[first[0]], count)
+            solve(rest, base, problems, np.arange(rest.size) - 1)
+            first_ends = usual(samples, np.zeros(m, bool))
+            base, _ = chosen(first_ends, count)
+            similar_at = base.offset_of(q)
+            parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
+        else:
+            parts, solve_parts = similar_parts(q, PART), solve_guessed
+        groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
         if len(groups) == 1:
             solve_parts(groups[0])
         else:

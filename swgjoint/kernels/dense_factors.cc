@@ -1,0 +1,216 @@
+#include "dense_factors.h"
+
+#include <algorithm>
+#include <cmath>
+
+// Versions of a loop, one of which is chosen when the library is loaded. All give the
+// same bits, because they add element by element.
+#if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && \
+    !defined(__SANITIZE_ADDRESS__)
+#define SWGJOINT_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define SWGJOINT_WIDE
+#endif
+// A loop that belongs to each of these versions
+#if defined(__GNUC__)
+#define SWGJOINT_INLINE inline __attribute__((always_inline))
+#else
+#define SWGJOINT_INLINE inline
+#endif
+
+namespace swgjoint {
+
+namespace {
+
+// y += a x
+SWGJOINT_INLINE void add_multiple(double* y, const double* x, double a, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) y[i] += a * x[i];
+}
+
+// Scalar product, in eight sums
+SWGJOINT_INLINE double product(const double* x, const double* y, std::size_t n) {
+  double sums[8] = {};
+  std::size_t i = 0;
+  for (; i + 8 <= n; i += 8) {
+    for (std::size_t k = 0; k < 8; ++k) sums[k] += x[i + k] * y[i + k];
+  }
+  for (; i < n; ++i) sums[0] += x[i] * y[i];
+  return ((sums[0] + sums[4]) + (sums[2] + sums[6])) +
+         ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+}
+
+constexpr std::size_t kPanel = 8;  // columns that are eliminated at once
+constexpr std::size_t kRows = 6;   // rows of a tile that stays in registers
+
+// Eight numbers, which compilers with vector types keep in one or more registers.
+#if defined(__GNUC__)
+typedef double Lanes __attribute__((vector_size(64), aligned(8), may_alias));
+#else
+struct Lanes {
+  double v[8];
+  Lanes& operator-=(const Lanes& other) {
+    for (int k = 0; k < 8; ++k) v[k] -= other.v[k];
+    return *this;
+  }
+};
+inline Lanes operator*(double a, Lanes x) {
+  for (int k = 0; k < 8; ++k) x.v[k] *= a;
+  return x;
+}
+#endif
+constexpr std::size_t kLanes = 8;
+
+// Rows from end on, less the multiples of the kPanel rows from first = end - kPanel on.
+SWGJOINT_WIDE void subtract_panel(double* matrix, std::size_t rows, std::size_t width,
+                                  std::size_t end) {
+  const std::size_t first = end - kPanel;
+  std::size_t k = end;
+  for (; k + kLanes <= width; k += kLanes) {
+    Lanes upper[kPanel];
+    for (std::size_t c = 0; c < kPanel; ++c) {
+      upper[c] = *reinterpret_cast<const Lanes*>(matrix + (first + c) * width + k);
+    }
+    std::size_t i = end;
+    for (; i + kRows <= rows; i += kRows) {
+      double* row = matrix + i * width;
+      Lanes tile[kRows];
+      for (std::size_t r = 0; r < kRows; ++r) {
+        tile[r] = *reinterpret_cast<const Lanes*>(row + r * width + k);
+      }
+      for (std::size_t c = 0; c < kPanel; ++c) {
+        for (std::size_t r = 0; r < kRows; ++r) {
+          tile[r] -= row[r * width + first + c] * upper[c];
+        }
+      }
+      for (std::size_t r = 0; r < kRows; ++r) {
+        *reinterpret_cast<Lanes*>(row + r * width + k) = tile[r];
+      }
+    }
+    for (; i < rows; ++i) {
+      double* row = matrix + i * width;
+      Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
+      for (std::size_t c = 0; c < kPanel; ++c) sum -= row[first + c] * upper[c];
+      *reinterpret_cast<Lanes*>(row + k) = sum;
+    }
+  }
+  for (; k < width; ++k) {
+    for (std::size_t i = end; i < rows; ++i) {
+      double* row = matrix + i * width;
+      for (std::size_t c = first; c < end; ++c) row[k] -= row[c] * matrix[c * width + k];
+    }
+  }
+}
+
+// Factors of the columns from first to end, in all rows from first on.
+SWGJOINT_WIDE bool eliminate_panel(double* matrix, std::size_t rows, std::size_t width,
+                                   std::size_t first, std::size_t end,
+                                   std::size_t* pivots) {
+  for (std::size_t c = first; c < end; ++c) {
+    std::size_t best = c;
+    double largest = std::abs(matrix[c * width + c]);
+    for (std::size_t i = c + 1; i < rows; ++i) {
+      const double size = std::abs(matrix[i * width + c]);
+      if (size > largest) {
+        largest = size;
+        best = i;
+      }
+    }
+    if (!(largest > 0.0)) return false;
+    pivots[c] = best;
+    double* own = matrix + c * width;
+    if (best != c) std::swap_ranges(own, own + width, matrix + best * width);
+    const double pivot = own[c];
+    if (width - first < kLanes || c + 1 == end) {
+      for (std::size_t i = c + 1; i < rows; ++i) {
+        double* row = matrix + i * width;
+        const double part = row[c] /= pivot;
+        for (std::size_t k = c + 1; k < end; ++k) row[k] -= part * own[k];
+      }
+      continue;
+    }
+    // all columns of the panel at once, those up to c less zero
+    double masked[kLanes] = {};
+    for (std::size_t k = c + 1; k < end; ++k) masked[k - first] = own[k];
+    const Lanes upper = *reinterpret_cast<const Lanes*>(masked);
+    for (std::size_t i = c + 1; i < rows; ++i) {
+      double* row = matrix + i * width;
+      const double part = row[c] /= pivot;
+      Lanes sum = *reinterpret_cast<const Lanes*>(row + first);
+      sum -= part * upper;
+      *reinterpret_cast<Lanes*>(row + first) = sum;
+    }
+  }
+  // the columns after the panel in its own rows
+  for (std::size_t c = first + 1; c < end; ++c) {
+    double* own = matrix + c * width;
+    for (std::size_t b = first; b < c; ++b) {
+      add_multiple(own + end, matrix + b * width + end, -own[b], width - end);
+    }
+  }
+  return true;
+}
+
+// Solutions of the columns after the first rows ones, given the factors of these.
+SWGJOINT_WIDE void substitute_back(double* matrix, std::size_t rows, std::size_t width) {
+  for (std::size_t i = rows; i-- > 0;) {
+    double* row = matrix + i * width;
+    std::size_t k = rows;
+    for (; k + kLanes <= width; k += kLanes) {
+      Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
+      for (std::size_t j = i + 1; j < rows; ++j) {
+        sum -= row[j] * *reinterpret_cast<const Lanes*>(matrix + j * width + k);
+      }
+      *reinterpret_cast<Lanes*>(row + k) = sum;
+    }
+    for (; k < width; ++k) {
+      for (std::size_t j = i + 1; j < rows; ++j) row[k] -= row[j] * matrix[j * width + k];
+    }
+    for (k = rows; k < width; ++k) row[k] /= row[i];
+  }
+}
+
+}  // namespace
+
+SWGJOINT_WIDE void add_columns(double* y, const double* const* x, const double* a,
+                               std::size_t count, std::size_t n) {
+  std::size_t c = 0;
+  for (; c + 4 <= count; c += 4) {
+    const double *x0 = x[c], *x1 = x[c + 1], *x2 = x[c + 2], *x3 = x[c + 3];
+    const double a0 = a[c], a1 = a[c + 1], a2 = a[c + 2], a3 = a[c + 3];
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i] = y[i] + a0 * x0[i] + a1 * x1[i] + a2 * x2[i] + a3 * x3[i];
+    }
+  }
+  for (; c < count; ++c) add_multiple(y, x[c], a[c], n);
+}
+
+SWGJOINT_WIDE void products(const std::vector<double>* rows, std::size_t count,
+                            const double* x, std::size_t n, double* results) {
+  for (std::size_t t = 0; t < count; ++t) results[t] = product(rows[t].data(), x, n);
+}
+
+bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t* pivots) {
+  for (std::size_t first = 0; first < rows; first += kPanel) {
+    const std::size_t end = std::min(first + kPanel, rows);
+    if (!eliminate_panel(matrix, rows, width, first, end, pivots)) return false;
+    // then in the rows below
+    if (end < rows) subtract_panel(matrix, rows, width, end);
+  }
+  substitute_back(matrix, rows, width);
+  return true;
+}
+
+SWGJOINT_WIDE void substitute(const double* factors, const std::size_t* pivots,
+                              std::size_t rows, double* right) {
+  for (std::size_t c = 0; c < rows; ++c) std::swap(right[c], right[pivots[c]]);
+  for (std::size_t i = 1; i < rows; ++i) {
+    right[i] -= product(factors + i * rows, right, i);
+  }
+  for (std::size_t i = rows; i-- > 0;) {
+    const double* row = factors + i * rows;
+    right[i] -= product(row + i + 1, right + i + 1, rows - i - 1);
+    right[i] /= row[i];
+  }
+}
+
+}  // namespace swgjoint

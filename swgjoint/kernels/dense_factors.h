@@ -1,0 +1,31 @@
+// Small dense systems, for the problems of complementarity.h. Matrices are stored row by
+// row. The results have the same bits on every machine.
+
+#ifndef SWGJOINT_KERNELS_DENSE_FACTORS_H_
+#define SWGJOINT_KERNELS_DENSE_FACTORS_H_
+
+#include <cstddef>
+#include <vector>
+
+namespace swgjoint {
+
+// y += a[0] x[0] + a[1] x[1] + ..., one product after another; the arrays have n numbers.
+void add_columns(double* y, const double* const* x, const double* a, std::size_t count,
+                 std::size_t n);
+
+// Scalar products of rows with x (n,), one result per row.
+void products(const std::vector<double>* rows, std::size_t count, const double* x,
+              std::size_t n, double* results);
+
+// LU factors of the first columns of a matrix (rows, width), with partial pivoting. The
+// columns after the first rows ones are replaced by their solutions. False if the matrix
+// is singular.
+bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t* pivots);
+
+// Replace one right-hand side by its solution, given the factors (rows, rows).
+void substitute(const double* factors, const std::size_t* pivots, std::size_t rows,
+                double* right);
+
+}  // namespace swgjoint
+
+#endif  // SWGJOINT_KERNELS_DENSE_FACTORS_H_
