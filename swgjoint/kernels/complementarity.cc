@@ -135,23 +135,25 @@ bool StripSolver::refer(const double* offset, const bool* active) {
     place_[j] = static_cast<std::int64_t>(extra_.size());
     extra_.push_back({Kind::kStrip, j});
   }
-  const std::size_t a = inside_.size(), count = extra_.size(), width = a + count + 2;
-  system_.resize(a * width);
+  const std::size_t a = inside_.size(), count = extra_.size(), width = a + count + 2,
+                    stride = width + kPadding;
+  system_.resize(a * stride);
   for (std::size_t c = 0; c < width - 2; ++c) {
     const double* column = c < a ? p_.columns + n * inside_[c]
                                  : p_.strip_columns + n * extra_[c - a].index;
-    for (std::size_t i = 0; i < a; ++i) system_[i * width + c] = column[inside_[i]];
+    for (std::size_t i = 0; i < a; ++i) system_[i * stride + c] = column[inside_[i]];
   }
   for (std::size_t i = 0; i < a; ++i) {
-    system_[i * width + width - 2] = -p_.direction[inside_[i]];
-    system_[i * width + width - 1] = -offset[inside_[i]];
+    system_[i * stride + width - 2] = -p_.direction[inside_[i]];
+    system_[i * stride + width - 1] = -offset[inside_[i]];
+    std::fill_n(system_.data() + i * stride + width, kPadding, 0.0);
   }
   pivots_.resize(a);
-  if (!eliminate(system_.data(), a, width, pivots_.data())) return false;
+  if (!eliminate(system_.data(), a, width, stride, pivots_.data())) return false;
   factors_.resize(a * a);
   into_forces_.resize(a * forces_.size());
   for (std::size_t i = 0; i < a; ++i) {
-    std::copy_n(system_.data() + i * width, a, factors_.data() + i * a);
+    std::copy_n(system_.data() + i * stride, a, factors_.data() + i * a);
     const double* column = p_.columns + n * inside_[i];
     double* row = into_forces_.data() + i * forces_.size();
     for (std::size_t f = 0; f < forces_.size(); ++f) row[f] = column[forces_[f]];
@@ -159,7 +161,7 @@ bool StripSolver::refer(const double* offset, const bool* active) {
   for (std::size_t load = 0; load < 2; ++load) {
     value_[load].resize(a);
     for (std::size_t i = 0; i < a; ++i) {
-      value_[load][i] = system_[i * width + width - 1 - load];
+      value_[load][i] = system_[i * stride + width - 1 - load];
     }
   }
   moved_.resize(std::max(moved_.size(), count));
@@ -167,7 +169,7 @@ bool StripSolver::refer(const double* offset, const bool* active) {
   across_.resize(moved_.size());
   for (std::size_t t = 0; t < count; ++t) {
     moved_[t].resize(a);
-    for (std::size_t i = 0; i < a; ++i) moved_[t][i] = system_[i * width + a + t];
+    for (std::size_t i = 0; i < a; ++i) moved_[t][i] = system_[i * stride + a + t];
     finish(t);
   }
   for (std::size_t load = 0; load < 2; ++load) {
@@ -269,12 +271,12 @@ double StripSolver::coupling(std::size_t k, const Extra& extra) const {
 }
 
 bool StripSolver::solve_extra(const bool* active, bool by_load) {
-  const std::size_t a = inside_.size(), count = extra_.size(), width = count + 1;
+  const std::size_t a = inside_.size(), count = extra_.size(), stride = count + 1 + kPadding;
   const std::vector<double>&value = value_[by_load], &slack = slack_[by_load];
   const double* q = by_load ? p_.direction : offset_;
-  system_.assign(count * width, 0.0);
+  system_.assign(count * stride, 0.0);
   for (std::size_t r = 0; r < count; ++r) {
-    double* row = system_.data() + r * width;
+    double* row = system_.data() + r * stride;
     const std::size_t k = extra_[r].index;
     if (extra_[r].kind == Kind::kActive) {
       // its slack is zero
@@ -317,9 +319,9 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
     }
   }
   order_.resize(count);
-  if (!eliminate(system_.data(), count, width, order_.data())) return false;
+  if (!eliminate(system_.data(), count, count + 1, stride, order_.data())) return false;
   x_.resize(count);
-  for (std::size_t t = 0; t < count; ++t) x_[t] = system_[t * width + count];
+  for (std::size_t t = 0; t < count; ++t) x_[t] = system_[t * stride + count];
   std::copy(value.begin(), value.end(), work_.begin());
   columns_.clear();
   parts_.clear();

@@ -62,110 +62,105 @@ constexpr std::size_t kLanes = 8;
 
 // Rows from end on, less the multiples of the kPanel rows from first = end - kPanel on.
 SWGJOINT_WIDE void subtract_panel(double* matrix, std::size_t rows, std::size_t width,
-                                  std::size_t end) {
+                                  std::size_t stride, std::size_t end) {
   const std::size_t first = end - kPanel;
-  std::size_t k = end;
-  for (; k + kLanes <= width; k += kLanes) {
+  for (std::size_t k = end; k < width; k += kLanes) {
     Lanes upper[kPanel];
     for (std::size_t c = 0; c < kPanel; ++c) {
-      upper[c] = *reinterpret_cast<const Lanes*>(matrix + (first + c) * width + k);
+      upper[c] = *reinterpret_cast<const Lanes*>(matrix + (first + c) * stride + k);
     }
     std::size_t i = end;
     for (; i + kRows <= rows; i += kRows) {
-      double* row = matrix + i * width;
+      double* row = matrix + i * stride;
       Lanes tile[kRows];
       for (std::size_t r = 0; r < kRows; ++r) {
-        tile[r] = *reinterpret_cast<const Lanes*>(row + r * width + k);
+        tile[r] = *reinterpret_cast<const Lanes*>(row + r * stride + k);
       }
       for (std::size_t c = 0; c < kPanel; ++c) {
         for (std::size_t r = 0; r < kRows; ++r) {
-          tile[r] -= row[r * width + first + c] * upper[c];
+          tile[r] -= row[r * stride + first + c] * upper[c];
         }
       }
       for (std::size_t r = 0; r < kRows; ++r) {
-        *reinterpret_cast<Lanes*>(row + r * width + k) = tile[r];
+        *reinterpret_cast<Lanes*>(row + r * stride + k) = tile[r];
       }
     }
     for (; i < rows; ++i) {
-      double* row = matrix + i * width;
+      double* row = matrix + i * stride;
       Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
       for (std::size_t c = 0; c < kPanel; ++c) sum -= row[first + c] * upper[c];
       *reinterpret_cast<Lanes*>(row + k) = sum;
     }
   }
-  for (; k < width; ++k) {
-    for (std::size_t i = end; i < rows; ++i) {
-      double* row = matrix + i * width;
-      for (std::size_t c = first; c < end; ++c) row[k] -= row[c] * matrix[c * width + k];
-    }
-  }
 }
 
-// Factors of the columns from first to end, in all rows from first on.
+// Factors of the columns from first to end, in all rows from first on. The copy of the
+// panel (kPanel, rows) has one column after another, so that loops run along columns.
 SWGJOINT_WIDE bool eliminate_panel(double* matrix, std::size_t rows, std::size_t width,
-                                   std::size_t first, std::size_t end,
-                                   std::size_t* pivots) {
+                                   std::size_t stride, std::size_t first,
+                                   std::size_t end, std::size_t* pivots, double* panel) {
+  for (std::size_t i = first; i < rows; ++i) {
+    for (std::size_t k = first; k < end; ++k) {
+      panel[(k - first) * rows + i] = matrix[i * stride + k];
+    }
+  }
   for (std::size_t c = first; c < end; ++c) {
+    double* own = panel + (c - first) * rows;
     std::size_t best = c;
-    double largest = std::abs(matrix[c * width + c]);
+    double largest = std::abs(own[c]);
     for (std::size_t i = c + 1; i < rows; ++i) {
-      const double size = std::abs(matrix[i * width + c]);
-      if (size > largest) {
-        largest = size;
+      if (std::abs(own[i]) > largest) {
+        largest = std::abs(own[i]);
         best = i;
       }
     }
     if (!(largest > 0.0)) return false;
     pivots[c] = best;
-    double* own = matrix + c * width;
-    if (best != c) std::swap_ranges(own, own + width, matrix + best * width);
-    const double pivot = own[c];
-    if (width - first < kLanes || c + 1 == end) {
-      for (std::size_t i = c + 1; i < rows; ++i) {
-        double* row = matrix + i * width;
-        const double part = row[c] /= pivot;
-        for (std::size_t k = c + 1; k < end; ++k) row[k] -= part * own[k];
+    if (best != c) {
+      double* row = matrix + c * stride;
+      std::swap_ranges(row, row + width, matrix + best * stride);
+      for (std::size_t k = 0; k < end - first; ++k) {
+        std::swap(panel[k * rows + c], panel[k * rows + best]);
       }
-      continue;
     }
-    // all columns of the panel at once, those up to c less zero
-    double masked[kLanes] = {};
-    for (std::size_t k = c + 1; k < end; ++k) masked[k - first] = own[k];
-    const Lanes upper = *reinterpret_cast<const Lanes*>(masked);
-    for (std::size_t i = c + 1; i < rows; ++i) {
-      double* row = matrix + i * width;
-      const double part = row[c] /= pivot;
-      Lanes sum = *reinterpret_cast<const Lanes*>(row + first);
-      sum -= part * upper;
-      *reinterpret_cast<Lanes*>(row + first) = sum;
+    const double pivot = own[c];
+    for (std::size_t i = c + 1; i < rows; ++i) own[i] /= pivot;
+    for (std::size_t k = c + 1; k < end; ++k) {
+      double* column = panel + (k - first) * rows;
+      const double upper = column[c];
+      for (std::size_t i = c + 1; i < rows; ++i) column[i] -= own[i] * upper;
+    }
+  }
+  for (std::size_t i = first; i < rows; ++i) {
+    for (std::size_t k = first; k < end; ++k) {
+      matrix[i * stride + k] = panel[(k - first) * rows + i];
     }
   }
   // the columns after the panel in its own rows
   for (std::size_t c = first + 1; c < end; ++c) {
-    double* own = matrix + c * width;
+    double* own = matrix + c * stride;
     for (std::size_t b = first; b < c; ++b) {
-      add_multiple(own + end, matrix + b * width + end, -own[b], width - end);
+      add_multiple(own + end, matrix + b * stride + end, -own[b], width - end);
     }
   }
   return true;
 }
 
 // Solutions of the columns after the first rows ones, given the factors of these.
-SWGJOINT_WIDE void substitute_back(double* matrix, std::size_t rows, std::size_t width) {
-  for (std::size_t i = rows; i-- > 0;) {
-    double* row = matrix + i * width;
-    std::size_t k = rows;
-    for (; k + kLanes <= width; k += kLanes) {
-      Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
-      for (std::size_t j = i + 1; j < rows; ++j) {
-        sum -= row[j] * *reinterpret_cast<const Lanes*>(matrix + j * width + k);
+SWGJOINT_WIDE void substitute_back(double* matrix, std::size_t rows, std::size_t width,
+                                   std::size_t stride) {
+  for (std::size_t j = rows; j-- > 0;) {
+    double* own = matrix + j * stride;
+    for (std::size_t k = rows; k < width; ++k) own[k] /= own[j];
+    for (std::size_t k = rows; k < width; k += kLanes) {
+      const Lanes upper = *reinterpret_cast<const Lanes*>(own + k);
+      for (std::size_t i = 0; i < j; ++i) {
+        double* row = matrix + i * stride;
+        Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
+        sum -= row[j] * upper;
+        *reinterpret_cast<Lanes*>(row + k) = sum;
       }
-      *reinterpret_cast<Lanes*>(row + k) = sum;
     }
-    for (; k < width; ++k) {
-      for (std::size_t j = i + 1; j < rows; ++j) row[k] -= row[j] * matrix[j * width + k];
-    }
-    for (k = rows; k < width; ++k) row[k] /= row[i];
   }
 }
 
@@ -189,14 +184,18 @@ SWGJOINT_WIDE void products(const std::vector<double>* rows, std::size_t count,
   for (std::size_t t = 0; t < count; ++t) results[t] = product(rows[t].data(), x, n);
 }
 
-bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t* pivots) {
+bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t stride,
+               std::size_t* pivots) {
+  std::vector<double> panel(kPanel * rows);
   for (std::size_t first = 0; first < rows; first += kPanel) {
     const std::size_t end = std::min(first + kPanel, rows);
-    if (!eliminate_panel(matrix, rows, width, first, end, pivots)) return false;
+    if (!eliminate_panel(matrix, rows, width, stride, first, end, pivots, panel.data())) {
+      return false;
+    }
     // then in the rows below
-    if (end < rows) subtract_panel(matrix, rows, width, end);
+    if (end < rows) subtract_panel(matrix, rows, width, stride, end);
   }
-  substitute_back(matrix, rows, width);
+  substitute_back(matrix, rows, width, stride);
   return true;
 }
 

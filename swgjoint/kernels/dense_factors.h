@@ -18,9 +18,12 @@ void products(const std::vector<double>* rows, std::size_t count, const double* 
               std::size_t n, double* results);
 
 // LU factors of the first columns of a matrix (rows, width), with partial pivoting. The
-// columns after the first rows ones are replaced by their solutions. False if the matrix
-// is singular.
-bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t* pivots);
+// columns after the first rows ones are replaced by their solutions. A row begins stride
+// numbers after the one before it, at least width + kPadding, and the numbers between are
+// zero. False if the matrix is singular.
+constexpr std::size_t kPadding = 7;
+bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t stride,
+               std::size_t* pivots);
 
 // Replace one right-hand side by its solution, given the factors (rows, rows).
 void substitute(const double* factors, const std::size_t* pivots, std::size_t rows,

@@ -39,9 +39,9 @@ EXACT = 1e-14
 ROUNDS = 60
 """Largest number of corrections of the approach of the strips in the numpy version,
 each of which divides its error by about four."""
-PART = 64
+PART = 128
 """Largest number of similar problems that share a base, see :class:`Base`."""
-GROUP = 16
+GROUP = 4
 """Number of parts that are solved one after another. Without a guess, the first problem
 of a part starts from a solution of the part before it."""
 SAMPLES = 12
@@ -312,7 +312,7 @@ class StripProblems:
             """Start from the most similar problem that is solved already."""
             last = first_ends
             for part in parts:
-                base, problems = chosen(last, part.size)
+                base, problems = common
                 rows, before = next_to(similar_at[part])
                 part = part[rows]
                 active[part[0]] = last
@@ -334,8 +334,8 @@ class StripProblems:
             base, problems = chosen(active[first[0]], count)
             solve(rest, base, problems, np.arange(rest.size) - 1)
             first_ends = usual(samples, np.zeros(m, bool))
-            base, _ = chosen(first_ends, count)
-            similar_at = base.offset_of(q)
+            common = chosen(first_ends, count)
+            similar_at = common[0].offset_of(q)
             parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
         else:
             parts, solve_parts = similar_parts(q, PART), solve_guessed
