@@ -66,12 +66,34 @@ def test_a_loop_that_is_kept_is_not_solved_again(monkeypatch, tmp_path):
         raise ComputationError("solved again")
 
     monkeypatch.setattr(friction_loop, "_along", unsolved)
+    shown = []
     options = {"top": TOP, "positions": 1, "steps": 4, "keep": keep}
+    options["progress"] = lambda stage, done, total: shown.append((done, total))
     (found,) = friction_loops(rubbing(0.1), **options)
+    total = shown[0][1]
+    assert shown == [(0, total), (total, total)]
     for key, value in values.items():
         assert np.array_equal(getattr(found, key), value)
     with pytest.raises(ComputationError, match="solved again"):
         friction_loops(rubbing(0.1), **{**options, "top": 0.9 * TOP})
+
+
+def test_every_equilibrium_is_reported():
+    """One at a time, up to the total, which is known before the first."""
+    shown = []
+    design = Design.preset("reference-2d").with_changes(
+        {"friction.tooth_coefficient": 0.1, "mesh.refinement": 0.5}
+    )
+    friction_loops(
+        design,
+        top=1.0,
+        positions=1,
+        steps=4,
+        progress=lambda stage, done, total: shown.append((done, total)),
+    )
+    # nine torques, zero twice on the elastic path, and the path with friction
+    total = 10 + 3 * FIRST_STEPS + 6 * 4 + 1
+    assert shown == [(k, total) for k in range(total + 1)]
 
 
 def test_loop_closes_and_encloses_the_work_of_friction():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from math import pi
 from typing import Any
@@ -73,8 +74,8 @@ def friction_loops(
             see :func:`swgjoint.gear.kinematics.periodicity`.
         steps: Number of steps from zero to the largest torque, a multiple of
             :data:`FIRST_STEPS`.
-        progress: Called with the stage, the number of finished loops and the number of
-            all loops.
+        progress: Called with the stage, the number of finished equilibria and the
+            number of all equilibria.
         keep: Store of finished loops, from which an interrupted run resumes; None
             stores none.
 
@@ -98,18 +99,29 @@ def friction_loops(
     series = series_compliance(design, cup=True)
     loops: list[FrictionLoop] = []
     stage = f"{drive.name}: friction loops"
+    # zero torque begins both sides of the elastic path
+    each = outward.size + 1 + torque.size
+    done, total = 0, each * len(parts)
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        progress(stage, done, total)
+
+    progress(stage, 0, total)
     for k, part in enumerate(parts):
-        progress(stage, k, len(parts))
         theta = period * float(part)
         there = _kept(keep, k, theta, torque)
         if there is not None:
             loops.append(there)
+            done += each
+            progress(stage, done, total)
             continue
         elastic: dict[float, State] = {}
         for side in (outward[outward >= 0.0], outward[outward <= 0.0][::-1]):
-            states = _along(smooth, theta, side)
+            states = _along(smooth, theta, side, tick)
             elastic |= dict(zip(side.tolist(), states, strict=True))
-        rubbed = _along(rubbing, theta, torque)
+        rubbed = _along(rubbing, theta, torque, tick)
         still = [elastic[t] for t in torque.tolist()]
         ideal = theta / design.ratio
         loops.append(
@@ -130,7 +142,6 @@ def friction_loops(
         if keep is not None:
             values = {item.name: getattr(loops[-1], item.name) for item in _FIELDS}
             keep.write(_LOOP.format(k), values)
-    progress(stage, len(parts), len(parts))
     return tuple(loops)
 
 
@@ -152,13 +163,19 @@ def _kept(
     return None if keep is None else keep.read(_LOOP.format(number), taken)
 
 
-def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
+def _along(
+    follow: Continuation,
+    theta: float,
+    torques: Array,
+    tick: Callable[[], None] = lambda: None,
+) -> list[State]:
     """Equilibria along a torque path that starts at zero, with the input locked.
 
     Args:
         follow: Continuation of the equilibria.
         theta: Locked input angle [rad].
         torques: Output torques (n,) [N·m].
+        tick: Called after every equilibrium.
 
     Raises:
         ComputationError: If an equilibrium cannot be found.
@@ -180,6 +197,7 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
                 f" {state.outcome.value}"
             )
         states.append(state)
+        tick()
     return states
 
 
