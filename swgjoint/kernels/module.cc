@@ -11,6 +11,7 @@
 #include "complementarity.h"
 #include "ellipse.h"
 #include "flank.h"
+#include "ring_factor.h"
 #include "tangents.h"
 #include "tooth_search.h"
 
@@ -284,6 +285,57 @@ class StripProblems {
   swgjoint::StripLaw law_{};
 };
 
+// A factorised ring of sectors. Methods return false if it is not positive definite.
+class RingFactor {
+ public:
+  RingFactor(std::int64_t sectors, std::int64_t size, std::int64_t face)
+      : ring_(checked(sectors, size, face), size, face) {}
+
+  bool update(In<3> blocks, Index changed) {
+    require(blocks.shape(0) == ring_.sectors() && blocks.shape(1) == ring_.size() &&
+                blocks.shape(2) == ring_.size(),
+            "blocks: (sectors, n, n)");
+    check(changed);
+    const nb::gil_scoped_release release;
+    return ring_.update(blocks.data(), changed.data(), changed.shape(0));
+  }
+
+  void solve(Out<3> loads) const {
+    require(loads.shape(0) == ring_.sectors() && loads.shape(1) == ring_.size(),
+            "loads: (sectors, n, k)");
+    const nb::gil_scoped_release release;
+    ring_.solve(loads.data(), loads.shape(2));
+  }
+
+  void condense(In<3> loads, Index sector, In<2> rows, Out<2> result) const {
+    const std::size_t d = loads.shape(2), k = rows.shape(0);
+    require(loads.shape(0) == ring_.sectors() && loads.shape(1) == ring_.size(),
+            "loads: (sectors, n, d)");
+    require(rows.shape(1) == ring_.size() && sector.shape(0) == k, "rows: (k, n)");
+    require(result.shape(0) == d + k && result.shape(1) == d + k,
+            "result: (d + k, d + k)");
+    check(sector);
+    const nb::gil_scoped_release release;
+    ring_.condense(loads.data(), d, sector.data(), rows.data(), k, result.data());
+  }
+
+ private:
+  static std::size_t checked(std::int64_t sectors, std::int64_t size,
+                             std::int64_t face) {
+    require(sectors > 0 && face > 0 && size >= 2 * face, "sectors, size, face");
+    return sectors;
+  }
+
+  void check(const Index& sector) const {
+    const auto count = static_cast<std::int64_t>(ring_.sectors());
+    for (std::size_t i = 0; i < sector.shape(0); ++i) {
+      require(sector.data()[i] >= 0 && sector.data()[i] < count, "sector");
+    }
+  }
+
+  swgjoint::RingFactor ring_;
+};
+
 }  // namespace
 
 NB_MODULE(compiled, m) {
@@ -297,6 +349,15 @@ NB_MODULE(compiled, m) {
         nb::arg("weight").noconvert(), nb::arg("result").noconvert());
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
+  nb::class_<RingFactor>(m, "RingFactor")
+      .def(nb::init<std::int64_t, std::int64_t, std::int64_t>(), nb::arg("sectors"),
+           nb::arg("size"), nb::arg("face"))
+      .def("update", &RingFactor::update, nb::arg("blocks").noconvert(),
+           nb::arg("changed").noconvert())
+      .def("solve", &RingFactor::solve, nb::arg("loads").noconvert())
+      .def("condense", &RingFactor::condense, nb::arg("loads").noconvert(),
+           nb::arg("sector").noconvert(), nb::arg("rows").noconvert(),
+           nb::arg("result").noconvert());
   nb::class_<StripProblems>(m, "StripProblems")
       .def(nb::init<In<2>, In<2>, Index, Mask, In<1>, In<1>, In<1>, In<1>, In<1>, In<1>,
                     In<1>>(),

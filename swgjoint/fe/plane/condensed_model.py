@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
+from swgjoint.fe.common.ring_factor import RingFactor
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
@@ -47,9 +47,13 @@ class CondensedModel:
     """Whether each contact carries force (n,)."""
 
     @cached_property
-    def _factor(self) -> CyclicFactor:
+    def _factor(self) -> RingFactor:
         """Factorised tangent with the anchor spring."""
-        return CyclicFactor(self.linear.anchor_tangent(), self.linear.face_dofs)
+        return RingFactor(
+            self.linear.anchor_tangent(),
+            self.linear.face_dofs,
+            np.unique(self.contacts.sector),
+        )
 
     @cached_property
     def _rows(self) -> Array:
@@ -58,30 +62,29 @@ class CondensedModel:
 
     @cached_property
     def _loads(self) -> Array:
-        """Unit loads on teeth, anchor and flexspline rotation (N, n_dofs, n + 2)."""
-        linear, n = self.linear, len(self.contacts)
-        loads = np.zeros((*linear.gradient.shape, n + 2))
-        loads[self.contacts.sector, :, np.arange(n)] = self._rows
-        loads[:, :, n], loads[:, :, n + 1] = linear.anchor, linear.rotation_gradient
+        """Unit loads on anchor and flexspline rotation, and minus the gradient.
+
+        Shape (N, n_dofs, 3).
+        """
+        linear = self.linear
+        loads = np.stack(
+            [linear.anchor, linear.rotation_gradient, -linear.gradient], axis=-1
+        )
+        loads[linear.fixed] = 0.0
         return loads
 
-    @cached_property
-    def _response(self) -> Array:
-        """Displacements under these loads, then under minus the gradient.
+    def _products(self, sector: Index, rows: Array) -> Array:
+        """Products of :attr:`_loads` and of k rows with the compliance of the ring.
 
-        Shape (N, n_dofs, n + 3).
+        Args:
+            sector: Sector of each row (k,).
+            rows: Loads on these sectors (k, n_dofs).
+
+        Returns:
+            Symmetric matrix (3 + k, 3 + k).
         """
-        return self._solved(
-            np.concatenate([self._loads, -self.linear.gradient[:, :, None]], axis=2)
-        )
-
-    def _solved(self, right: Array) -> Array:
-        """Displacements (N, n_dofs, k) under right-hand sides of that shape.
-
-        Rows of fixed degrees of freedom are set to zero in ``right`` itself.
-        """
-        right[self.linear.fixed] = 0.0
-        return self._factor.solve(right)
+        free = np.where(self.linear.fixed[sector], 0.0, rows)
+        return self._factor.condense(self._loads, sector, free)
 
     def torque_response(self) -> Array:
         """Displacements per output torque of the whole drive (N, n_dofs) [m/(N·m)]."""
@@ -96,7 +99,9 @@ class CondensedModel:
             z[n + 1] = -1.0 / self.model.copies
             right = -system[inside, n + 1] * z[n + 1]
         z[inside] = np.linalg.solve(system[at], right)
-        return np.asarray(self._response[:, :, :-1] @ z[: n + 2])
+        load = self._loads[:, :, :2] @ z[n : n + 2]
+        np.add.at(load, self.contacts.sector, z[:n, None] * self._rows)
+        return self._factor.solve(load[:, :, None])[:, :, 0]
 
     @cached_property
     def _teeth(self) -> tuple[Array, Array]:
@@ -112,8 +117,10 @@ class CondensedModel:
         model, state, linear = self.model, self.state, self.linear
         contacts, element, n = self.contacts, model.element, len(self.contacts)
         system, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
-        answers = self._answers(self._response)
-        system[: n + 2, : n + 2], offset[: n + 2] = answers[:, :-1], answers[:, -1]
+        products = self._products(contacts.sector, self._rows)
+        order = np.r_[3 : n + 3, 0, 1]
+        system[: n + 2, : n + 2] = products[np.ix_(order, order)]
+        offset[: n + 2] = products[order, 2]
         local = contacts.weight @ element.flank_compliance
         same = contacts.sector[:, None] == contacts.sector[None, :]
         system[:n, :n] += np.where(same, local @ contacts.weight.T, 0.0)
@@ -154,20 +161,6 @@ class CondensedModel:
             law, self.contacts, state.contacts, state.tooth_force
         )
 
-    def _answers(self, response: Array) -> Array:
-        """Changes of tooth gaps, anchor and rotation (n + 2, n_columns).
-
-        Args:
-            response: Displacements (N, n_dofs, n_columns).
-        """
-        n = len(self.contacts)
-        return np.concatenate(
-            [
-                at_sectors(self._rows, self.contacts.sector, response),
-                np.einsum("snf,snl->fl", self._loads[:, :, n:], response),
-            ]
-        )
-
     def _system(self, supports: Supports) -> tuple[Array, Array]:
         """System :attr:`_teeth` with k supports of the bore inserted after the teeth.
 
@@ -177,16 +170,22 @@ class CondensedModel:
         n, sector = len(self.contacts), supports.intervals.sector
         k = len(sector)
         m = n + k
-        load = np.zeros((*self.linear.gradient.shape, k))
-        load[sector, :, np.arange(k)] = supports.loads
-        supported = self._solved(load)
+        products = self._products(
+            np.concatenate([self.contacts.sector, sector]),
+            np.concatenate([self._rows, supports.loads]),
+        )
         teeth = np.r_[0:n, m : m + 3]
         system, offset = np.zeros((m + 3, m + 3)), np.zeros(m + 3)
         system[np.ix_(teeth, teeth)], offset[teeth] = self._teeth
-        system[np.ix_(teeth[:-1], np.arange(n, m))] = self._answers(supported)
-        answers = supports.answers(self._response)
-        system[n:m, teeth[:-1]], offset[n:m] = answers[:, :-1], answers[:, -1]
-        system[n:m, n:m] = supports.answers(supported)
+        # rows of the supports in the products, and those of teeth, anchor and rotation
+        here, there = np.arange(n + 3, m + 3), np.r_[3 : n + 3, 0, 1]
+        supported = products[np.ix_(there, here)]
+        system[np.ix_(teeth[:-1], np.arange(n, m))] = supported
+        # the response of a closed support is a force, which decreases with the gap
+        sign = np.where(supports.closed, -1.0, 1.0)
+        system[n:m, teeth[:-1]] = sign[:, None] * supported.T
+        system[n:m, n:m] = sign[:, None] * products[np.ix_(here, here)]
+        offset[n:m] = sign * products[here, 2]
         system[np.arange(n, m), np.arange(n, m)] += supports.own
         offset[n:m] += supports.start
         return system, offset
@@ -221,21 +220,6 @@ class CondensedModel:
             else state.rotation,
             torque=state.torque,
         )
-
-
-def at_sectors(rows: Array, sector: Index, response: Array) -> Array:
-    """Products of rows with the responses of their sectors (k, n_columns).
-
-    Args:
-        rows: One row per product (k, n).
-        sector: Sector of each row (k,).
-        response: Responses of all sectors (N, n, n_columns).
-    """
-    products = np.empty((len(rows), response.shape[2]))
-    for number in np.unique(sector):
-        here = sector == number
-        products[here] = rows[here] @ response[number]
-    return products
 
 
 def _by_shift(weight: Array) -> Array:
@@ -353,14 +337,3 @@ class Supports:
     def own(self) -> Array:
         """Response of the layer itself per unit of each support's unknown (k,)."""
         return np.where(self.closed, self.stiffness, 1.0 / self.stiffness)
-
-    def answers(self, response: Array) -> Array:
-        """Responses of the supports to displacements (k, n_columns).
-
-        The response :attr:`own` of the layer is not included.
-
-        Args:
-            response: Displacements of the sectors (N, n, n_columns) [m].
-        """
-        moved = at_sectors(self.rows, self.intervals.sector, response)
-        return np.asarray(np.where(self.closed, -self.stiffness, 1.0)[:, None] * moved)

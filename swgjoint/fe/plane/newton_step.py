@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
-from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.common.friction import Sliding
+from swgjoint.fe.common.ring_factor import RingFactor
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.force_lines import ForceLines
@@ -145,7 +145,7 @@ class NewtonProblem:
     """The linearised ring."""
     lines: ForceLines
     """Lines of force of the candidates."""
-    factor: CyclicFactor
+    factor: RingFactor
     """Factorised tangent with the anchor spring."""
 
     @classmethod
@@ -175,7 +175,7 @@ class NewtonProblem:
             state=state,
             linear=linear,
             lines=ForceLines.from_candidates(model, state, linear, contacts),
-            factor=CyclicFactor(
+            factor=RingFactor(
                 linear.anchor_tangent(), linear.face_dofs, np.unique(contacts.sector)
             ),
         )
@@ -213,55 +213,50 @@ class NewtonProblem:
         linear, lines = self.linear, self.lines
         loads = np.concatenate([-linear.gradient[:, :, None], lines.constraints], 2)
         loads[linear.fixed] = 0.0
-        base, held = np.split(self.factor.solve(loads), [1], axis=2)
-        matrix, offset = self._matrix(held), self._offset(base[:, :, 0])
+        sector = lines.force.sector
+        products = self.factor.condense(loads, sector, lines.rows)
+        matrix, offset = self._matrix(products), self._offset(products[0])
         guess = _first_guess(self.state, lines.contacts, offset, pressing)
         solution = _solve_condensed(matrix, offset, lines.sliding, guess, self.load)
-        # the teeth push in a few sectors and move all
-        push = np.zeros_like(base)
-        np.add.at(
-            push[:, :, 0], lines.force.sector, solution.force[:, None] * lines.rows
-        )
-        moved = base + self.factor.solve(push)
-        moved += held @ np.array([[solution.anchor], [solution.multiplier]])
-        return self._step(solution, moved[:, :, 0])
+        # the loads of the solution together: on all sectors and on those of the teeth
+        load = loads @ np.array([1.0, solution.anchor, solution.multiplier])
+        np.add.at(load, sector, solution.force[:, None] * lines.rows)
+        moved = self.factor.solve(load[:, :, None])[:, :, 0]
+        return self._step(solution, moved)
 
-    def _matrix(self, held: Array) -> Array:
+    def _matrix(self, products: Array) -> Array:
         """Matrix M (n + 3, n + 3).
 
         Args:
-            held: Displacements per anchor force and multiplier (N, n_dofs, 2).
+            products: Products with the compliance of the ring of minus the gradient,
+                the constraints and the n lines (n + 3, n + 3).
         """
-        lines, rows = self.lines.force, self.lines.rows
+        lines = self.lines.force
         n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
-        sectors, which = np.unique(lines.sector, return_inverse=True)
-        pushes = np.zeros((len(sectors), rows.shape[1], n))
-        pushes[which, :, np.arange(n)] = rows
-        response = self.factor.solve_within(sectors, pushes)
-        matrix[:n, :n] = np.einsum("kn,knl->kl", rows, response[which])
-        matrix[:n, :n] += self.lines.compliance
+        matrix[:n, :n] = products[3:, 3:] + self.lines.compliance
         # anchor and rotation of the flexspline
         constrained = np.array([n, n + 2])
-        by_line = np.einsum("kn,knf->kf", rows, held[lines.sector])
-        matrix[:n, constrained], matrix[constrained, :n] = by_line, by_line.T
-        matrix[np.ix_(constrained, constrained)] = np.einsum(
-            "snf,snl->fl", self.lines.constraints, held
-        )
+        matrix[:n, constrained] = products[3:, 1:3]
+        matrix[constrained, :n] = products[1:3, 3:]
+        matrix[np.ix_(constrained, constrained)] = products[1:3, 1:3]
         matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
         # turning the circular spline towards the teeth closes the gap by the lever arm
         arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
         matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
         return matrix
 
-    def _offset(self, base: Array) -> Array:
-        """Offset q (n + 3,) from the displacement without line forces (N, n_dofs)."""
+    def _offset(self, products: Array) -> Array:
+        """Offset q (n + 3,).
+
+        Args:
+            products: Row of minus the gradient in the products of :meth:`_matrix`: the
+                changes without line forces (n + 3,).
+        """
         lines, load = self.lines, self.load
         n, offset = len(lines.force), np.zeros(len(lines.force) + 3)
-        moved = np.einsum("kn,kn->k", lines.rows, base[lines.force.sector])
-        offset[:n] = lines.gap + moved
+        offset[:n] = lines.gap + products[3:]
         # anchor and rotation of the flexspline, torque on the circular spline
-        constrained = np.array([n, n + 2])
-        offset[constrained] = np.einsum("snf,sn->f", lines.constraints, base)
+        offset[[n, n + 2]] = products[1:3]
         offset[n + 1] = -(load.on_circular_spline or 0.0) / self.model.copies
         offset[n + 2] += self.linear.rotation - (load.rotation or 0.0)
         return offset
