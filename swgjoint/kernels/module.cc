@@ -160,14 +160,6 @@ void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
   swgjoint::ellipse_distance(points.data(), n, major, minor, result.data());
 }
 
-void rotate_blocks(Out<3> matrices, In<1> angle) {
-  const std::size_t count = matrices.shape(0), size = matrices.shape(1);
-  require(matrices.shape(2) == size && size % 2 == 0 && angle.shape(0) == count,
-          "matrices: (n, 2 m, 2 m), angle: (n,)");
-  const nb::gil_scoped_release release;
-  swgjoint::rotate_blocks(matrices.data(), angle.data(), count, size);
-}
-
 void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
                            Out<3> result) {
   const std::size_t p = weights.shape(0), width = weights.shape(2);
@@ -339,8 +331,6 @@ class RingFactor {
 }  // namespace
 
 NB_MODULE(compiled, m) {
-  m.def("rotate_blocks", &rotate_blocks, nb::arg("matrices").noconvert(),
-        nb::arg("angle").noconvert());
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
         nb::arg("result").noconvert());

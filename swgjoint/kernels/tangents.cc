@@ -1,30 +1,8 @@
 #include "tangents.h"
 
-#include <cmath>
 #include <vector>
 
 namespace swgjoint {
-
-void rotate_blocks(double* matrices, const double* angle, std::size_t count,
-                   std::size_t size) {
-  for (std::size_t s = 0; s < count; ++s, matrices += size * size) {
-    const double c = std::cos(angle[s]), d = std::sin(angle[s]);
-    for (std::size_t i = 0; i < size; i += 2) {
-      double *upper = matrices + i * size, *lower = upper + size;
-      for (std::size_t j = 0; j < size; j += 2) {
-        // R B R^T of one block B of two by two
-        const double xx = c * upper[j] - d * lower[j];
-        const double xy = c * upper[j + 1] - d * lower[j + 1];
-        const double yx = d * upper[j] + c * lower[j];
-        const double yy = d * upper[j + 1] + c * lower[j + 1];
-        upper[j] = c * xx - d * xy;
-        upper[j + 1] = d * xx + c * xy;
-        lower[j] = c * yx - d * yy;
-        lower[j + 1] = d * yx + c * yy;
-      }
-    }
-  }
-}
 
 void add_station_stiffness(const double* weights, std::size_t p, std::size_t width,
                            const double* direction, const double* stiffness,

@@ -1,5 +1,5 @@
-// Dense sums behind the tangent of a drive: rotated blocks, springs of bore stations,
-// compliance between points of a ring of teeth.
+// Dense sums behind the tangent of a drive: springs of bore stations, and compliance
+// between points of a ring of teeth.
 
 #ifndef SWGJOINT_KERNELS_TANGENTS_H_
 #define SWGJOINT_KERNELS_TANGENTS_H_
@@ -8,11 +8,6 @@
 #include <cstdint>
 
 namespace swgjoint {
-
-// Twin of _in_global_frame in swgjoint/fe/plane/linearise.py, in place:
-// matrices (count, size, size) of x, y pairs, turned by angles (count,) [rad].
-void rotate_blocks(double* matrices, const double* angle, std::size_t count,
-                   std::size_t size);
 
 // Twin of BoreStations.stiffness_of in swgjoint/fe/plane/bore_contact.py, added to
 // result (count, size, size): weights (p, 2, width), direction (count, q, 2),

@@ -7,7 +7,6 @@ import pytest
 
 from swgjoint.fe.common.block_circulant import contact_compliance
 from swgjoint.fe.plane.bore_contact import BoreStations
-from swgjoint.fe.plane.linearise import _in_global_frame
 from swgjoint.kernels import kernels
 
 pytestmark = pytest.mark.skipif(
@@ -18,16 +17,6 @@ pytestmark = pytest.mark.skipif(
 def near(ours, theirs):
     scale = np.abs(theirs).max()
     np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-14 * scale)
-
-
-def test_blocks_turn_as_in_numpy(monkeypatch):
-    rng = np.random.default_rng(1)
-    matrices, angle = rng.normal(size=(7, 12, 12)), rng.uniform(-4.0, 4.0, 7)
-    kept = matrices.copy()
-    ours = _in_global_frame(matrices, angle)
-    assert np.array_equal(matrices, kept)
-    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
-    near(ours, _in_global_frame(matrices, angle))
 
 
 @pytest.mark.parametrize("touching", [0.0, 0.2, 1.0])
@@ -77,10 +66,6 @@ def test_compliance_between_points_as_in_numpy(monkeypatch, most):
 def test_shapes_that_do_not_fit_are_refused():
     native = kernels()
     index = np.zeros(2, dtype=np.int64)
-    with pytest.raises(ValueError):
-        native.rotate_blocks(np.zeros((2, 3, 3)), np.zeros(2))
-    with pytest.raises(ValueError):
-        native.rotate_blocks(np.zeros((2, 4, 4)), np.zeros(3))
     with pytest.raises(ValueError):
         native.add_station_stiffness(
             np.zeros((2, 2, 4)),

@@ -102,6 +102,26 @@ def test_tangent_is_the_derivative_of_the_gradient(element):
     assert np.abs(matrix - matrix.transpose(0, 2, 1)).max() < 1e-6 * matrix.max()
 
 
+def test_tangent_in_other_axes_is_the_turned_tangent(element):
+    """Of sectors that stretch and turn, and of those of a linear model."""
+    place, x = deformed(element, 1e-4)
+    turn = np.array([0.3, -2.0, 4.0])
+    for fixed in (None, np.zeros(3)):
+        frames = sector_frames(element, rotate(x, 0.3), place, fixed=fixed)
+        force = elastic_force(element, frames)
+        matrix = tangent(element, frames, force)
+        cos, sin = np.cos(turn), np.sin(turn)
+        axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+        blocks = matrix.reshape(3, matrix.shape[1] // 2, 2, -1, 2)
+        expected = np.einsum("sab,snbmc,sdc->snamd", axes, blocks, axes)
+        ours = tangent(element, frames, force, turn)
+        # round-off of sums over terms of this size
+        atol = 1e-13 * np.abs(matrix).max()
+        np.testing.assert_allclose(
+            ours, expected.reshape(matrix.shape), rtol=0.0, atol=atol
+        )
+
+
 def test_condensed_sector_carries_rigid_motion_without_force(element):
     """Translation and small rotation of a sector give no force and no stress."""
     x, y = element.skeleton.T

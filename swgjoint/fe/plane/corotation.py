@@ -137,12 +137,10 @@ def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) ->
     Returns:
         Energies (N,) [J].
     """
-    d = frames.deformation
-    return np.asarray(
-        0.5 * np.einsum("si,ij,sj->s", d, element.stiffness, d)
-        + 0.5
-        * np.einsum("si,ij,sj->s", flank_force, element.flank_compliance, flank_force)
-    )
+    d, f = frames.deformation, flank_force
+    of_skeleton = np.einsum("si,si->s", d @ element.stiffness, d)
+    of_flanks = np.einsum("si,si->s", f @ element.flank_compliance, f)
+    return np.asarray(0.5 * of_skeleton + 0.5 * of_flanks)
 
 
 def elastic_force(element: Superelement, frames: Frames) -> Array:
@@ -184,7 +182,9 @@ def project_to_frames(frames: Frames, force: Array) -> Array:
     return np.asarray(force - frames.spin * np.einsum("si,si->s", force, j_y)[:, None])
 
 
-def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
+def tangent(
+    element: Superelement, frames: Frames, force: Array, turn: Array | None = None
+) -> Array:
     r"""Second derivative of the energy with respect to the node positions.
 
     .. math::
@@ -194,43 +194,50 @@ def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
 
     .. math:: K = (I + Qd\,p^T) \hat K (I + p\,(Qd)^T) + N Q .
 
+    Except for :math:`\hat K + N Q`, these are products of a few vectors. The matrices
+    :math:`\hat K` and Q follow a turn by
+    :attr:`swgjoint.fe.plane.superelement.Superelement.turning_parts`, the vectors turn
+    themselves.
+
     Args:
         element: The condensed sector.
         frames: Kinematics from :func:`sector_frames`.
         force: Nodal forces f in the sector frames (N, n) [N].
+        turn: Angles from the axes of the result to the sector frames (N,) [rad]; None
+            for the axes of the sector frames.
 
     Returns:
-        Symmetric matrices along the axes of the sector frames (N, n, n) [N/m].
+        Symmetric matrices (N, n, n) [N/m].
     """
     n_sectors, n = force.shape
-    gamma = frames.spin
-    if not gamma.any():
-        return np.broadcast_to(element.stiffness, (n_sectors, n, n)).copy()
-    stiffness = _elastic_tangent(element, frames)
-    y = frames.position
+    gamma, y, elongating = frames.spin, frames.position, frames.elongating
+    nonlinear = bool(gamma.any())
+    stretched = element.stiffness @ element.elongation
+    hoop = frames.deformation @ stretched if nonlinear else np.zeros(n_sectors)
+    angle = np.zeros(n_sectors) if turn is None else turn
+    waves = np.stack([np.ones(n_sectors), np.cos(2 * angle), np.sin(2 * angle)], -1)
+    waves = np.concatenate([waves, hoop[:, None] * waves], axis=1)
+    matrix = (waves @ element.turning_parts).reshape(n_sectors, n, n)
+    if not nonlinear:
+        return matrix
+    # Qd (K p)^T + (K p) Qd^T + (p K p) Qd Qd^T
+    column = stretched + 0.5 * (element.elongation @ stretched) * elongating
+    # P^T K P = K - Gamma (K Jy)^T - (K Jy) Gamma^T + (Jy K Jy) Gamma Gamma^T
     j_y = rotate_right_angle(y.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
     j_f = rotate_right_angle(force.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
-    # P^T K P = K - Gamma (K Jy)^T - (K Jy) Gamma^T + (Jy K Jy) Gamma Gamma^T
-    k_jy = np.einsum("sij,sj->si", stiffness, j_y)
+    k_jy = j_y @ element.stiffness + hoop[:, None] * (j_y @ element.slope_products)
+    k_jy += np.einsum("si,si->s", column, j_y)[:, None] * elongating
+    k_jy += np.einsum("si,si->s", elongating, j_y)[:, None] * column
     quadratic = np.einsum("si,si->s", j_y, k_jy) - np.einsum("si,si->s", force, y)
     moment = np.einsum("si,si->s", force, j_y)
     # Gamma = J X_c / C, hence X_c = -C J Gamma
     x_c = -rotate_right_angle(gamma.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
     x_c *= frames.gyration[:, None]
-    column = j_f - k_jy + (moment / frames.gyration)[:, None] * x_c
-    column += 0.5 * quadratic[:, None] * gamma
-    outer = gamma[:, :, None] * column[:, None, :]
-    return np.asarray(stiffness + outer + outer.transpose(0, 2, 1))
-
-
-def _elastic_tangent(element: Superelement, frames: Frames) -> Array:
-    """Matrix K of :func:`tangent` (N, n, n) [N/m]."""
-    stretched = element.stiffness @ element.elongation
-    hoop = frames.deformation @ stretched
-    # Qd (K p)^T + (K p) Qd^T + (p K p) Qd Qd^T
-    column = stretched + 0.5 * (element.elongation @ stretched) * frames.elongating
-    outer = frames.elongating[:, :, None] * column[:, None, :]
-    matrix = outer + outer.transpose(0, 2, 1)
-    matrix += hoop[:, None, None] * (element.rim_slopes.T @ element.rim_slopes)
-    matrix += element.stiffness
-    return np.asarray(matrix)
+    beside = j_f - k_jy + (moment / frames.gyration)[:, None] * x_c
+    beside += 0.5 * quadratic[:, None] * gamma
+    vectors = np.stack([elongating, gamma, column, beside], axis=1)  # (N, 4, n)
+    if turn is not None:
+        shaped = vectors.reshape(n_sectors, 4, -1, 2)
+        vectors = rotate(shaped, turn[:, None, None]).reshape(vectors.shape)
+    matrix += vectors.transpose(0, 2, 1) @ vectors[:, [2, 3, 0, 1]]
+    return matrix

@@ -20,7 +20,6 @@ from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.plane.tooth_contact import ToothContact
-from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
@@ -195,9 +194,7 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     seen = project_to_frames(frames, elastic).reshape(model.sectors, n_a, 2)
     gradient, hessian = np.zeros(sign.shape), np.zeros((*sign.shape, sign.shape[1]))
     gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(model.sectors, -1)
-    hessian[:, dofs[:, None], dofs] = _in_global_frame(
-        tangent(element, frames, total), frames.angle
-    )
+    hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
 
     nodes = x[:, model.bore_nodes]
     if model.race is not None and state.race is not None:
@@ -228,6 +225,8 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     if torque is not None:
         gradient += torque / model.copies * rotation_gradient
 
+    # signs other than 1 occur in the last sector only
+    hessian[-1] *= np.outer(sign[-1], sign[-1])
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
@@ -242,7 +241,7 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         face_dofs=model.face_dofs,
         sign=sign,
         gradient=sign * gradient,
-        hessian=sign[:, :, None] * hessian * sign[:, None, :],
+        hessian=hessian,
         gap=bore.gap,
         gap_dofs=into,
         stations=model.stations,
@@ -309,16 +308,13 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     return gaps[0], gaps[1], gaps[2]
 
 
-def _in_global_frame(matrices: Array, angle: Array) -> Array:
-    """Sector matrices (N, n, n) rotated by the angles of their frames (N,) [rad]."""
-    count, n, _ = matrices.shape
-    if (native := kernels()) is not None:
-        turned = np.array(matrices)
-        native.rotate_blocks(turned, np.ascontiguousarray(angle))
-        return turned
-    cos, sin = np.cos(angle), np.sin(angle)
-    turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-    blocks = matrices.reshape(count, n // 2, 2, n // 2, 2)
-    return np.asarray(
-        np.einsum("sab,snbmc,sdc->snamd", turn, blocks, turn, optimize=True)
-    ).reshape(count, n, n)
+def _block(dofs: Index) -> tuple[Index | slice, ...]:
+    """Index of the rows and columns of some degrees of freedom in all sectors.
+
+    Args:
+        dofs: Degrees of freedom of a sector, increasing (k,).
+    """
+    first, end = int(dofs[0]), int(dofs[-1]) + 1
+    if end - first == dofs.size:  # faster than a list of indices
+        return slice(None), slice(first, end), slice(first, end)
+    return slice(None), dofs[:, None], dofs

@@ -68,6 +68,35 @@ class Superelement:
     """Weights of one flank's nodes in the mean displacement of a contact patch, as
     functions of the arc length [m] of its centre."""
 
+    @cached_property
+    def slope_products(self) -> Array:
+        """Matrix Q of the second-order elongation (2 n_a, 2 n_a) [1/m]."""
+        return np.asarray(self.rim_slopes.T @ self.rim_slopes)
+
+    @cached_property
+    def turning_parts(self) -> Array:
+        r"""Parts of K hat and of Q that turn with the sector.
+
+        In axes from which the sector is turned by :math:`\varphi`, the matrices are
+        the sums of their parts times :math:`1, \cos 2\varphi, \sin 2\varphi`.
+
+        Returns:
+            Flattened matrices, three parts of K hat and three of Q (6, (2 n_a)^2).
+        """
+        parts = []
+        for matrix in (self.stiffness, self.slope_products):
+            blocks = matrix.reshape(len(self.skeleton), 2, len(self.skeleton), 2)
+            (xx, xy), (yx, yy) = blocks.transpose(1, 3, 0, 2)
+            even, odd = 0.5 * (xx + yy), 0.5 * (xy - yx)
+            along, across = 0.5 * (xx - yy), 0.5 * (xy + yx)
+            for part in (
+                [[even, odd], [-odd, even]],
+                [[along, across], [across, -along]],
+                [[-across, along], [along, across]],
+            ):
+                parts.append(np.array(part).transpose(2, 0, 3, 1).ravel())
+        return np.array(parts)
+
     @property
     def flank_size(self) -> int:
         """Number of nodes of one flank."""
