@@ -21,9 +21,11 @@ from swgjoint.store import (
     arrays_content,
     arrays_file,
     cache_folder,
+    join_arrays,
     json_content,
     json_file,
     read_kept,
+    split_arrays,
 )
 
 
@@ -61,6 +63,25 @@ def test_content_comes_back_and_other_programs_read_it():
     plain = json.loads(JSON)
     assert len(plain.pop("sha256")) == 64 and plain == asdict(ROW)
     assert np.array_equal(np.load(io.BytesIO(NPZ))["x"], ARRAYS["x"])
+
+
+def test_joined_arrays_come_back():
+    """Types, shapes and bits, whatever the sizes."""
+    arrays = {
+        **ARRAYS,
+        "number": 0.1 + 0.2,
+        "none": np.zeros((0, 3)),
+        "mask": np.eye(3, dtype=bool).T,
+        "columns": np.asfortranarray(np.arange(6.0).reshape(2, 3) / 7.0),
+        "count": np.int64(7),
+    }
+    stored = arrays_file(join_arrays(arrays), level=1)
+    found = split_arrays(arrays_content(stored))
+    assert list(found) == list(arrays)
+    for key, value in arrays.items():
+        assert found[key].dtype == np.asarray(value).dtype
+        assert found[key].shape == np.shape(value)
+        assert np.array_equal(found[key], value) and found[key].flags.writeable
 
 
 @KINDS

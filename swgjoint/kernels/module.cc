@@ -97,10 +97,15 @@ class Search {
       from = starts.data();
     }
     const nb::gil_scoped_release release;
+    swgjoint::Pose pose{};
     for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t k = sector.data()[i], flank = side.data()[i];
+      if (i == 0 || k != pose.sector || flank != pose.side) {
+        pose = search_.pose_of(k, flank);
+      }
       const double *p = points.data() + 2 * i, *o = outward.data() + 2 * i;
       const swgjoint::Seen seen =
-          search_.see({p[0], p[1]}, {o[0], o[1]}, sector.data()[i], side.data()[i], rigid,
+          search_.see({p[0], p[1]}, {o[0], o[1]}, pose, rigid,
                       from ? from + i : nullptr, steps);
       double* row = real.data() + 11 * i;
       row[0] = seen.foot.gap;

@@ -82,18 +82,24 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
   return foot;
 }
 
-Seen ToothSearch::see(Vec point, Vec outward, std::int64_t sector, std::int64_t side,
-                      bool rigid, const double* start, int steps) const {
+Pose ToothSearch::pose_of(std::int64_t sector, std::int64_t side) const {
   const double pitch = 2.0 * kPi / static_cast<double>(teeth_);
   const double sign = side == 0 ? 1.0 : -1.0;
   const double space = std::nearbyint(sign * bearing_[sector] / pitch);
   const double turn = sign * angle_[sector] - (space - 0.5) * pitch;
-  const double cos = std::cos(turn), sin = std::sin(turn);
+  Pose pose{sector, side, 0, std::cos(turn), std::sin(turn)};
+  pose.tooth = static_cast<std::int64_t>(side == 0 ? space - 1.0 : -space);
+  pose.tooth %= teeth_in_model_;
+  if (pose.tooth < 0) pose.tooth += teeth_in_model_;
+  return pose;
+}
+
+Seen ToothSearch::see(Vec point, Vec outward, const Pose& pose, bool rigid,
+                      const double* start, int steps) const {
+  const double cos = pose.cos, sin = pose.sin;
   Seen seen;
-  seen.tooth = static_cast<std::int64_t>(side == 0 ? space - 1.0 : -space);
-  seen.tooth %= teeth_in_model_;
-  if (seen.tooth < 0) seen.tooth += teeth_in_model_;
-  const auto flank = static_cast<std::size_t>(2 * seen.tooth + 1 - side);
+  seen.tooth = pose.tooth;
+  const auto flank = static_cast<std::size_t>(2 * seen.tooth + 1 - pose.side);
   seen.foot = foot_of(mirror(rotate(point, cos, sin)), mirror(rotate(outward, cos, sin)),
                       flank, rigid, start, steps);
   seen.normal = rotate(mirror(seen.foot.normal), cos, -sin);
@@ -142,7 +148,7 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
       displaced(s, mirrored + 2 * spline_.nodes * i, &point, &tangent, &curvature);
       const double length = size(tangent);
       const Vec outward = {-tangent.y / length, tangent.x / length};
-      const Seen seen = see(point, outward, sector[i], side[i], rigid,
+      const Seen seen = see(point, outward, pose_of(sector[i], side[i]), rigid,
                             round ? &foot[i] : nullptr, round ? 2 : 3);
       foot[i] = seen.foot.station;
       double slope = dot(seen.normal, tangent);

@@ -47,6 +47,13 @@ struct Seen {
   std::int64_t tooth;
 };
 
+// Rotation from the mirrored frame of a sector to that of the circular-spline tooth that
+// one of its flanks faces. Points of one flank share it.
+struct Pose {
+  std::int64_t sector, side, tooth;
+  double cos, sin;
+};
+
 // Constants of the search, with the values of the Python modules.
 struct Limits {
   double corner, beyond;  // CORNER, BEYOND of circular_spline.py, per flank length [-]
@@ -69,8 +76,11 @@ class ToothSearch {
   // Foot of a point in a mirrored sector frame. outward: outward normal of the
   // flexspline at the point; start: arc length near the foot, or null to start from the
   // foot on the rigid flank
-  Seen see(Vec point, Vec outward, std::int64_t sector, std::int64_t side, bool rigid,
-           const double* start, int steps) const;
+  Seen see(Vec point, Vec outward, const Pose& pose, bool rigid, const double* start,
+           int steps) const;
+
+  // Pose of a flank
+  Pose pose_of(std::int64_t sector, std::int64_t side) const;
 
   // Refine n minima of the gap in place. station: their arc lengths; mirrored: node
   // displacements of their flanks (n, nodes, 2); spacing: half width of the brackets

@@ -15,7 +15,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from swgjoint.maps.cache import key_of
-from swgjoint.store import arrays_content, arrays_file, cache_folder, keep, read_kept
+from swgjoint.store import (
+    arrays_content,
+    arrays_file,
+    cache_folder,
+    join_arrays,
+    keep,
+    read_kept,
+    split_arrays,
+)
 
 FORGOTTEN = 14 * 24 * 3600.0
 """Age after which the parts of an interrupted map are removed [s]."""
@@ -52,7 +60,11 @@ class Unfinished:
             take: Builds the part from its arrays and raises an exception if they are
                 damaged.
         """
-        return read_kept(self._path(name), lambda data: take(arrays_content(data)))
+
+        def read(data: bytes) -> Part:
+            return take(split_arrays(arrays_content(data)))
+
+        return read_kept(self._path(name), read)
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
         """Write a part atomically; a failure such as a full disk is only logged.
@@ -61,7 +73,7 @@ class Unfinished:
             name: Name of the part.
             arrays: Arrays of the part by name.
         """
-        keep(self._path(name), arrays_file(arrays))
+        keep(self._path(name), arrays_file(join_arrays(arrays), level=1))
 
     def _path(self, name: str) -> Path:
         """File of a part."""

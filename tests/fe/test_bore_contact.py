@@ -61,7 +61,7 @@ def test_force_between_nodes_meets_the_compliance_of_a_node():
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     yielding = 4.0 - np.log(apart + 0.5)
     normal = own.positions(chain(count)[None]) / RADIUS
-    rows = own.project(normal)[0].reshape(own.stiffness.size, count, 2)
+    rows = own.forces_of(np.eye(normal.shape[1])[:, :, None] * normal)
     radial = np.einsum("qni,ni->qn", rows, chain(count) / RADIUS)
     inner = radial[20 * own.per_interval : 21 * own.per_interval]
     part = np.linspace(0.0, 1.0, 21)

@@ -169,6 +169,22 @@ def test_nothing_penetrates():
     assert ours == pytest.approx(slope, rel=1e-4, abs=1e-5)
 
 
+def test_gradients_of_mean_gaps_are_those_of_the_gaps():
+    """Weighted means over the stations of some sectors, also of the last one."""
+    model = follow().model
+    here = linearise(model, follow().to_torque(meshed(), TORQUE), None)
+    rng = np.random.default_rng(4)
+    increment = 1e-6 * rng.normal(size=here.gradient.shape)
+    sector = np.array([5, 0, model.sectors - 1, 5])
+    weight = rng.random((4, here.gap.shape[1]))
+    rows = here.mean_gap_gradient(sector, weight)
+    ours = np.einsum("kn,kn->k", rows, increment[sector])
+    change = (here.gap_after(increment) - here.gap)[sector]
+    assert ours == pytest.approx(np.einsum("kq,kq->k", weight, change), rel=1e-9)
+    none = np.zeros((0, here.gap.shape[1]))
+    assert here.mean_gap_gradient(sector[:0], none).shape == (0, rows.shape[1])
+
+
 def test_gradient_and_tangent_are_derivatives_of_the_energy():
     """Rim and layer below the bore against differences, with half a ring closed."""
     model, h = follow().model, 1e-8

@@ -24,8 +24,11 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
     """
     result = np.zeros((len(force), blocks.shape[1]))
     loaded = np.flatnonzero(force.any(axis=1))
-    for offset, block in zip(offsets, blocks, strict=True):
-        result[(loaded + offset) % len(force)] += force[loaded] @ block.T
+    product = blocks.reshape(-1, blocks.shape[2]) @ force[loaded].T
+    moved = product.reshape(*blocks.shape[:2], len(loaded))
+    for offset, rows in zip(offsets, moved, strict=True):
+        # the loaded sectors differ, and so do those at one offset from them
+        result[(loaded + offset) % len(force)] += rows.T
     return result
 
 

@@ -70,27 +70,13 @@ class BoreStations:
         by_node = self.weights.reshape(-1, self.weights.shape[2])
         return np.asarray((self._windows(nodes) @ by_node.T).reshape(len(nodes), -1, 2))
 
-    def project(self, direction: Array) -> Array:
-        """Displacements of the stations along given directions, as rows over the nodes.
-
-        Args:
-            direction: Direction at each station (N, q, 2).
-
-        Returns:
-            Derivatives with respect to the node displacements (N, q, 2 m) [-].
-        """
-        local = self._local(direction)
-        count, intervals, p, width = local.shape
-        rows = np.zeros((count, intervals, p, width + 2 * (intervals - 1)))
-        for k in range(intervals):
-            rows[:, k, :, 2 * k : 2 * k + width] = local[:, k]
-        return rows.reshape(count, intervals * p, -1)
-
     def forces_of(self, forces: Array) -> Array:
         """Nodal forces (N, m, 2) [N] equivalent to station forces (N, q, 2) [N]."""
         by_node = self.weights.reshape(-1, self.weights.shape[2])
-        shaped = forces.reshape(len(forces), -1, len(by_node))
-        return self._assembled(shaped @ by_node).reshape(len(forces), -1, 2)
+        intervals = len(self.stiffness) // self.per_interval
+        shaped = forces.reshape(len(forces), intervals, len(by_node))
+        total = self._assembled(shaped @ by_node)
+        return total.reshape(len(forces), total.shape[1] // 2, 2)
 
     def stiffness_of(self, direction: Array, stiffness: Array) -> Array:
         """Stiffness matrices of springs at the stations along given directions.
@@ -132,7 +118,7 @@ class BoreStations:
         return np.concatenate([nodes[:, k : k + intervals] for k in range(s)], axis=2)
 
     def _local(self, direction: Array) -> Array:
-        """Rows of :meth:`project` over the nodes of each interval (N, i, p, 2 s)."""
+        """Displacements along directions by the nodes of intervals (N, i, p, 2 s)."""
         shaped = direction.reshape(len(direction), -1, len(self.weights), 2)
         x, y = shaped[..., 0, None], shaped[..., 1, None]
         return np.asarray(x * self.weights[:, 0] + y * self.weights[:, 1])

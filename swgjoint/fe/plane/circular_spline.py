@@ -289,11 +289,14 @@ class FlankSplines:
             nodes: Node displacements (n_flanks, n_nodes, 2) [m].
         """
         cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
+        order, intervals, n_nodes = cardinal.shape
+        # one product: rows by interval and power, columns by flank and component
+        rows = cardinal.transpose(1, 0, 2).reshape(-1, n_nodes)
+        product = rows @ nodes.transpose(1, 0, 2).reshape(n_nodes, -1)
+        shaped = product.reshape(intervals, order, len(nodes), 2)
         return cls(
             breaks=np.asarray(spline.x),
-            coefficients=np.ascontiguousarray(
-                np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True)
-            ),
+            coefficients=np.ascontiguousarray(shaped.transpose(2, 0, 1, 3)),
         )
 
     def evaluate_at(self, flank: Index, s: Array) -> tuple[Array, Array]:

@@ -318,12 +318,13 @@ class Supports:
         k = used_there * linear.stations.stiffness.reshape(-1, p)[interval]
         stiffness = k.sum(axis=1)
         there = _Intervals(sector=sector, number=interval, share=k / stiffness[:, None])
-        rows = np.zeros((len(sector), linear.gradient.shape[1]))
-        rows[:, linear.gap_dofs] = there.mean(linear.gap_gradients())
+        weight = np.zeros((len(sector), *used.shape[1:], p))
+        weight[np.arange(len(sector)), interval] = there.share
+        weight = weight.reshape(len(sector), linear.gap.shape[1])
         return cls(
             intervals=there,
             closed=is_closed,
-            rows=rows,
+            rows=linear.mean_gap_gradient(sector, weight),
             stiffness=stiffness,
             start=np.where(is_closed, -stiffness, 1.0) * there.mean(linear.gap),
         )

@@ -149,7 +149,7 @@ def _stations_to_exchange(
     linear, state = problem.linear, problem.state
     if linear.race_rows is not None or not step.largest < below:
         return None
-    bad = _wrong_stations(state, linear.gap_after(step.increment)) > TOUCH
+    bad = _wrong_stations(state, step.gap) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():
         return None
     return np.asarray(bad)
@@ -169,7 +169,7 @@ def _advance(
     Returns:
         The new state, and whether the bore contact remained the same.
     """
-    after = linear.gap_after(damping * step.increment)
+    after = linear.gap + damping * (step.gap - linear.gap)
     wrong = _wrong_stations(state, after)
     bad = wrong > TOUCH
     # if all stations opened, the rim would spring back: release the worst one only

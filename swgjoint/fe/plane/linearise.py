@@ -154,12 +154,23 @@ class Linearised:
         )
         return replace(self, gradient=gradient, hessian=hessian)
 
-    def gap_gradients(self) -> Array:
-        """Derivatives of station gaps with respect to ``gap_dofs`` (N, q, k) [-]."""
-        rows = self.race_rows
-        if rows is None:
-            rows = self.stations.project(self.normal)
-        return np.asarray(rows * self.sign[:, None, self.gap_dofs])
+    def mean_gap_gradient(self, sector: Index, weight: Array) -> Array:
+        """Derivatives of weighted means of station gaps (k, n) [-].
+
+        Args:
+            sector: Sector of each mean (k,).
+            weight: Weights of the stations of that sector (k, q).
+        """
+        into = self.gap_dofs
+        if self.race_rows is None:
+            # the nodal forces equivalent to the weights as forces along the normals
+            forces = weight[..., None] * self.normal[sector]
+            means = self.stations.forces_of(forces).reshape(len(sector), into.size)
+        else:
+            means = np.einsum("kq,kqm->km", weight, self.race_rows[sector])
+        rows = np.zeros((len(sector), self.gradient.shape[1]))
+        rows[:, into] = means * self.sign[sector[:, None], into]
+        return rows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -299,6 +310,8 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     middle = model.wave_generator_gap(shaped[:, :, p // 2], alpha)
     near = middle[0] < FAR * model.lobe_height
     near |= state.touching.reshape(shaped.shape[:3]).any(axis=2)
+    if near.all():
+        return model.wave_generator_gap(points, alpha)
     gaps = []
     exact = model.wave_generator_gap(shaped[near], alpha)
     for coarse, fine in zip(middle, exact, strict=True):

@@ -79,6 +79,8 @@ class NewtonStep:
     """Shift of the skeleton nodes in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
     """Shift of the race nodes (N, m, 2, 2) [m]; empty without a race."""
+    gap: Array
+    """Gaps of the stations of the bore after the step (N, q) [m]."""
     pressure: Array
     """Normal force on the bore at each of its stations (N, q) [N]."""
     strip_error: float
@@ -271,7 +273,8 @@ class NewtonProblem:
         model, linear, load, lines = self.model, self.linear, self.load, self.lines
         force, strips = solution.force, lines.strips
         race_shift = increment[:, model.race_dofs[:-NODE]]
-        push = -model.stations.stiffness * linear.gap_after(increment)
+        gap = linear.gap_after(increment)
+        push = -model.stations.stiffness * gap
         holding = model.copies * solution.multiplier
         on_flexspline = load.on_flexspline
         return NewtonStep(
@@ -286,6 +289,7 @@ class NewtonProblem:
             increment=increment,
             shift=linear.rotate_to_global(increment),
             race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
+            gap=gap,
             pressure=np.where(self.state.touching, push, 0.0),
             strip_error=0.0
             if strips is None

@@ -137,7 +137,8 @@ class ToothContact:
             s, gap, sector, side = self._sampled(
                 DENSE_SAMPLES, shaped[sector, side], sector, side, rigid=False
             )
-        padded = np.pad(gap, ((0, 0), (1, 1)), constant_values=np.inf)
+        padded = np.full((len(gap), gap.shape[1] + 2), np.inf)
+        padded[:, 1:-1] = gap
         minimum = (
             np.isfinite(gap)
             & (gap <= padded[:, :-2])
