@@ -39,6 +39,7 @@ import numpy as np
 
 from swgjoint.errors import MissingExtraError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.typing import Array
 
 LARGE = 20_000
@@ -116,7 +117,7 @@ def joint_forces(drive: DriveMap, *, damping: float) -> Any:
     rests, relaxed = past[: len(drive.hysteresis)], past[len(drive.hysteresis) :]
     x, slope, elastic, force = _conservative(drive, q)
     slipping = sum(
-        e.stiffness * _clip(x - rests[k], e.yield_torsion)
+        e.stiffness * _clip(x - rests[k], _yield_torsion(e, elastic))
         for k, e in enumerate(drive.hysteresis)
     )
     force = force - slope.T * (slipping + damping * ca.mtimes(slope, v))
@@ -143,7 +144,7 @@ def joint_history(drive: DriveMap) -> Any:
     x, _, elastic, _ = _conservative(drive, q)
     slipping, after = 0.0, []
     for k, e in enumerate(drive.hysteresis):
-        after.append(x - _clip(x - past[k], e.yield_torsion))
+        after.append(x - _clip(x - past[k], _yield_torsion(e, elastic)))
         slipping += e.stiffness * (x - after[-1])
     if drive.friction is not None:
         b = ca.DM(drive.friction_direction)
@@ -278,6 +279,19 @@ def _reach(drive: DriveMap, speed: Any, along: Any) -> Any:
     more = (law.static - law.coulomb) * ca.exp(-((speed / law.stribeck_speed) ** 2))
     load = law.load / abs(drive.ratio) * ca.fabs(along)
     return (law.bending + law.coulomb + more + load) / law.stiffness
+
+
+def _yield_torsion(element: Jenkin, elastic: Any) -> Any:
+    """Torsion from rest to slip of one element [rad] at an elastic torque [N·m]."""
+    if not element.yield_curve:
+        return element.yield_torsion
+    ca = casadi()
+    at, values = np.array([(0.0, element.yield_torque), *element.yield_curve]).T
+    size, total = ca.fabs(elastic), values[0]
+    slopes = np.diff(values) / np.diff(at)
+    for left, right, slope in zip(at, at[1:], slopes, strict=False):
+        total = total + slope * (ca.fmin(ca.fmax(size, left), right) - left)
+    return total / element.stiffness
 
 
 def _clip(value: Any, reach: Any) -> Any:

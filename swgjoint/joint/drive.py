@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError
-from swgjoint.joint.native import NativeSpring
+from swgjoint.joint.native import NativeSpring, constant_elements
 from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import Jenkin, Sliders
+from swgjoint.maps.hysteresis import Jenkin, Sliders, vary_with_load
 from swgjoint.typing import Array
 
 LEAST_DAMPING_RATIO = 0.001
@@ -28,6 +28,8 @@ under RK4. A bouncing chain touches the floor about 5 % of the time, so this val
 dissipates about as much as :data:`LEAST_DAMPING_RATIO` applied all the time."""
 ACCELERATIONS = 2
 """Number of plugin states that precede the hysteresis states."""
+BRISTLE = 2
+"""Number of plugin states of the friction, which follow the hysteresis states."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +125,9 @@ class JointDrive:
     @property
     def elements(self) -> tuple[Jenkin, ...]:
         """Hysteresis elements in the model; only ``native`` and ``full`` have them."""
-        return self.drive.hysteresis if self.level in ("native", "full") else ()
+        if self.level == "native":
+            return constant_elements(self.drive)
+        return self.drive.hysteresis if self.level == "full" else ()
 
     @property
     def friction(self) -> Friction | None:
@@ -289,11 +293,20 @@ class JointDrive:
         else:
             instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, self.plugin)
             first = int(model.plugin_stateadr[instance]) + ACCELERATIONS
-            rest = data.plugin_state[first : first + len(self.elements)]
+            count = len(self.elements)
+            rest = data.plugin_state[first : first + count]
+            elastic = 0.0
+            if vary_with_load(self.elements):
+                elastic = float(self.drive.torque(torsion, *state[:2]))
+                # the slip of the last step, with its yield torsions
+                after = first + count + (0 if self.friction is None else BRISTLE)
+                limit = data.plugin_state[after : after + count]
+                limit = np.where(limit > 0.0, limit, np.inf)
+                rest = np.clip(rest, torsion - limit, torsion + limit)
             sliders = replace(Sliders.relax(self.elements), rest=rest.copy())
-            slipping = float(sliders.torque(torsion))
+            slipping = float(sliders.torque(torsion, elastic))
             if self.friction is not None:
-                relaxed, known = data.plugin_state[first + len(self.elements) :][:2]
+                relaxed, known = data.plugin_state[first + count :][:BRISTLE]
                 b = self.drive.friction_direction
                 beta = float(np.dot(b, state[:2]))
                 friction = self.friction.torque(

@@ -157,11 +157,24 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         residual=float(np.sqrt(np.mean((best.torque(x) - torque) ** 2))),
         fitted_to=peak,
         note="; ".join(notes),
-        hysteresis=drive.hysteresis,
+        hysteresis=constant_elements(drive),
         friction=law.coulomb + law.bending if law else 0.0,
         viscous=law.viscous if law else 0.0,
         friction_note="its dependence on load and speed" if changes else "",
     )
+
+
+def constant_elements(drive: DriveMap) -> tuple[Jenkin, ...]:
+    """Elements of a map with constant yield torques, as native tendons have them.
+
+    Yield torques that depend on the load are taken at half of the rated torque.
+
+    Args:
+        drive: Map of the drive.
+    """
+    torque = 0.5 * drive.ratings.rated_torque
+    elements = (element.constant_at(torque) for element in drive.hysteresis)
+    return tuple(element for element in elements if element is not None)
 
 
 def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:

@@ -18,6 +18,7 @@ from swgjoint.engine import library as library
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import vary_with_load, yield_table
 
 NUMERICAL_DAMPING = 0.1
 """Coefficient nu1 of the numerical damping of unresolved torsion modes [-].
@@ -134,8 +135,23 @@ def config(
             if drive.hysteresis
             else {}
         )
+        | (
+            {"yield_curve": _text(yield_numbers(drive))}
+            if vary_with_load(drive.hysteresis)
+            else {}
+        )
         | ({"friction": _text(friction_numbers(drive))} if drive.friction else {})
     )
+
+
+def yield_numbers(drive: DriveMap) -> np.ndarray:
+    """Numbers of the attribute ``yield_curve``. Shape (1 + n (1 + n_elements),).
+
+    They are n, then n elastic torques [N·m] and, for each element, n yield torques
+    [N·m].
+    """
+    at, yields = yield_table(drive.hysteresis)
+    return np.array([at.size, *at, *yields.ravel()])
 
 
 def friction_numbers(drive: DriveMap) -> np.ndarray:

@@ -19,18 +19,8 @@ of its two end values, and g is the secant of the torsion. The scheme predicts t
 of the pair. The rest of the force, which is linear in the velocity step, is passed to
 the engine as the metric :math:`M + h^2 p\,g g^T`.
 
-Hysteresis consists of elements with stiffness k and yield torque f, each relaxed at a
-torsion r. An element adds its mean torque over the step to L and the slope of that mean
-to the slope of L, which enters p. Its stretch changes from :math:`u_0` to
-:math:`u_1 = \mathrm{clip}(u_0 + \Delta^+ - \Delta, \pm f/k)`; with s the fraction of
-the torsion step in which it sticks,
-
-.. math::
-    \bar q = k\,[\tfrac12 (u_0 + u_1)\,s + u_1 (1 - s)], \qquad
-    \partial\bar q/\partial\Delta^+ = \tfrac12 k s^2.
-
-Its work is the change of :math:`k u^2/2` plus the slip dissipation, which is never
-negative.
+Hysteresis adds its mean torque over the step to L and the slope of that mean to the
+slope of L, which enters p; see :mod:`swgjoint.joint.hysteresis_step`.
 
 Friction acts along beta, the rotation of the wave generator relative to the flexspline,
 with b its gradient and its own metric :math:`h^2 p_b\,b b^T`; see
@@ -49,6 +39,7 @@ from itertools import pairwise
 import numpy as np
 
 from swgjoint.joint.friction_step import FrictionStep, friction_step, stretch_after
+from swgjoint.joint.hysteresis_step import mean_torque, move_rests, yield_torsions
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
@@ -71,6 +62,9 @@ class TwinMotion:
     link_acceleration: float = 0.0
     rest: tuple[float, ...] = ()
     """Torsion at which each hysteresis element is relaxed [rad]."""
+    limit: tuple[float, ...] = ()
+    """Yield torsion of each hysteresis element in the last step [rad]; empty if there
+    was none."""
     relaxed: float | None = None
     """Angle beta at which the friction bristle is relaxed [rad]; None: at the current
     state."""
@@ -93,6 +87,8 @@ class SchemeForce:
     e_theta: float
     e_psi: float
     """Secants of V by theta and by psi at fixed torsion [N·m]."""
+    reach: tuple[float, ...] = ()
+    """Yield torsion of each hysteresis element in this step [rad]."""
     friction: FrictionStep | None = None
     """Friction along beta; ``theta`` and ``psi`` include its torque, but ``metric``
     excludes its metric."""
@@ -125,16 +121,21 @@ def gradient_force(
     g_theta, g_psi = 1.0 / drive.ratio + float(e_theta), -1.0 + float(e_psi)
     friction = damping * (g_theta * motion.theta_rate + g_psi * motion.psi_rate)
     torsion = float(drive.torsion(motion.theta, motion.psi))
-    slipping = _slip(drive, motion.rest, torsion, 0.0)[0]
+    elastic = float(drive.torque(torsion, motion.theta, motion.psi))
+    slipping = mean_torque(
+        drive.hysteresis,
+        motion.rest,
+        yield_torsions(drive.hysteresis, elastic),
+        torsion,
+    )[0]
     friction += slipping
     on_theta, on_psi = float(theta) - friction * g_theta, float(psi) - friction * g_psi
     if drive.friction is not None:
         law, b = drive.friction, np.array(drive.friction_direction, float)
-        elastic = float(drive.torque(torsion, motion.theta, motion.psi)) + slipping
         speed = float(b @ [motion.theta_rate, motion.psi_rate])
         beta = float(b @ [motion.theta, motion.psi])
         turned = 0.0 if motion.relaxed is None else beta - motion.relaxed
-        rubs = law.torque(turned, speed, elastic / drive.ratio)
+        rubs = law.torque(turned, speed, (elastic + slipping) / drive.ratio)
         on_theta, on_psi = on_theta - b[0] * rubs, on_psi - b[1] * rubs
     return on_theta, on_psi
 
@@ -164,6 +165,8 @@ def scheme_force(
     weight = np.array([motion.rotor_weight, motion.link_weight])
     other = np.array([motion.rotor_acceleration, motion.link_acceleration])
     x = np.array([motion.theta, motion.psi]) - 0.5 * h * v
+    start = float(drive.torsion(*x))
+    rest = move_rests(motion.rest, motion.limit, start)
     b = np.array(drive.friction_direction, float)
     beta, speed = float(b @ x), float(b @ v)
     rubs: FrictionStep | None = None
@@ -171,8 +174,9 @@ def scheme_force(
     for _ in range(passes):
         dx = h * (v + 0.5 * dv)
         s = _secant(drive, x, dx)
-        torque, slope, sticking = _slip(
-            drive, motion.rest, float(drive.torsion(*x)), float(s.g @ dx)
+        reach = yield_torsions(drive.hysteresis, s.torque)
+        torque, slope, sticking = mean_torque(
+            drive.hysteresis, rest, reach, start, float(s.g @ dx)
         )
         s = replace(
             s,
@@ -220,6 +224,7 @@ def scheme_force(
         metric=p,
         e_theta=float(s.e[0]),
         e_psi=float(s.e[1]),
+        reach=reach,
         friction=rubs,
     )
 
@@ -283,15 +288,18 @@ def other_acceleration(
 
 
 def rest_after(
-    drive: DriveMap, motion: TwinMotion, *, timestep: float
+    drive: DriveMap, motion: TwinMotion, force: SchemeForce, *, timestep: float
 ) -> tuple[float, ...]:
     """Plugin state after a step: torsion at which each element is relaxed [rad].
 
-    The plugin updates this state at the beginning of the next step.
+    The state contains the slip up to the start of the step. The slip of the step itself
+    follows at the beginning of the next step, to which the yield torsions
+    ``force.reach`` are passed as ``limit``.
 
     Args:
         drive: The map.
-        motion: State of the pair at the end of the step.
+        motion: State of the pair at the beginning of the step.
+        force: Linearised force of the step.
         timestep: Step h [s].
     """
     torsion = float(
@@ -300,9 +308,9 @@ def rest_after(
             motion.psi - 0.5 * timestep * motion.psi_rate,
         )
     )
-    reach = np.array([e.yield_torsion for e in drive.hysteresis])
-    rest = np.array(motion.rest)
-    return tuple(np.clip(rest, torsion - reach, torsion + reach).tolist())
+    return move_rests(
+        move_rests(motion.rest, motion.limit, torsion), force.reach, torsion
+    )
 
 
 def relax_state(
@@ -331,22 +339,6 @@ def relax_state(
     beta = float(b @ [motion.theta, motion.psi]) - 0.5 * timestep * float(b @ v)
     end = stretch_after(drive.friction, force.friction, turned)
     return beta + turned - end
-
-
-def _slip(
-    drive: DriveMap, rest: tuple[float, ...], torsion: float, change: float
-) -> tuple[float, float, float]:
-    """Mean torque of the elements [N·m], its slope and sticking stiffness [N·m/rad]."""
-    torque = slope = sticking = 0.0
-    for element, r in zip(drive.hysteresis, rest, strict=True):
-        k, d = element.stiffness, element.yield_torsion
-        begin = float(np.clip(torsion - r, -d, d))
-        end = float(np.clip(begin + change, -d, d))
-        part = 1.0 if end == begin + change else (end - begin) / change
-        torque += k * (0.5 * (begin + end) * part + end * (1.0 - part))
-        slope += 0.5 * k * part**2
-        sticking += k * part
-    return torque, slope, sticking
 
 
 def _secant(drive: DriveMap, x: Array, dx: Array) -> _Secant:

@@ -14,14 +14,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.typing import Array
 
 SIZE = 5
@@ -81,9 +78,6 @@ class Variation:
             c, s = np.cos(shift).reshape(one), np.sin(shift).reshape(one)
             return np.stack([a * c + b * s, b * c - a * s], 1)
 
-        def scaled(part: Jenkin | Friction, *keys: str) -> Any:
-            return replace(part, **{key: losses * getattr(part, key) for key in keys})
-
         return replace(
             drive,
             potential=size * shifted(drive.potential),
@@ -91,8 +85,11 @@ class Variation:
             kinematic_error=(1.0 + self.kinematic_error)
             * shifted(drive.kinematic_error),
             hysteresis=tuple(
-                scaled(element, "stiffness", "yield_torque")
-                for element in drive.hysteresis
+                element.with_torques_scaled(losses) for element in drive.hysteresis
             ),
-            friction=drive.friction and scaled(drive.friction, *_TORQUES),
+            friction=drive.friction
+            and replace(
+                drive.friction,
+                **{key: losses * getattr(drive.friction, key) for key in _TORQUES},
+            ),
         )

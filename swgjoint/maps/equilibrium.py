@@ -56,6 +56,21 @@ def output_angle(
     return np.concatenate(parts).reshape(theta.shape)
 
 
+def move_sliders(
+    drive: Potential, sliders: Sliders, theta: float, psi: float
+) -> Sliders:
+    """State of the hysteresis elements after a monotone path to given angles.
+
+    Args:
+        drive: The map.
+        sliders: State at the start of the path.
+        theta: Input angle at its end [rad].
+        psi: Output angle at its end [rad].
+    """
+    x = float(drive.torsion(theta, psi))
+    return sliders.move_to(x, float(drive.torque(x, theta, psi)))
+
+
 def _solve(
     drive: Potential,
     curve: tuple[Array, Array],
@@ -102,8 +117,9 @@ def _torque(
     torque = np.sum(first[..., 0] * cos + first[..., 1] * sin, axis=-1)
     stiffness = np.sum(second[..., 0] * cos + second[..., 1] * sin, axis=-1)
     if sliders is not None:
-        torque = torque + sliders.torque(x)
-        stiffness = stiffness + sliders.tangent(x)
+        elastic, spring = torque, stiffness
+        torque = elastic + sliders.torque(x, elastic)
+        stiffness = spring + sliders.tangent(x, elastic, spring)
     total = torque * (1.0 - e_psi)
     n_psi = drive.angle_orders[:, 1]
     if n_psi.any():

@@ -20,34 +20,39 @@ import zipfile
 from dataclasses import asdict
 from numbers import Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, MapFileError
-from swgjoint.faults import Section, validate
+from swgjoint.faults import validate
 from swgjoint.files import write_whole
 from swgjoint.gear.ratings import Ratings
 from swgjoint.json_text import json_text
 from swgjoint.maps.checks import check_map
 from swgjoint.maps.fields import DriveFields
+from swgjoint.maps.file_header import (
+    FRICTION_KEYS,
+    MAX_NAME,
+    FrictionHeader,
+    Header,
+    JenkinHeader,
+)
 from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.hysteresis import vary_with_load
 from swgjoint.maps.info import check_texts, sound_info
 from swgjoint.maps.potential import Potential
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Version 2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 the
-fields for display. A file of an older version is read as a map without these parts."""
-_READABLE = (1, 2, 3, SCHEMA_VERSION)
+fields for display, 5 the yield curve of the hysteresis. A file of an older version
+is read as a map without these parts. A map without yield curves is written as version
+4."""
+_READABLE = (1, 2, 3, 4, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
 """Largest file that is read [B]; 1000 harmonics with 100 knots take about 10 MB."""
-
-MAX_NAME = 300
-"""Longest name of a map, and longest path quoted in full in a message [characters]."""
 
 _ARRAYS: dict[str, tuple[str, int, str]] = {
     "torsion_knots": ("<f8", 1, "rad"),
@@ -82,78 +87,11 @@ _END = struct.Struct("<4s4H2LH")  # end of the central directory, PKZIP APPNOTE 
 Map = TypeVar("Map", bound=Potential)
 
 
-class RatingsHeader(Section):
-    """Catalogue torques [N·m]."""
-
-    rated_torque: float
-    repeated_peak: float
-    momentary_peak: float
-    T1: float
-    T2: float
-    source: str
-    ratcheting_torque: float | None = None
-
-
-class JenkinHeader(Section):
-    """One Jenkin element of the hysteresis; the keys state the units."""
-
-    stiffness_Nm_rad: float
-    yield_torque_Nm: float
-
-
-class FrictionHeader(Section):
-    """Friction of the wave generator; the keys state the units, ``load`` has none."""
-
-    stiffness_Nm_rad: float
-    coulomb_Nm: float
-    static_Nm: float
-    stribeck_speed_rad_s: float
-    viscous_Nms_rad: float
-    load: float
-    bending_Nm: float
-    damping_Nms_rad: float
-    source: str
-
-
-_FRICTION = {
-    "stiffness_Nm_rad": "stiffness",
-    "coulomb_Nm": "coulomb",
-    "static_Nm": "static",
-    "stribeck_speed_rad_s": "stribeck_speed",
-    "viscous_Nms_rad": "viscous",
-    "load": "load",
-    "bending_Nm": "bending",
-    "damping_Nms_rad": "damping",
-    "source": "source",
-}
-"""Fields of :class:`Friction` by their keys in the file."""
-
-
-class Header(Section):
-    """The JSON header of a ``.swg`` file."""
-
-    format: Literal["swgjoint drive map"]
-    schema_version: int
-    units: dict[str, str]
-    versions: dict[str, str]
-    name: Annotated[str, Field(max_length=MAX_NAME)]
-    level: str
-    layout: str
-    teeth_flexspline: int
-    teeth_circular_spline: int
-    damping_ratio: float
-    ratings: RatingsHeader
-    hysteresis: list[JenkinHeader] = Field(default_factory=list)
-    friction: FrictionHeader | None = None
-    fields_period_rad: float | None = None
-    info: dict[str, Any]
-
-
 def map_bytes(drive: Potential) -> bytes:
     """Content of a ``.swg`` file; equal maps and software versions give equal bytes."""
     header = {
         "format": "swgjoint drive map",
-        "schema_version": SCHEMA_VERSION,
+        "schema_version": SCHEMA_VERSION if vary_with_load(drive.hysteresis) else 4,
         "units": {key: unit for key, (_, _, unit) in (_ARRAYS | _FIELDS).items()}
         | {"ratings": "N·m"},
         "versions": {
@@ -168,17 +106,11 @@ def map_bytes(drive: Potential) -> bytes:
         "teeth_circular_spline": drive.teeth_circular_spline,
         "damping_ratio": float(drive.damping_ratio),
         "ratings": {key: _plain(value) for key, value in asdict(drive.ratings).items()},
-        "hysteresis": [
-            {
-                "stiffness_Nm_rad": float(element.stiffness),
-                "yield_torque_Nm": float(element.yield_torque),
-            }
-            for element in drive.hysteresis
-        ],
+        "hysteresis": [JenkinHeader.from_element(e) for e in drive.hysteresis],
         "friction": drive.friction
         and {
             key: _plain(getattr(drive.friction, name))
-            for key, name in _FRICTION.items()
+            for key, name in FRICTION_KEYS.items()
         },
         "fields_period_rad": drive.fields and float(drive.fields.period),
         "info": dict(drive.info),
@@ -287,13 +219,7 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
         teeth_circular_spline=header.teeth_circular_spline,
         damping_ratio=header.damping_ratio,
         ratings=Ratings(**header.ratings.model_dump()),
-        hysteresis=tuple(
-            Jenkin(
-                stiffness=element.stiffness_Nm_rad,
-                yield_torque=element.yield_torque_Nm,
-            )
-            for element in header.hysteresis
-        ),
+        hysteresis=tuple(element.element() for element in header.hysteresis),
         friction=_friction(header.friction),
         fields=fields,
         info=sound_info(header.info, name=header.name),
@@ -306,7 +232,7 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
 def _friction(header: FrictionHeader | None) -> Friction | None:
     if header is None:
         return None
-    return Friction(**{_FRICTION[key]: v for key, v in header.model_dump().items()})
+    return Friction(**{FRICTION_KEYS[key]: v for key, v in header.model_dump().items()})
 
 
 def _content(path: Path) -> bytes:

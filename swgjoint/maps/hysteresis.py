@@ -5,25 +5,47 @@ torsion at which its spring is relaxed,
 
 .. math:: q = k (\Delta - r), \qquad r \in [\Delta - f/k, \Delta + f/k],
 
-and r changes only when an end of that interval moves past it. In increments:
-:math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`. After a monotone path, r
-depends only on the initial r and the final torsion.
+and r changes only when an end of that interval moves past it. For a constant f, in
+increments: :math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`.
 
-The element is passive: the work :math:`q\,d\Delta` is the change of :math:`q^2/2k` plus
-f times the slip :math:`|dr|`, which is never negative. A steady cycle of amplitude
-X > f/k dissipates :math:`4 f (X - f/k)`. In parallel with a spring K the loop is
-:math:`2 f/K` wide at zero torque if the torsion between the tip and zero torque exceeds
-2 f/k.
+The yield torque may depend on the elastic torque
+:math:`T = \partial V/\partial\Delta` of the drive, because tooth friction depends on
+the tooth forces: :math:`f = f(|T|) \ge 0`, piecewise linear. When f shrinks below the
+torque of the spring, the slider slips back.
+
+The element is passive for any history of :math:`f \ge 0`. It stores :math:`q^2/2k`, and
+
+.. math:: q\,d\Delta = d\!\left(\frac{q^2}{2k}\right) + q\,dr.
+
+The slider moves only when :math:`|q|` would exceed f, and then in the direction in
+which the spring pulls it, whether f has shrunk or the torsion has grown. Hence
+:math:`q\,dr = |q|\,|dr| \ge 0`: the work is the change of the stored energy plus a
+loss. No work is gained over a closed cycle of torsion and elements, or from relaxed
+elements on. The same holds for every step of a computation that first adapts the
+interval to f and then moves the torsion at constant f.
+
+Two conditions keep the static torque well defined, with the elastic stiffness
+:math:`K = \partial T/\partial\Delta`. The sum of :math:`|df/d|T||` over the elements is
+below 1, so that the torque of spring and elements increases with the torsion, also
+while sliders slip back. And :math:`|df/d|T||\,K \le k`, so that both ends of the
+interval of r increase with the torsion. Then, after a monotone path, r depends only on
+the initial r and on the final state.
+
+With a constant f, a steady cycle of amplitude X > f/k dissipates
+:math:`4 f (X - f/k)`. In parallel with a spring K the loop is :math:`2 f/K` wide at
+zero torque if the torsion between the tip and zero torque exceeds 2 f/k.
 
 Source:
     Iwan (1966), "A distributed-element model for hysteresis and its steady-state
-    dynamic response", J. Appl. Mech. 33, 893-900.
+    dynamic response", J. Appl. Mech. 33, 893-900, for constant f. The interval that
+    varies with the load makes the element a generalised play operator, see Visintin
+    (1994), "Differential Models of Hysteresis", Springer, chapter III.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -34,6 +56,8 @@ from swgjoint.typing import Array
 
 MAX_ELEMENTS = 64
 """Largest number of elements, more than a measured loop can distinguish."""
+MAX_POINTS = 64
+"""Largest number of points of a yield curve."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,35 +67,184 @@ class Jenkin:
     stiffness: float
     """Stiffness while the element sticks [N·m/rad]."""
     yield_torque: float
-    """Torque at which the element slips [N·m]."""
+    """Torque at which the element slips, without load [N·m]."""
+    yield_curve: tuple[tuple[float, float], ...] = ()
+    """Further points of the yield torque: magnitude of the elastic torque, increasing
+    from zero, and yield torque there, both [N·m]. The yield torque is linear between
+    the points and constant beyond the last one."""
 
     def __post_init__(self) -> None:
+        curve = tuple(tuple(point) for point in self.yield_curve)
+        object.__setattr__(self, "yield_curve", curve)
         for key, unit in (("stiffness", "N·m/rad"), ("yield_torque", "N·m")):
             value = getattr(self, key)
-            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if curve and key == "yield_torque" and _is_number(value) and value == 0.0:
+                continue
             # far above the values of any drive; products do not overflow
-            if not (number and isfinite(value) and 1e-60 < value < 1e60):
+            if not (_is_number(value) and isfinite(value) and 1e-60 < value < 1e60):
                 raise InputError(
                     f"hysteresis {key} {value!s:.40} {unit}; accepted: a finite number"
                     " > 0"
                 )
+        last = 0.0
+        for point in curve:
+            if len(point) != 2 or not all(
+                _is_number(value) and 0.0 <= value < 1e60 for value in point
+            ):
+                raise InputError(
+                    f"hysteresis yield_curve {point!s:.60} N·m; accepted: pairs of"
+                    " finite numbers >= 0"
+                )
+            if point[0] <= last or len(curve) > MAX_POINTS:
+                raise InputError(
+                    f"hysteresis yield_curve at {point[0]:.6g} N·m; accepted: up to"
+                    f" {MAX_POINTS} torques > 0 in increasing order"
+                )
+            last = point[0]
 
     @property
     def yield_torsion(self) -> float:
-        """Torsion from rest to slip, f/k [rad]."""
+        """Torsion from rest to slip without load [rad]."""
         return self.yield_torque / self.stiffness
+
+    def yields(self, elastic: ArrayLike) -> Array:
+        """Yield torque f at elastic torques of any shape [N·m].
+
+        Args:
+            elastic: Elastic torque T of the drive [N·m].
+        """
+        at, values = np.array([(0.0, self.yield_torque), *self.yield_curve]).T
+        return np.asarray(np.interp(np.abs(elastic), at, values))
+
+    def reach(self, elastic: ArrayLike) -> Array:
+        """Yield torsion f/k at elastic torques of any shape [rad].
+
+        Args:
+            elastic: Elastic torque T of the drive [N·m].
+        """
+        return np.asarray(self.yields(elastic) / self.stiffness)
+
+    def yield_slopes(self, elastic: ArrayLike) -> Array:
+        """Slope of the yield torque over the magnitude of the elastic torque [-]."""
+        at, values = np.array([(0.0, self.yield_torque), *self.yield_curve]).T
+        slopes = np.append(np.diff(values) / np.diff(at), 0.0)
+        interval = np.searchsorted(at, np.abs(elastic), side="right") - 1
+        return np.asarray(slopes[interval])
+
+    def with_torques_scaled(self, factor: float) -> Jenkin:
+        """The element with all its torques multiplied by a factor [-]."""
+        return Jenkin(
+            stiffness=factor * self.stiffness,
+            yield_torque=factor * self.yield_torque,
+            yield_curve=tuple((at, factor * f) for at, f in self.yield_curve),
+        )
+
+    def constant_at(self, elastic: float) -> Jenkin | None:
+        """The element with the constant yield torque that it has at one elastic torque.
+
+        None if it yields there without any torque.
+
+        Args:
+            elastic: Elastic torque T [N·m].
+        """
+        if not self.yield_curve:
+            return self
+        torque = float(self.yields(elastic))
+        if not torque:
+            return None
+        return Jenkin(stiffness=self.stiffness, yield_torque=torque)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def vary_with_load(elements: Sequence[Jenkin]) -> bool:
+    """Whether the yield torque of an element depends on the load."""
+    return any(element.yield_curve for element in elements)
+
+
+def total_yield(elements: Sequence[Jenkin], elastic: float) -> float:
+    """Sum of the yield torques at an elastic torque; both [N·m]."""
+    return sum(float(element.yields(elastic)) for element in elements)
+
+
+def yield_table(elements: Sequence[Jenkin]) -> tuple[Array, Array]:
+    """Yield torques of all elements at common elastic torques.
+
+    Args:
+        elements: Jenkin elements of a drive.
+
+    Returns:
+        Magnitudes of the elastic torque, increasing from zero [N·m], shape (m,), and
+        yield torques there [N·m], shape (n_elements, m).
+    """
+    points = {at for element in elements for at, _ in element.yield_curve}
+    at = np.array(sorted({0.0, *points}))
+    return at, np.array([element.yields(at) for element in elements]).reshape(
+        -1, at.size
+    )
+
+
+def check_elements(elements: Sequence[object], name: str) -> None:
+    """Reject what is not a list of at most :data:`MAX_ELEMENTS` elements.
+
+    Args:
+        elements: Elements of a drive.
+        name: Name of the drive, for messages.
+    """
+    if len(elements) > MAX_ELEMENTS or not all(isinstance(e, Jenkin) for e in elements):
+        raise InputError(
+            f"hysteresis of {name!r}; accepted: up to {MAX_ELEMENTS} Jenkin elements"
+        )
+
+
+def check_loads(elements: Sequence[Jenkin], name: str, largest: float) -> None:
+    """Reject yield torques that change too fast with the load, see above.
+
+    Args:
+        elements: Jenkin elements of a drive.
+        name: Name of the drive, for messages.
+        largest: Largest elastic stiffness K of the drive [N·m/rad].
+
+    Raises:
+        InputError: If one of the two conditions is not met.
+    """
+    at, yields = yield_table(elements)
+    slopes = np.abs(np.diff(yields, axis=1) / np.diff(at))
+    total = float(slopes.sum(axis=0).max())
+    if not total < 1.0:
+        raise InputError(
+            f"hysteresis of {name!r}: slopes of the yield curves sum to {total:.4g};"
+            " accepted: a sum below 1"
+        )
+    for element, slope in zip(elements, slopes.max(axis=1).tolist(), strict=True):
+        if slope * largest > element.stiffness:
+            raise InputError(
+                f"hysteresis of {name!r}: an element of {element.stiffness:.4g} N·m/rad"
+                f" whose yield curve has a slope of {slope:.4g}; accepted: at least the"
+                f" slope times the largest stiffness of the map,"
+                f" {slope * largest:.4g} N·m/rad"
+            )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sliders:
-    """Parameters and state of the Jenkin elements of a drive; immutable."""
+    """Parameters and state of the Jenkin elements of a drive; immutable.
+
+    The argument ``elastic`` of the methods is the elastic torque of the drive at each
+    torsion [N·m], of the same shape as ``torsion``. It affects only elements whose
+    yield torque depends on the load.
+    """
 
     stiffness: Array
     """Stiffness k [N·m/rad]. Shape (n,)."""
     reach: Array
-    """Yield torsion f/k [rad]. Shape (n,)."""
+    """Yield torsion f/k without load [rad]. Shape (n,)."""
     rest: Array
     """Torsion r at which each element is currently relaxed [rad]. Shape (n,)."""
+    elements: tuple[Jenkin, ...] = ()
+    """The elements, if their yield torques depend on the load; otherwise empty."""
 
     @classmethod
     def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
@@ -85,33 +258,66 @@ class Sliders:
             stiffness=np.array([e.stiffness for e in elements], dtype=float),
             reach=np.array([e.yield_torsion for e in elements], dtype=float),
             rest=np.full(len(elements), torsion, dtype=float),
+            elements=tuple(elements) if vary_with_load(elements) else (),
         )
 
-    def move_to(self, torsion: float) -> Sliders:
-        """State after a monotone path to a torsion [rad]."""
-        rest = np.clip(self.rest, torsion - self.reach, torsion + self.reach)
-        return Sliders(stiffness=self.stiffness, reach=self.reach, rest=rest)
+    def move_to(self, torsion: float, elastic: float = 0.0) -> Sliders:
+        """State after a monotone path to a torsion.
 
-    def torque(self, torsion: ArrayLike) -> Array:
+        Args:
+            torsion: Torsion at the end [rad].
+            elastic: Elastic torque there [N·m].
+        """
+        reach = self._reach(elastic)
+        rest = np.clip(self.rest, torsion - reach, torsion + reach)
+        return replace(self, rest=rest)
+
+    def torque(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
         """Total torque after a monotone path to each torsion [N·m]."""
-        return np.asarray(self._stretch(torsion) @ self.stiffness)
+        return np.asarray(self._stretch(torsion, elastic) @ self.stiffness)
 
-    def tangent(self, torsion: ArrayLike) -> Array:
-        """Total stiffness of the elements that stick at each torsion [N·m/rad]."""
-        sticks = np.abs(self._stretch(torsion)) < self.reach
-        return np.asarray(sticks @ self.stiffness)
+    def tangent(
+        self,
+        torsion: ArrayLike,
+        elastic: ArrayLike = 0.0,
+        stiffness: ArrayLike = 0.0,
+    ) -> Array:
+        """Derivative of the total torque by the torsion [N·m/rad].
 
-    def energy(self, torsion: ArrayLike) -> Array:
+        Args:
+            torsion: Torsion, reached along a monotone path [rad].
+            elastic: Elastic torque T there [N·m].
+            stiffness: Stiffness dT/dx there [N·m/rad].
+        """
+        stretch = self._stretch(torsion, elastic)
+        sticks = np.abs(stretch) < self._reach(elastic)
+        total = sticks @ self.stiffness
+        if not self.elements:
+            return np.asarray(total)
+        # a slipping element follows its yield torque
+        slopes = np.stack([e.yield_slopes(elastic) for e in self.elements], -1)
+        follows = np.sum(np.where(sticks, 0.0, np.sign(stretch)) * slopes, axis=-1)
+        return np.asarray(total + follows * np.sign(elastic) * np.asarray(stiffness))
+
+    def energy(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
         """Strain energy of the springs after a monotone path to each torsion [J]."""
-        return np.asarray(0.5 * self._stretch(torsion) ** 2 @ self.stiffness)
+        return np.asarray(0.5 * self._stretch(torsion, elastic) ** 2 @ self.stiffness)
 
-    def _stretch(self, torsion: ArrayLike) -> Array:
+    def _reach(self, elastic: ArrayLike) -> Array:
+        """Yield torsion of each element at each elastic torque (..., n)."""
+        if not self.elements:
+            return self.reach
+        return np.stack([element.reach(elastic) for element in self.elements], -1)
+
+    def _stretch(self, torsion: ArrayLike, elastic: ArrayLike) -> Array:
         """Stretch of each element after a monotone path to each torsion (..., n)."""
-        x = np.asarray(torsion, float)[..., None]
-        return np.asarray(np.clip(x - self.rest, -self.reach, self.reach))
+        x, reach = np.asarray(torsion, float)[..., None], self._reach(elastic)
+        return np.asarray(np.clip(x - self.rest, -reach, reach))
 
 
-def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
+def play_hysteresis(
+    elements: Sequence[Jenkin], torsion: Array, elastic: Array | float = 0.0
+) -> Array:
     """Total torque of the elements along a torsion history [N·m]. Shape (n,).
 
     The elements start relaxed at zero torsion, as after a reset of the simulation
@@ -120,24 +326,28 @@ def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
     Args:
         elements: Jenkin elements of the drive.
         torsion: History of the torsion [rad]. Shape (n,).
+        elastic: History of the elastic torque [N·m]. Shape (n,), or one value.
     """
     total = np.zeros_like(torsion, dtype=float)
     for element in elements:
-        total += element.stiffness * stretches(torsion, element.yield_torsion)
+        total += element.stiffness * stretches(torsion, element.reach(elastic))
     return total
 
 
-def stretches(torsion: Array, reach: float) -> Array:
+def stretches(torsion: Array, reach: ArrayLike) -> Array:
     """Stretch x - r of one element along a torsion history x [rad]. Shape (n,).
 
     The element starts relaxed at zero torsion.
 
     Args:
         torsion: History of the torsion [rad]. Shape (n,).
-        reach: Stretch at which the slider of the element slips [rad].
+        reach: Stretch at which the slider of the element slips [rad]. Shape (n,), or
+            one value.
     """
     stretch, rest = np.empty(len(torsion)), 0.0
-    for k, x in enumerate(np.asarray(torsion, float).tolist()):
-        rest = min(max(rest, x - reach), x + reach)
+    limits = np.broadcast_to(np.asarray(reach, float), stretch.shape).tolist()
+    steps = zip(np.asarray(torsion, float).tolist(), limits, strict=True)
+    for k, (x, limit) in enumerate(steps):
+        rest = min(max(rest, x - limit), x + limit)
         stretch[k] = x - rest
     return stretch

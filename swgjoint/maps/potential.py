@@ -31,7 +31,7 @@ from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
+from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -116,14 +116,10 @@ class Potential:
             array = frozen_array(getattr(self, key), f"{key} [{unit}]", shape=shape)
             object.__setattr__(self, key, array)
         elements = tuple(self.hysteresis)
-        if len(elements) > MAX_ELEMENTS or not all(
-            isinstance(element, Jenkin) for element in elements
-        ):
-            raise InputError(
-                f"hysteresis of {self.name!r}; accepted: up to {MAX_ELEMENTS} Jenkin"
-                " elements"
-            )
+        check_elements(elements, self.name)
         object.__setattr__(self, "hysteresis", elements)
+        if vary_with_load(elements):
+            check_loads(elements, self.name, self.max_stiffness)
         if not isinstance(self.friction, Friction | None):
             raise InputError(
                 f"friction of {self.name!r}: {self.friction!s:.40}; accepted: Friction"

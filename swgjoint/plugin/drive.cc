@@ -17,10 +17,9 @@ constexpr char kName[] = "swgjoint.drive";
 constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
-    "friction",        "contact_damping"};
+    "friction",        "contact_damping", "yield_curve"};
 constexpr int kAccelerations = 2;  // number of states before those of the hysteresis
 constexpr int kBristle = 2;  // states: rotation where it is relaxed, 1 once it is known
-constexpr size_t kMaxElements = 64;
 constexpr int kDeviations = 5;           // number of user values of a tendon
 constexpr mjtNum kLeastLosses = 1e-6;    // keeps the bristle stiffness above zero
 // Largest cubic coefficient of the friction tendon, which is identified by so small a
@@ -55,26 +54,16 @@ bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum 
   return true;
 }
 
-// Reads stiffness and yield torque of every Jenkin element; the list is empty without
-// the attribute. Returns false if the attribute is invalid.
-bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
-  const char* text = mj_getPluginConfig(m, instance, "hysteresis");
-  list->clear();
-  if (!text || !*text) return true;
-  if (!ParseNumbers(text, list) || list->size() % 2 ||
-      list->size() > 2 * kMaxElements) {
-    return false;
-  }
-  return std::all_of(list->begin(), list->end(), [](double x) { return x > 0; });
-}
-
 // Number of states of an instance in plugin_state.
 int CountStates(const mjModel* m, int instance) {
-  std::vector<double> list;
+  Hysteresis hysteresis;
   // Create rejects an invalid attribute
-  if (!Elements(m, instance, &list)) return kAccelerations;
+  if (hysteresis.Parse(mj_getPluginConfig(m, instance, "hysteresis"),
+                       mj_getPluginConfig(m, instance, "yield_curve"))) {
+    return kAccelerations;
+  }
   const char* friction = mj_getPluginConfig(m, instance, "friction");
-  return kAccelerations + static_cast<int>(list.size() / 2) +
+  return kAccelerations + static_cast<int>(hysteresis.states()) +
          (friction && *friction ? kBristle : 0);
 }
 
@@ -176,16 +165,8 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance, "attribute 'passes' is not an integer in 1..20");
   }
   drive->passes_ = static_cast<int>(passes);
-  std::vector<double> elements;
-  if (!Elements(m, instance, &elements)) {
-    return Refuse(m, instance,
-                  "attribute 'hysteresis' is not up to 64 pairs of numbers > 0");
-  }
-  for (size_t j = 0; j < elements.size(); j += 2) {
-    drive->stiffness_.push_back(elements[j]);
-    drive->reach_.push_back(elements[j + 1] / elements[j]);
-  }
-  drive->stretch_.assign(drive->reach_.size(), 0.0);
+  const char* fault = drive->hysteresis_.Parse(text("hysteresis"), text("yield_curve"));
+  if (fault) return Refuse(m, instance, fault);
 
   // When a model is attached, names get a prefix but config strings do not. The tendon
   // is therefore found by the name of the instance, which it shares.
@@ -273,6 +254,15 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
 // (or velocities) of rotor and link.
 mjtNum Drive::Rotation(const Pair& q) const { return Dot(friction_->b(), q); }
 
+mjtNum* Drive::Bristle(mjtNum* state) const {
+  return state + kAccelerations + hysteresis_.size();
+}
+
+mjtNum* Drive::Limit(mjtNum* state) const {
+  if (!hysteresis_.varies()) return nullptr;
+  return Bristle(state) + (friction_ ? kBristle : 0);
+}
+
 void Drive::AddTorque(mjData* d, const Pair& torque) const {
   d->qfrc_passive[v_rotor_] += torque[0];
   d->qfrc_passive[v_link_] += torque[1];
@@ -309,30 +299,6 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   } else {
     Watch(m, d, instance, m->opt.integrator == mjINT_RK4 ? 1 : 2);
     AddGradient(m, d, instance);
-  }
-}
-
-// Sets the stretch of every hysteresis element at the torsion at the start of the step;
-// `rest` are the torsions at which they are relaxed. An element beyond its reach slips.
-void Drive::Place(const mjtNum* rest) {
-  for (size_t j = 0; j < reach_.size(); ++j) {
-    stretch_[j] = std::clamp(map_.torsion() - rest[j], -reach_[j], reach_[j]);
-  }
-}
-
-// Adds the contribution of the hysteresis elements over a change of the torsion: their
-// mean torque, so that their work is exact, and the derivative of this mean with
-// respect to the change. An element sticks over the fraction f of the change.
-void Drive::Slip(mjtNum change, DriveValue* value) const {
-  for (size_t j = 0; j < reach_.size(); ++j) {
-    const mjtNum k = losses_ * stiffness_[j], begin = stretch_[j];
-    const mjtNum free = begin + change;
-    const mjtNum end = std::clamp(free, -reach_[j], reach_[j]);
-    const mjtNum f = end == free ? 1 : (end - begin) / change;
-    value->torque += k * (0.5 * (begin + end) * f + end * (1 - f));
-    value->slope += 0.5 * k * f * f;
-    value->stiffness_begin += k * f;
-    value->stiffness_end += k * f;
   }
 }
 
@@ -391,12 +357,12 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   DriveValue value;
   map_.Gradient(q[0], q[1], &value);
-  Place(d->plugin_state + m->plugin_stateadr[instance] + kAccelerations);
-  Slip(0, &value);
+  mjtNum* all = d->plugin_state + m->plugin_stateadr[instance];
+  hysteresis_.Place(map_.torsion(), all + kAccelerations, nullptr);
+  hysteresis_.Slip(0, losses_, &value);
   mjtNum rubs = 0;
   if (friction_) {
-    const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance] +
-                          kAccelerations + reach_.size();
+    const mjtNum* state = Bristle(all);
     const mjtNum speed = Rotation(v);
     const mjtNum x = state[1] != 0 ? Rotation(q) - state[0] : 0;
     rubs = friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
@@ -430,20 +396,20 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   const Pair weight = Responses(m, d);
-  const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   const Pair other = {state[0], state[1]};
   const mjtNum damping = Damping(m, d);
 
   // the scheme is a midpoint rule for the positions of half a step earlier
   const Pair x = Pair{d->qpos[q_rotor_], d->qpos[q_link_]} - v * (0.5 * h);
   map_.Begin(x[0], x[1]);
-  Place(state + kAccelerations);
+  hysteresis_.Place(map_.torsion(), state + kAccelerations, Limit(state));
   DriveValue& g = step_.value;
   FrictionStep& rub = step_.friction;
   Pair dv = {0, 0};
   mjtNum force = 0, p = 0, speed = 0, turned = 0;
   if (friction_) {
-    const mjtNum* rest = state + kAccelerations + reach_.size();
+    const mjtNum* rest = Bristle(state);
     speed = Rotation(v);
     step_.rotation = Rotation(x);
     turned = rest[1] != 0 ? step_.rotation - rest[0] : 0;
@@ -451,7 +417,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   for (int pass = 0; pass < passes_; ++pass) {
     const Pair dx = v * h + dv * (0.5 * h);
     map_.Secant(dx[0], dx[1], &g);
-    if (!reach_.empty()) Slip(Dot(g.g, dx), &g);
+    if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, dx), losses_, &g);
     const mjtNum k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
     const mjtNum w = Dot(g.g * g.g, weight);
     const mjtNum ka = h * h * w * k;
@@ -517,26 +483,29 @@ void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
   // The torsion at the end of a step determines where each element is relaxed. In the
   // scheme, the end of a step is the start of the next step and is evaluated there.
   // With other integrators, intermediate stages are ignored.
-  if (!reach_.empty() && (step_.scheme || step_.gradient)) {
-    if (step_.gradient) {
+  mjtNum *rest = state + kAccelerations, *bristle = Bristle(state);
+  if (hysteresis_.size() && (step_.scheme || step_.gradient)) {
+    mjtNum* limit = Limit(state);
+    if (step_.gradient && limit) {
+      DriveValue value;
+      map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
+      hysteresis_.Load(value.torque);
+      step_.torsion = map_.torsion();
+    } else if (step_.gradient) {
       map_.Begin(d->qpos[q_rotor_], d->qpos[q_link_]);
       step_.torsion = map_.torsion();
     }
-    mjtNum* rest = state + kAccelerations;
-    for (size_t j = 0; j < reach_.size(); ++j) {
-      rest[j] =
-          std::clamp(rest[j], step_.torsion - reach_[j], step_.torsion + reach_[j]);
-    }
+    hysteresis_.Relax(step_.torsion, step_.scheme ? limit : nullptr, rest);
+    if (limit) hysteresis_.Store(limit);
   }
-  mjtNum* bristle = state + kAccelerations + reach_.size();
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   if (friction_ && step_.gradient) {
     const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
     const mjtNum x = Rotation(q);
     DriveValue value;
     map_.Gradient(q[0], q[1], &value);
-    Place(state + kAccelerations);
-    Slip(0, &value);
+    hysteresis_.Place(map_.torsion(), rest, nullptr);
+    hysteresis_.Slip(0, losses_, &value);
     const mjtNum reach = friction_->Reach(Rotation(v), value.torque);
     bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
     bristle[1] = 1;

@@ -11,6 +11,7 @@
 
 #include "drive_map.h"
 #include "friction.h"
+#include "hysteresis.h"
 #include "lanes.h"
 
 namespace swgjoint {
@@ -36,7 +37,10 @@ class Drive {
   // Copies the data that Advance needs to complete a step that the drive of another
   // mjData has begun. That drive may belong to another model; its map, addresses and
   // parameters are therefore not copied.
-  void Continue(const Drive& other) { step_ = other.step_; }
+  void Continue(const Drive& other) {
+    step_ = other.step_;
+    hysteresis_.Continue(other.hysteresis_);
+  }
 
   static void RegisterPlugin();
 
@@ -67,8 +71,9 @@ class Drive {
   Pair Responses(const mjModel* m, const mjData* d);
   void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
   bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
-  void Place(const mjtNum* rest);
-  void Slip(mjtNum change, DriveValue* value) const;
+  // States of the friction bristle, and yield torsions in the last step or null.
+  mjtNum* Bristle(mjtNum* state) const;
+  mjtNum* Limit(mjtNum* state) const;
   bool FindFriction(const mjModel* m, const char* text, int rotor, int link);
   mjtNum Rotation(const Pair& q) const;
   void AddTorque(mjData* d, const Pair& torque) const;
@@ -79,9 +84,7 @@ class Drive {
   int passes_ = 0;  // evaluations of the map per step
   int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, indices in ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
-  // Jenkin elements: stiffness, yield torsion, and torsion relative to the relaxed
-  // state
-  std::vector<mjtNum> stiffness_, reach_, stretch_;
+  Hysteresis hysteresis_;
   bool siblings_ = false;       // whether rotor and link have the same ancestors
   std::vector<mjtNum> column_;  // workspace of Response: two columns of L^-T
   mjtNum losses_ = 1;  // scale of hysteresis and friction

@@ -11,6 +11,7 @@ import pytest
 
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.hysteresis_step import move_rests
 from swgjoint.joint.reference import (
     TwinMotion,
     metric_of,
@@ -21,7 +22,7 @@ from swgjoint.joint.reference import (
 )
 from swgjoint.joint.response import responses
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.hysteresis import Sliders
+from swgjoint.maps.hysteresis import Sliders, vary_with_load
 
 TWO_MASS = """
 <mujoco>
@@ -76,8 +77,13 @@ class Bench:
         torsion = drive.torsion(*x)
         potential = drive.energy(torsion, *x)
         if drive.hysteresis and self.drive.plugin:
-            sliders = Sliders.relax(drive.hysteresis)
-            potential += replace(sliders, rest=self.rest.copy()).energy(torsion)
+            # the slip of the last step, with its yield torsions
+            count = len(drive.hysteresis)
+            limit = d.plugin_state[-count:] if vary_with_load(drive.hysteresis) else ()
+            rest = move_rests(self.rest, tuple(limit), float(torsion))
+            sliders = replace(Sliders.relax(drive.hysteresis), rest=np.array(rest))
+            elastic = drive.torque(torsion, *x)
+            potential += sliders.energy(torsion, elastic)
         if drive.friction and self.drive.plugin and self.bristle[1]:
             stretch = float(np.dot(drive.friction_direction, x)) - self.bristle[0]
             potential += 0.5 * drive.friction.stiffness * stretch**2
@@ -107,6 +113,7 @@ class Bench:
         inertia = np.array([self.drive.rotor_inertia, self.drive.link_inertia])
         q, v = self.data.qpos[self.q].copy(), self.data.qvel[self.v].copy()
         state, rest, relaxed = (0.0, 0.0), (0.0,) * len(drive.hysteresis), None
+        limit: tuple[float, ...] = ()
         rubs = []
         for _ in range(steps):
             motion = TwinMotion(
@@ -119,6 +126,7 @@ class Bench:
                 rotor_acceleration=state[0],
                 link_acceleration=state[1],
                 rest=rest,
+                limit=limit,
                 relaxed=relaxed,
             )
             f = scheme_force(drive, motion, timestep=h, damping=self.drive.damping)
@@ -128,7 +136,7 @@ class Bench:
             q = q + h * v
             rates = {"timestep": h, "theta_rate": v[0], "psi_rate": v[1]}
             state = other_acceleration(drive, motion, f, **rates)
-            rest = rest_after(drive, motion, timestep=h)
+            rest, limit = rest_after(drive, motion, f, timestep=h), f.reach
             if drive.friction is not None:
                 relaxed = relax_state(drive, motion, f, **rates)
                 rubs.append(f.friction)

@@ -24,10 +24,16 @@ ELEMENTS = (
 )
 
 
-@pytest.fixture
-def lossy(any_layout: DriveMap) -> DriveMap:
+LOADED = (
+    Jenkin(stiffness=9e4, yield_torque=2.0, yield_curve=((15.0, 5.0), (60.0, 1.0))),
+    Jenkin(stiffness=3e5, yield_torque=0.0, yield_curve=((50.0, 8.0),)),
+)
+
+
+@pytest.fixture(params=[ELEMENTS, LOADED], ids=["constant", "loaded"])
+def lossy(request: pytest.FixtureRequest, any_layout: DriveMap) -> DriveMap:
     """The synthetic map in each layout, with two elements."""
-    return replace(any_layout, hysteresis=ELEMENTS)
+    return replace(any_layout, hysteresis=request.param)
 
 
 def random_motion(b, rng):
@@ -38,10 +44,13 @@ def random_motion(b, rng):
     psi = theta / drive.ratio - torsion
     rates = rng.normal(0, 20), rng.normal(0, 0.5)
     rest = drive.torsion(theta, psi) + 2e-4 * rng.standard_normal(2)
+    limit = np.zeros(b.data.plugin_state.size - 4)
+    if limit.size:
+        limit[:] = rng.uniform(1e-5, 2e-4, 2)
     b.place(theta, psi, *rates)
-    b.data.plugin_state[:] = rng.normal(0, 300), rng.normal(0, 5), *rest
+    b.data.plugin_state[:] = rng.normal(0, 300), rng.normal(0, 5), *rest, *limit
     mujoco.mj_forward(b.model, b.data)
-    return b.motion(rest=tuple(rest))
+    return b.motion(rest=tuple(rest), limit=tuple(limit))
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
@@ -136,7 +145,7 @@ def test_full_equals_native_elements(bench):
 
 
 @pytest.mark.parametrize(
-    "elements", [ELEMENTS, (Jenkin(stiffness=4e5, yield_torque=10.0),)]
+    "elements", [ELEMENTS, LOADED, (Jenkin(stiffness=4e5, yield_torque=10.0),)]
 )
 def test_free_swing_only_loses(bench, synthetic_map, elements):
     """Energy falls from step to step at 1 ms until no element slips any more.
@@ -286,3 +295,85 @@ def test_stiff_sticking_leaves_the_region(bench):
         for drive in (b.drive.drive, DriveMap.linear(2e4))
     ]
     assert steps[0] == pytest.approx(steps[1] / np.sqrt(31), rel=0.1)
+
+
+def test_equal_curves_step_bit_for_bit_as_constants(bench, synthetic_map):
+    """A curve of one value gives the bits of the constant element in every step."""
+    flat = tuple(replace(e, yield_curve=((30.0, e.yield_torque),)) for e in ELEMENTS)
+    ends = []
+    for elements in (ELEMENTS, flat):
+        b = bench(replace(synthetic_map, hysteresis=elements))
+        b.place(0.1, -5e-4, 30.0, 0.5)
+        b.data.qfrc_applied[b.v] = 0.2, -20.0
+        mujoco.mj_step(b.model, b.data, 200)
+        ends.append((b.data.qpos.copy(), b.data.qvel.copy(), b.rest.copy()))
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_loaded_elements_continue_bitwise_from_a_state(bench, synthetic_map):
+    """Copies, also within a step, and a state that is set: the same bits."""
+    b = bench(replace(synthetic_map, hysteresis=LOADED))
+    b.place(0.1, -5e-4, 30.0, 0.5)
+    b.data.qfrc_applied[b.v] = 0.2, -20.0
+    mujoco.mj_step(b.model, b.data, 50)
+    assert b.model.npluginstate == 6 and b.data.plugin_state[4:].min() > 0.0
+    fresh = mujoco.MjData(b.model)
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    mujoco.mj_setState(b.model, fresh, full_state(b, b.data), kind)
+    mujoco.mj_step1(b.model, b.data)
+    twin = copy.copy(b.data)
+    for data in (b.data, twin):
+        mujoco.mj_step2(b.model, data)
+        mujoco.mj_step(b.model, data, 20)
+    mujoco.mj_step(b.model, fresh, 21)
+    np.testing.assert_array_equal(full_state(b, twin), full_state(b, b.data))
+    np.testing.assert_array_equal(full_state(b, fresh), full_state(b, b.data))
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "discrete"])
+def test_observed_torque_is_that_of_the_engine(bench, integrator):
+    """observe() and the engine agree after a step, while the load changes."""
+    element = Jenkin(stiffness=6e4, yield_torque=0.5, yield_curve=((40.0, 5.0),))
+    b = bench(
+        replace(DriveMap.linear(2e4), hysteresis=(element,)),
+        step=1e-7,
+        integrator=integrator,
+    )
+    for x in 2e-3 * np.sin(np.linspace(0.0, 9.0, 200)):
+        b.place(b.drive.ratio * x, 0.0, 0.0, 0.0)
+        mujoco.mj_step(b.model, b.data)
+        b.place(b.drive.ratio * x, 0.0, 0.0, 0.0)
+        mujoco.mj_forward(b.model, b.data)
+        signals = b.drive.observe(b.model, b.data)
+        assert signals.torque == pytest.approx(b.data.qfrc_passive[b.v[1]], abs=1e-4)
+
+
+@pytest.mark.parametrize("text", ["1 0 1", "2 1 2 1 1", "2 0 5 1", "2 0 5 1 -1", "x"])
+def test_bad_yield_curve_is_rejected(text):
+    """A table that does not fit the elements gives an error that names it."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    drive = replace(
+        DriveMap.linear(1e4), hysteresis=(Jenkin(stiffness=1e4, yield_torque=1.0),)
+    )
+    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
+    [instance] = spec.plugins
+    instance.config = {**plugin.config(drive, damping=1.0), "yield_curve": text}
+    with pytest.raises(
+        ValueError, match=naming("'j_drive'", "'yield_curve'", "torques", ">= 0")
+    ):
+        spec.compile()
+
+
+def test_native_takes_the_yield_at_half_the_rated_torque(bench):
+    """A tendon yields at a constant torque; an element without torque there is none."""
+    drive = DriveMap.linear(2e4)  # rated 100 N·m
+    loaded = Jenkin(stiffness=4e4, yield_torque=1.0, yield_curve=((100.0, 3.0),))
+    none = Jenkin(
+        stiffness=4e4, yield_torque=0.0, yield_curve=((60.0, 0.0), (90.0, 1.0))
+    )
+    b = bench(replace(drive, hysteresis=(loaded, none)), level="native")
+    assert b.drive.elements == (Jenkin(stiffness=4e4, yield_torque=2.0),)

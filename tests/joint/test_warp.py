@@ -31,6 +31,10 @@ ELEMENTS = (
     Jenkin(stiffness=1e4, yield_torque=3.0),
     Jenkin(stiffness=3e3, yield_torque=6.0),
 )
+LOADED = (
+    *ELEMENTS,
+    Jenkin(stiffness=5e4, yield_torque=0.0, yield_curve=((8.0, 2.0), (40.0, 0.5))),
+)
 PAIR = """
 <mujoco>
   <option timestep="1e-3" integrator="discrete" gravity="0 0 0"/>
@@ -97,13 +101,14 @@ class Both:
         return [int(j.dofadr[0]) for j in joints]
 
 
-@pytest.fixture(params=["conservative", "slipping", "rubbing"])
+@pytest.fixture(params=["conservative", "slipping", "loaded", "rubbing"])
 def drive(request, synthetic_map: DriveMap, friction_law) -> DriveMap:
     """The synthetic map with side bands, without and with losses, in two layouts."""
     if request.param == "conservative":
         return synthetic_map
-    ring = replace(synthetic_map, layout="flexspline_fixed", hysteresis=ELEMENTS)
-    return ring if request.param == "slipping" else replace(ring, friction=friction_law)
+    elements = LOADED if request.param == "loaded" else ELEMENTS
+    ring = replace(synthetic_map, layout="flexspline_fixed", hysteresis=elements)
+    return replace(ring, friction=friction_law) if request.param == "rubbing" else ring
 
 
 def test_force_direction_and_stiffness_equal_reference(drive):
@@ -129,6 +134,7 @@ def test_force_direction_and_stiffness_equal_reference(drive):
 
     d, h = both.d, float(both.m.opt.timestep.numpy()[0])
     steps, rest = both.call.steps.numpy(), both.call.rest.numpy()
+    count = len(drive.hysteresis)
     tendon = both.plain.tendon(one.tendon).id
     largest = max(abs(t) for t in drive.torque_range)
     knots, crossed, slips = drive.torsion_knots, 0, 0
@@ -138,6 +144,7 @@ def test_force_direction_and_stiffness_equal_reference(drive):
             d.qpos.numpy()[world][q].astype(float),
             d.qvel.numpy()[world][v].astype(float),
         )
+        limits = rest[world][count:]
         want = scheme_force(
             drive,
             TwinMotion(
@@ -149,7 +156,8 @@ def test_force_direction_and_stiffness_equal_reference(drive):
                 link_weight=1 / 0.4,
                 rotor_acceleration=steps[world, 0]["a_rotor"],
                 link_acceleration=steps[world, 0]["a_link"],
-                rest=tuple(rest[world][: len(drive.hysteresis)]),
+                rest=tuple(rest[world][:count]),
+                limit=tuple(np.where(limits > 0, limits, np.inf)),
                 relaxed=steps[world, 0]["relaxed"] if drive.friction else None,
             ),
             timestep=h,

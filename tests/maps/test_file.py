@@ -370,9 +370,9 @@ def test_wrong_headers(synthetic_map, tmp_path):
     header = header_of(data)
     ratings = header["ratings"]
     cases = {
-        ("schema version", "5", "1", "4", "swgjoint map"): {
+        ("schema version", "6", "1", "5", "swgjoint map"): {
             **header,
-            "schema_version": 5,
+            "schema_version": 6,
         },
         ("schema version", "0", "1", "4", "swgjoint map"): {
             **header,
@@ -610,3 +610,18 @@ def test_a_map_that_cannot_be_read_is_not_written(synthetic_map, tmp_path):
     with pytest.raises(InputError, match=naming("'synthetic'", "half a turn")):
         drive.save(tmp_path / "a.swg")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_yield_curves_come_back_and_only_they_change_the_version(synthetic_map):
+    """Elements with a curve return equal; a map without has no trace of the key."""
+    loaded = Jenkin(
+        stiffness=9e4, yield_torque=0.0, yield_curve=((15.0, 5.0), (60.0, 1.0))
+    )
+    plain = Jenkin(stiffness=2e4, yield_torque=2.0)
+    data = map_bytes(replace(synthetic_map, hysteresis=(loaded, plain)))
+    assert map_from_bytes(data, DriveMap).hysteresis == (loaded, plain)
+    assert header_of(data)["schema_version"] == 5
+    assert "yield_curve_Nm" not in header_of(data)["hysteresis"][1]
+    old = header_of(map_bytes(replace(synthetic_map, hysteresis=(plain,))))
+    assert old["schema_version"] == 4
+    assert set(old["hysteresis"][0]) == {"stiffness_Nm_rad", "yield_torque_Nm"}

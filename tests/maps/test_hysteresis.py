@@ -12,12 +12,19 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis
+from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis, stretches
 from swgjoint.maps.sheet.loop import torque_loop
 
 ELEMENTS = (
     Jenkin(stiffness=4e3, yield_torque=2.0),
     Jenkin(stiffness=9e3, yield_torque=0.7),
+)
+
+
+LOADED = (
+    Jenkin(stiffness=4e3, yield_torque=2.0, yield_curve=((10.0, 1.0), (40.0, 5.0))),
+    Jenkin(stiffness=9e3, yield_torque=0.0, yield_curve=((20.0, 3.0),)),
+    Jenkin(stiffness=2e4, yield_torque=0.7),
 )
 
 
@@ -135,3 +142,152 @@ def test_area_of_the_loop_is_the_slip_work(synthetic_map):
     want = sum(4 * e.yield_torque * (X - e.yield_torsion) for e in ELEMENTS)
     # chords of the legs between 80 torques cut the corners where elements slip
     assert area == pytest.approx(want, rel=5e-3)
+
+
+def test_an_empty_curve_is_a_constant_bit_for_bit():
+    """Without a yield curve the elastic torque changes no bit of the law."""
+    rng = np.random.default_rng(4)
+    x, elastic = 1e-3 * rng.standard_normal(300), 50.0 * rng.standard_normal(300)
+    want = sum(
+        e.stiffness * stretches(x, e.yield_torque / e.stiffness) for e in ELEMENTS
+    )
+    np.testing.assert_array_equal(play_hysteresis(ELEMENTS, x, elastic), want)
+    flat = tuple(replace(e, yield_curve=((30.0, e.yield_torque),)) for e in ELEMENTS)
+    np.testing.assert_array_equal(play_hysteresis(flat, x, elastic), want)
+    sliders = Sliders.relax(ELEMENTS).move_to(1e-3, 40.0)
+    np.testing.assert_array_equal(
+        sliders.rest, Sliders.relax(ELEMENTS).move_to(1e-3).rest
+    )
+
+
+def test_one_element_under_a_load_ramp():
+    """Beside a spring K, f = f0 + c|T|: loads and unloads on lines known in advance.
+
+    From rest the element sticks with k until k x = f0 + c K x, then carries f. After
+    the reversal at X it sticks until its torque is -f, then follows -f back to zero.
+    """
+    K, k, f0, c, X = 1e4, 4e4, 1.0, 0.25, 4e-3
+    element = Jenkin(
+        stiffness=k, yield_torque=f0, yield_curve=((2 * K * X, f0 + c * 2 * K * X),)
+    )
+    up = np.linspace(0.0, X, 401)
+    x = np.concatenate([up, up[-2::-1]])
+    q = play_hysteresis([element], x, K * x)
+    on, yields = f0 / (k - c * K), f0 + c * K * x
+    loaded = np.where(up < on, k * up, yields[:401])
+    np.testing.assert_allclose(q[:401], loaded, rtol=0, atol=1e-12 * K * X)
+    back = x[401:]
+    stuck = f0 + c * K * X - k * (X - back)
+    np.testing.assert_allclose(
+        q[401:], np.maximum(stuck, -yields[401:]), rtol=0, atol=1e-9 * K * X
+    )
+    assert q[-1] == pytest.approx(-f0, rel=1e-9)
+
+
+def test_a_shrinking_yield_slips_back():
+    """Without torsion, an unloading drive takes the torque that an element may keep."""
+    element = Jenkin(stiffness=1e4, yield_torque=1.0, yield_curve=((50.0, 6.0),))
+    sliders = Sliders.relax([element]).move_to(5e-4, 50.0)
+    assert float(sliders.torque(5e-4, 50.0)) == 5.0
+    back = sliders.move_to(5e-4, 10.0)
+    assert float(back.torque(5e-4, 10.0)) == pytest.approx(2.0)
+    # what it lost does not come back with the load
+    assert float(back.torque(5e-4, 50.0)) == pytest.approx(2.0)
+    assert float(back.energy(5e-4, 50.0)) < float(sliders.energy(5e-4, 50.0))
+
+
+def test_no_cycle_of_torsion_and_load_gains_work():
+    """2000 random histories: stored energy >= 0, loss >= 0, and no cycle gains work.
+
+    Torsion and elastic torque are independent here, as for angles that turn. A step
+    adapts the yield torque, then moves the torsion, as the scheme of the joint does.
+    """
+    rng = np.random.default_rng(5)
+    for _ in range(2000):
+        count = int(rng.integers(1, 5))
+        elements = [
+            Jenkin(
+                stiffness=float(10 ** rng.uniform(2, 5)),
+                yield_torque=float(rng.uniform(0, 5)),
+                yield_curve=tuple(
+                    zip(
+                        np.sort(rng.uniform(1, 80, 3)).tolist(),
+                        rng.uniform(0, 10, 3).tolist(),
+                        strict=True,
+                    )
+                ),
+            )
+            for _ in range(count)
+        ]
+        n = 40
+        x = 2e-3 * rng.standard_normal(n) * rng.choice([0.1, 1.0])
+        load = 60.0 * rng.standard_normal(n)
+        x, load = np.tile(x, 3), np.tile(load, 3)  # a cycle, run three times
+        k = np.array([e.stiffness for e in elements])
+        rest, here, work, stored = np.zeros(count), 0.0, [], []
+        for to, torque in zip(x, load, strict=True):
+            reach = np.array([float(e.reach(torque)) for e in elements])
+            begin = np.clip(here - rest, -reach, reach)
+            before = 0.5 * k @ begin**2
+            assert not stored or before <= stored[-1] * (1 + 1e-12)
+            end = np.clip(begin + to - here, -reach, reach)
+            sticks = end - begin
+            step = k @ (0.5 * (begin + end) * sticks + end * (to - here - sticks))
+            after = 0.5 * k @ end**2
+            assert step - (after - before) >= -1e-12 * (after + before + abs(step))
+            rest, here = to - end, to
+            work.append(step)
+            stored.append(after)
+        total = np.cumsum(work)
+        scale = 1e-9 * (np.abs(total).max() + max(stored))
+        assert min(stored) >= 0.0 and total.min() >= -scale
+        # the last round starts and ends in the same state
+        assert total[-1] - total[2 * n - 1] >= stored[-1] - stored[2 * n - 1] - scale
+
+
+def test_tangent_follows_the_yield_torque():
+    """The derivative of the total torque with slipping, loaded elements."""
+    K = 8e3
+    sliders = Sliders.relax(LOADED).move_to(2e-3, K * 2e-3).move_to(1.2e-3, K * 1.2e-3)
+    for x in (-2.1e-3, -7e-4, 4e-4, 1.7e-3, 2.6e-3):
+        d = 1e-9
+        high, low = (float(sliders.torque(y, K * y)) for y in (x + d, x - d))
+        got = float(sliders.tangent(x, K * x, K))
+        assert got == pytest.approx((high - low) / (2 * d), abs=1e-2)
+
+
+def test_loop_widens_with_the_load(synthetic_map):
+    """The standard loop of a map whose yield grows is wider under load, and closed."""
+    element = Jenkin(stiffness=2e5, yield_torque=0.5, yield_curve=((60.0, 6.0),))
+    drive = replace(DriveMap.linear(2e4), hysteresis=(element,))
+    loop = torque_loop(drive)
+    width = loop.branch([0.0, 60.0], rising=False) - loop.branch(
+        [0.0, 60.0], rising=True
+    )
+    # T is spring plus element: at T = 0 the spring carries -+f
+    c = 5.5 / 60.0
+    low = 2 * (0.5 / (1 - c)) / 2e4  # falling: K x = f(K x), rising: the opposite
+    assert width[0] == pytest.approx(low, rel=1e-3)
+    rising, falling = (60.0 - 0.5) / (1 + c), (60.0 + 0.5) / (1 - c)
+    # beyond 60 N·m the yield torque is constant
+    falling = falling if falling < 60.0 else 66.0
+    assert width[1] == pytest.approx((falling - rising) / 2e4, rel=1e-3)
+
+
+def test_yields_that_change_too_fast_are_refused():
+    """Slopes of 1 in all, or above k/K of one element, have no unique torque."""
+    steep = Jenkin(stiffness=1e6, yield_torque=0.0, yield_curve=((10.0, 6.0),))
+    with pytest.raises(InputError, match=naming("'linear'", "slopes", "1.2")):
+        replace(DriveMap.linear(2e4), hysteresis=(steep, steep))
+    soft = replace(steep, stiffness=1e4)
+    with pytest.raises(InputError, match=naming("1e+04 N·m/rad", "0.6", "1.2e+04")):
+        replace(DriveMap.linear(2e4), hysteresis=(soft,))
+
+
+@pytest.mark.parametrize(
+    "curve", [((0.0, 1.0),), ((2.0, 1.0), (1.0, 1.0)), ((1.0, -1.0),), ((1.0,),)]
+)
+def test_curves_that_cannot_be(curve):
+    """Points are pairs of numbers >= 0 at increasing torques."""
+    with pytest.raises(InputError, match=naming("yield_curve", "N·m", "accepted")):
+        Jenkin(stiffness=1.0, yield_torque=1.0, yield_curve=curve)

@@ -29,7 +29,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from swgjoint.arrays import frozen_array
-from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.equilibrium import move_sliders, output_angle
 from swgjoint.maps.fit.torsion_fit import FAINT
 from swgjoint.maps.hysteresis import Jenkin, Sliders, stretches
 from swgjoint.maps.potential import Potential
@@ -237,7 +237,7 @@ def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
     for begin, end in pairwise([0, *turns.tolist(), loop.torque.size - 1]):
         leg = slice(begin + 1, end + 1)
         psi[leg] = output_angle(drive, theta, loop.torque[leg], sliders)
-        sliders = sliders.move_to(float(drive.torsion(theta, psi[end])))
+        sliders = move_sliders(drive, sliders, theta, float(psi[end]))
     elastic = output_angle(replace(drive, hysteresis=()), theta, loop.torque)
     ideal = theta / drive.ratio
     x = drive.torsion(theta, elastic)

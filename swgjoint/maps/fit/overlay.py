@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.equilibrium import move_sliders, output_angle
 from swgjoint.maps.fit.loop_match import readings
-from swgjoint.maps.hysteresis import Sliders
+from swgjoint.maps.hysteresis import Sliders, total_yield
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import NO_WIDTH, REST, TorqueLoop
 from swgjoint.typing import Array
@@ -217,7 +217,7 @@ def _played(
         for begin, end in measured.turns():
             leg = slice(begin, end + 1)
             psi[leg] = output_angle(drive, theta, torque[leg], sliders)
-            sliders = sliders.move_to(float(drive.torsion(theta, psi[end])))
+            sliders = move_sliders(drive, sliders, theta, float(psi[end]))
         rounds.append(free - psi)
     return rounds[0], rounds[1]
 
@@ -262,9 +262,9 @@ def _shift(measured: TorqueLoop, predicted: TorqueLoop, top: float) -> float:
 def _beyond(drive: Potential, measured: TorqueLoop) -> bool:
     """Whether a record exceeds the torques of the map, including its hysteresis."""
     low, high = drive.torque_range
-    slipping = sum(element.yield_torque for element in drive.hysteresis)
+    low -= total_yield(drive.hysteresis, low)
+    high += total_yield(drive.hysteresis, high)
     reach = 1.0 + 1e-6
     return bool(
-        measured.torque.max() > reach * (high + slipping)
-        or measured.torque.min() < reach * (low - slipping)
+        measured.torque.max() > reach * high or measured.torque.min() < reach * low
     )

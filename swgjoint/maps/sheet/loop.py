@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.catalogue import CatalogueRow
 from swgjoint.gear.ratings import Ratings
-from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.equilibrium import move_sliders, output_angle
 from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
@@ -174,7 +174,7 @@ def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
     parts: list[Array] = []
     for leg in legs * (2 if drive.hysteresis else 1):
         psi = output_angle(drive, theta, leg, sliders)
-        sliders = sliders.move_to(float(drive.torsion(theta, psi[-1])))
+        sliders = move_sliders(drive, sliders, theta, float(psi[-1]))
         parts.append(float(free) - psi)
     torque = np.concatenate(legs)
     torque[np.abs(torque) == side] = 0.0

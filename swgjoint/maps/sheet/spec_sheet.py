@@ -14,6 +14,7 @@ import numpy as np
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.hysteresis import total_yield
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,
@@ -375,8 +376,8 @@ def validity(drive: Potential) -> dict[str, Any]:
     and friction; figures of the loop exclude friction.
     """
     low, high = drive.torque_range
-    slipping = sum(element.yield_torque for element in drive.hysteresis)
-    low, high = low - slipping, high + slipping
+    low -= total_yield(drive.hysteresis, low)
+    high += total_yield(drive.hysteresis, high)
     top = largest_torque(drive.ratings)
     reach = 1.0 + 1e-6
     return {

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.faults import Section
 from swgjoint.joint.prescribed import ratio_variation
 from swgjoint.joint.step_damping import StepMode, step_mode
+from swgjoint.maps.hysteresis import vary_with_load
 from swgjoint.units import hertz
 
 if TYPE_CHECKING:
@@ -248,6 +249,9 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
         items.append({"part": part, "reason": lossless})
+    if attached.level == "native" and vary_with_load(attached.drive.hysteresis):
+        part = "change of the hysteresis with the load"
+        items.append({"part": part, "reason": "no native form"})
     if count := transmission.drive.info.get("hysteresis_left_out"):
         part = f"hysteresis ({count} elements)"
         items.append({"part": part, "reason": "joints.*.hysteresis = false"})

@@ -8,7 +8,8 @@ one thread per drive and world.
 import warp as wp
 
 from swgjoint.joint import plugin
-from swgjoint.joint.warp_potential import (
+from swgjoint.joint.warp.hysteresis import relax, slip
+from swgjoint.joint.warp.potential import (
     HALF,
     ONE,
     ZERO,
@@ -17,7 +18,6 @@ from swgjoint.joint.warp_potential import (
     WarpDrive,
     real,
     secant_over,
-    slip,
 )
 
 _SPRING, _, _CUBIC = plugin.TENDON_STIFFNESS
@@ -60,6 +60,8 @@ class WarpStep:
     force: real
     metric: real
     torsion: real
+    elastic: real
+    """Mean elastic torque [N·m]."""
     a_rotor: real
     """Rotor acceleration by all other forces, ``a_link`` likewise [rad/s²]."""
     a_link: real
@@ -250,7 +252,7 @@ def law(
         qvel: Velocities. Shape (worlds, nv).
         ten_velocity: Tendon velocities. Shape (worlds, ntendon).
         steps: State that the evaluations pass on. Shape (worlds, drives).
-        rest: Torsions at which the hysteresis elements are relaxed [rad].
+        rest: State of the hysteresis elements, see :mod:`.hysteresis` [rad].
         ten_J: Tendon Jacobians; gets the direction.
         ten_length: Tendon lengths; get the stiffness.
         qfrc_passive: Passive forces; get the force. Shape (worlds, nv).
@@ -278,16 +280,14 @@ def law(
             last.known = 1
         last.a_rotor = rm / h + last.w_rotor * on_rotor
         last.a_link = rl / h + last.w_link * on_link
-        for j in range(drive.element, drive.element + drive.elements):
-            low = last.torsion - maps.element[j, 1]
-            high = last.torsion + maps.element[j, 1]
-            rest[world, j] = wp.clamp(rest[world, j], low, high)
+        relax(drive, maps, world, last.torsion, last.elastic, rest)
     if time[world] < last.time:
         last.a_rotor = ZERO
         last.a_link = ZERO
         last.known = 0
         for j in range(drive.element, drive.element + drive.elements):
             rest[world, j] = ZERO
+            rest[world, maps.element.shape[0] + j] = ZERO
 
     # remove the torque of the tendon's native spring, which the engine has applied
     length = real(ten_length[world, drive.tendon])
@@ -320,8 +320,10 @@ def law(
         s = secant_over(
             drive, maps, theta, psi, h * (vm + HALF * dm), h * (vl + HALF * dl)
         )
+        last.elastic = s.torque
         for j in range(drive.element, drive.element + drive.elements):
-            s = slip(s, maps.element[j, 0], maps.element[j, 1], rest[world, j])
+            limit = rest[world, maps.element.shape[0] + j]
+            s = slip(s, drive, maps, j, last.elastic, rest[world, j], limit)
         k = wp.max(ZERO, HALF * (s.k0 + s.k1))
         w = s.g_theta * s.g_theta * wm + s.g_psi * s.g_psi * wl
         ka = h * h * k * w

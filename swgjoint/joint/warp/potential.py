@@ -45,6 +45,9 @@ class WarpDrive:
     element: int
     """Index of the first hysteresis element; ``elements`` is their number."""
     elements: int
+    curve: int
+    """Index of the first point of the yield curves; ``curves`` is their number."""
+    curves: int
     ratio: real
     """Signed ratio i [-]."""
     damping: real
@@ -120,7 +123,10 @@ class Maps:
     row: wp.array(dtype=vec5)
     """Polynomials A and B (factors of cosine and sine), see :class:`WarpDrive`."""
     element: wp.array2d(dtype=real)
-    """Stiffness [N·m/rad] and yield torsion [rad] of each hysteresis element."""
+    """Stiffness [N·m/rad] and yield torsion without load [rad] of each hysteresis
+    element, then the first and the end index of its yield curve."""
+    curve: wp.array2d(dtype=real)
+    """Points of the yield curves: elastic torque [N·m] and yield torsion [rad]."""
 
 
 @wp.func
@@ -323,26 +329,3 @@ def secant_over(
     out.e_theta = HALF * (value(sums.by_theta, d0) + value(last.by_theta, d1))
     out.e_psi = HALF * (value(sums.by_psi, d0) + value(last.by_psi, d1))
     return out
-
-
-@wp.func
-def slip(s: Secant, stiffness: real, reach: real, rest: real):
-    """Secant with the mean torque of one hysteresis element over the step added.
-
-    Args:
-        s: Secant to which the element is added.
-        stiffness: Stiffness of the element [N·m/rad].
-        reach: Yield torsion of the element [rad].
-        rest: Torsion at which the element is relaxed [rad].
-    """
-    begin = wp.clamp(s.begin - rest, -reach, reach)
-    free = begin + s.change
-    end = wp.clamp(free, -reach, reach)
-    sticks = real(1.0)
-    if end != free:
-        sticks = (end - begin) / s.change
-    s.torque += stiffness * (HALF * (begin + end) * sticks + end * (ONE - sticks))
-    s.slope += HALF * stiffness * sticks * sticks
-    s.k0 += stiffness * sticks
-    s.k1 += stiffness * sticks
-    return s

@@ -39,8 +39,8 @@ from swgjoint.maps.drive_map import DriveMap
 try:
     import warp as wp
 
-    from swgjoint.joint.warp_law import WarpStep, factor_mass_matrix, law, respond
-    from swgjoint.joint.warp_potential import Maps, WarpDrive, real, vec5
+    from swgjoint.joint.warp.law import WarpStep, factor_mass_matrix, law, respond
+    from swgjoint.joint.warp.potential import Maps, WarpDrive, real, vec5
 except ImportError as error:
     raise MissingExtraError(
         "drives in MuJoCo Warp need mujoco-warp: pip install 'swgjoint[warp]'"
@@ -76,6 +76,7 @@ class WarpDrives:
             "segment": [],
             "row": [],
             "element": [],
+            "curve": [],
         }
         for drive in drives:
             one = _place(model, drive)
@@ -93,7 +94,7 @@ class WarpDrives:
                 setattr(self.maps, key, array)
             self.drives = wp.array(rows, dtype=WarpDrive)
             elements = sum(len(part) for part in parts["element"])
-            self.rest = wp.zeros((worlds, max(elements, 1)), dtype=real)
+            self.rest = wp.zeros((worlds, max(2 * elements, 1)), dtype=real)
             unknown = WarpStep()
             unknown.time = float("inf")  # treated as a reset
             self.steps = wp.full((worlds, len(rows)), unknown, dtype=WarpStep)
@@ -218,6 +219,7 @@ def _arrays(drive: DriveMap) -> dict[str, np.ndarray]:
     for power in (0, 1):
         ends[..., power] = drive.coefficients(knots[[0, -1]], power)
     ends[..., 2] = 0.5 * np.moveaxis(drive.end_stiffness, 2, 0)
+    points = np.cumsum([len(element.yield_curve) for element in drive.hysteresis])
     return {
         "harmonic": np.column_stack(
             [drive.angle_orders.astype(float), drive.kinematic_error]
@@ -231,6 +233,12 @@ def _arrays(drive: DriveMap) -> dict[str, np.ndarray]:
         ),
         "row": np.concatenate([ends[:1], inside, ends[1:]]).reshape(-1, 5),
         "element": np.array(
-            [(e.stiffness, e.yield_torsion) for e in drive.hysteresis]
+            [
+                (e.stiffness, e.yield_torsion, end - len(e.yield_curve), end)
+                for e, end in zip(drive.hysteresis, points, strict=True)
+            ]
+        ).reshape(-1, 4),
+        "curve": np.array(
+            [(at, f / e.stiffness) for e in drive.hysteresis for at, f in e.yield_curve]
         ).reshape(-1, 2),
     }
