@@ -100,7 +100,13 @@ def _with_friction(
     """The map with hysteresis from tooth friction, or the reason why it has none."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
-        loops = friction_loops(design, top=top, progress=progress, keep=keep)
+        loops = friction_loops(
+            design,
+            top=top,
+            rated=drive.ratings.rated_torque,
+            progress=progress,
+            keep=keep,
+        )
     except ComputationError as failure:
         reason = f"friction of the teeth gives no hysteresis: {failure}"
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}

@@ -20,6 +20,7 @@ from swgjoint.fe.plane.figures.friction_loop import (
     FIRST_STEPS,
     friction_loops,
     loop_torques,
+    small_loop_torques,
 )
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.fit import fit_map
@@ -53,6 +54,18 @@ def test_path_ends_with_a_round():
     assert torque[0] == 0.0 and torque[-1] == torque[-33] == TOP
     assert torque.max() == -torque.min() == TOP
     np.testing.assert_array_equal(torque[-33:-16][::-1], torque[-17:])
+
+
+def test_small_loops_follow_from_the_top_downwards():
+    """Means top - a, rated, half and zero, each run twice; larger ones are left out."""
+    path = np.concatenate([[TOP], *small_loop_torques(TOP, 16.0)])
+    for mean, end in ((36.0, 33), (16.0, 69), (8.0, 105), (0.0, 141)):
+        last = path[end - 17 : end]
+        assert (
+            last.min() == mean - 4.0 and last.max() == last[0] == last[-1] == mean + 4.0
+        )
+        np.testing.assert_array_equal(last, path[end - 33 : end - 16])
+    assert len(small_loop_torques(TOP, TOP)) == 3
 
 
 def test_a_loop_that_is_kept_is_not_solved_again(monkeypatch, tmp_path):

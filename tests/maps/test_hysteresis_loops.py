@@ -10,13 +10,9 @@ from messages import naming
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit.hysteresis_loops import (
-    REACHES,
-    FrictionLoop,
-    fit_elements,
-    played_loop,
-    with_hysteresis,
-)
+from swgjoint.maps.fit.friction_loop import FrictionLoop
+from swgjoint.maps.fit.hysteresis_elements import REACHES, fit_elements
+from swgjoint.maps.fit.hysteresis_loops import played_loop, with_hysteresis
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.units import arcmin
 
@@ -75,7 +71,7 @@ def test_elements_come_back(synthetic_map):
     given = elements(synthetic_map, (2.0, REACHES[8]), (5.0, REACHES[5]))
     drive = replace(synthetic_map, hysteresis=given)
     loops = [rubbed(drive, theta) for theta in (0.0, 0.02)]
-    found = fit_elements(loops)
+    found = fit_elements(loops, synthetic_map.max_stiffness)
     for loop in loops:
         back = played_loop(replace(drive, hysteresis=found), loop)
         # friction takes 1 % of the travel, and the grid of yield torsions with it
@@ -88,7 +84,7 @@ def test_no_friction_no_elements(synthetic_map):
     """Loops of a conservative drive have no width and give no elements."""
     loop = blank(synthetic_map, 0.1)
     assert np.abs(loop.width).max() < 1e-15 and loop.friction_work == 0.0
-    assert fit_elements([replace(loop, torsion=loop.elastic_torsion)]) == ()
+    assert fit_elements([replace(loop, torsion=loop.elastic_torsion)], 1e5) == ()
 
 
 def test_sticking_teeth_stiffen_without_loss(synthetic_map):
@@ -96,7 +92,7 @@ def test_sticking_teeth_stiffen_without_loss(synthetic_map):
     drive = replace(synthetic_map, hysteresis=elements(synthetic_map, (5.0, 1.0)))
     loop = rubbed(drive)
     assert np.abs(loop.width).max() < 1e-12 and np.abs(loop.shift).max() > 1e-5
-    found = replace(drive, hysteresis=fit_elements([loop]))
+    found = replace(drive, hysteresis=fit_elements([loop], synthetic_map.max_stiffness))
     back = played_loop(found, loop)
     assert np.abs(back.width).max() < 0.01 * np.abs(loop.shift).max()
     assert back.shift == pytest.approx(loop.shift, abs=0.02 * np.abs(loop.shift).max())
@@ -127,3 +123,70 @@ def test_round_of_unequal_branches_is_refused(synthetic_map):
     loop = blank(synthetic_map, 0.1)
     with pytest.raises(ValueError, match=naming("217", "torques", "24 steps")):
         replace(loop, torque=np.linspace(-1.0, 1.0, loop.torque.size))
+
+
+def small(
+    drive: DriveMap, theta: float, means: tuple[float, ...]
+) -> list[FrictionLoop]:
+    """Small loops of 8 N·m about several torques, which follow the large loop."""
+    part = np.arange(1, 9) / 4
+    once = np.concatenate([1.0 - part, part - 1.0])
+    torque = path(90.0)
+    loops = []
+    for mean in means:
+        approach = np.linspace(torque[-1], mean + 8.0, 5)[1:]
+        torque = np.concatenate([torque, approach, *[mean + 8.0 * once] * 2])
+        bare = replace(drive, hysteresis=())
+        psi = output_angle(bare, theta, torque)
+        x = drive.torsion(theta, psi)
+        one = FrictionLoop(
+            input_angle=theta,
+            quarter=4,
+            torque=torque,
+            torsion=theta / drive.ratio - psi,
+            elastic_torsion=theta / drive.ratio - psi,
+            stiffness=drive.stiffness(x, theta, psi),
+            work=np.zeros(torque.size),
+        )
+        loops.append(played_loop(drive, one))
+    return loops
+
+
+def test_yields_that_grow_with_the_load_come_back(synthetic_map):
+    """Narrow in the middle, wide under load: the fit follows, constants do not."""
+    (base,) = elements(synthetic_map, (2.0, REACHES[10]))
+    element = Jenkin(
+        stiffness=4.0 * base.stiffness, yield_torque=1.0, yield_curve=((90.0, 7.0),)
+    )
+    drive = replace(synthetic_map, hysteresis=(element,))
+    loops = [rubbed(drive), *small(drive, 0.1, [50.0, 0.0])]
+    found = fit_elements(loops, synthetic_map.max_stiffness)
+    back = [played_loop(replace(drive, hysteresis=found), one) for one in loops]
+    widest = loops[0].width.max()
+    for one, other in zip(back, loops, strict=True):
+        # the grids of yield torsions and torques do not contain the element
+        assert np.abs(one.width - other.width).max() < 0.08 * widest
+    assert back[0].area == pytest.approx(loops[0].area, rel=0.02)
+    assert back[0].loss == pytest.approx(loops[0].loss, rel=0.1)
+    plain = tuple(e for e in found if not e.yield_curve)
+    assert sum(float(e.yields(90.0)) for e in plain) < 0.3 * 7.0
+
+
+def test_small_loops_are_compared_by_their_torque(synthetic_map):
+    """The report has one row per mean torque, averaged over the positions."""
+    given = elements(synthetic_map, (4.0, REACHES[8]))
+    drive = replace(synthetic_map, hysteresis=given)
+    loops = []
+    for theta in (0.0, 0.02):
+        loops += [rubbed(drive, theta), *small(drive, theta, [50.0, 0.0])]
+    loops = [
+        replace(one, work=np.linspace(0.0, one.area, one.torque.size)) for one in loops
+    ]
+    report = with_hysteresis(synthetic_map, loops).info["friction_loop"]
+    assert len(report["hysteresis_loss_arcmin"]) == 2
+    zero, half = report["small_loops"]
+    assert (zero["mean_torque_Nm"], half["mean_torque_Nm"]) == (0.0, 50.0)
+    for row in (zero, half):
+        assert row["amplitude_Nm"] == pytest.approx(8.0)
+        assert row["width_map_arcmin"] == pytest.approx(row["width_arcmin"], rel=0.1)
+        assert row["round_area_map_J"] == pytest.approx(row["round_area_J"], rel=0.1)

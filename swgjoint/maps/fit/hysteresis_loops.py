@@ -6,165 +6,29 @@ without friction provides the torsion :math:`x_0(T)`, whose inverse is the torqu
 
 .. math:: R = T - T_0(x), \qquad \oint R\,dx = \oint T\,dx = \text{work of friction},
 
-is the target of the fit of Jenkin elements. For a given yield torsion, the torque of an
-element is its yield torque times a known signal, so the yield torques follow from a
-non-negative least-squares problem. Samples are weighted with the torsion between them.
-An element that slips throughout then takes the mean of R and thereby dissipates the
-work of friction in a round.
-
-Elements yield at a constant torque, whereas tooth friction varies with the load and the
-sliding of the teeth. The loop of tooth friction may be narrower in the middle than
-under load. Parallel elements cannot reproduce this: their loop is then too wide in the
-middle and too narrow elsewhere. The report states the differences.
+is the target of the fit of Jenkin elements; see
+:mod:`swgjoint.maps.fit.hysteresis_elements`. The report compares the loops of the map
+with those of the finite elements.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
-from swgjoint.arrays import frozen_array
 from swgjoint.maps.equilibrium import move_sliders, output_angle
-from swgjoint.maps.fit.torsion_fit import FAINT
-from swgjoint.maps.hysteresis import Jenkin, Sliders, stretches
+from swgjoint.maps.fit.friction_loop import FrictionLoop
+from swgjoint.maps.fit.hysteresis_elements import fit_elements, is_large
+from swgjoint.maps.hysteresis import Sliders, total_yield
 from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 Map = TypeVar("Map", bound=Potential)
-
-REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
-"""Yield torsions of the candidate elements as fractions of the travel [-], from 1 to
-0.1 %. An element with 1 always sticks, like teeth that do not slide and thereby stiffen
-a drive."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FrictionLoop:
-    """Torque loop with locked input, from the first loading to a closed round.
-
-    The last round is T -> 0 -> -T -> 0 -> T. When it begins, the first loading no
-    longer affects the drive.
-    """
-
-    input_angle: float
-    """Locked input angle theta [rad]."""
-    quarter: int
-    """Number n of steps in each quarter of the last round."""
-    torque: Array
-    """Torque T along the path, at least 4 n + 1 values [N·m]. Shape (n_points,)."""
-    torsion: Array
-    """Torsion theta/i - psi with friction [rad]. Shape (n_points,)."""
-    elastic_torsion: Array
-    """Torsion without friction at the same torques [rad]. Shape (n_points,)."""
-    stiffness: Array
-    """Tangent stiffness dT/dx without friction [N·m/rad]. Shape (n_points,)."""
-    work: Array
-    """Work of friction since the start [J]. Shape (n_points,)."""
-
-    def __post_init__(self) -> None:
-        torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
-        falling, rising = self.branches(torque)
-        if rising.size != 2 * self.quarter + 1 or (falling != rising).any():
-            raise ValueError(
-                f"{torque.size} torques do not end with a round of equal branches, in"
-                f" quarters of {self.quarter} steps"
-            )
-        object.__setattr__(self, "torque", torque)
-        for key, unit in (
-            ("torsion", "rad"),
-            ("elastic_torsion", "rad"),
-            ("stiffness", "N·m/rad"),
-            ("work", "J"),
-        ):
-            values = frozen_array(
-                getattr(self, key), f"{key} [{unit}]", shape=(torque.size,)
-            )
-            object.__setattr__(self, key, values)
-
-    @property
-    def round(self) -> slice:
-        """The last round, closed, from T to T."""
-        return slice(-4 * self.quarter - 1, None)
-
-    def branches(self, values: Array) -> tuple[Array, Array]:
-        """Values of the falling and the rising branch, both from -T to T (2 n + 1,)."""
-        n = self.quarter
-        last = values[self.round]
-        return last[: 2 * n + 1][::-1], last[2 * n :]
-
-    @property
-    def width(self) -> Array:
-        """Torsion of the falling minus that of the rising branch (2 n + 1,) [rad]."""
-        falling, rising = self.branches(self.torsion)
-        return np.asarray(falling - rising)
-
-    @property
-    def shift(self) -> Array:
-        """Mid-line minus the torsion without friction (2 n + 1,) [rad]."""
-        falling, rising = self.branches(self.torsion - self.elastic_torsion)
-        return np.asarray(0.5 * (falling + rising))
-
-    @property
-    def loss(self) -> float:
-        """Full width at zero torque [rad]."""
-        return float(self.width[self.quarter])
-
-    @property
-    def area(self) -> float:
-        """Work of the round, the integral of T dx [J]."""
-        return float(np.trapezoid(self.torque[self.round], self.torsion[self.round]))
-
-    @property
-    def friction_work(self) -> float:
-        """Work of friction over the round [J]."""
-        return float(np.ptp(self.work[self.round]))
-
-    @property
-    def gap(self) -> float:
-        """Torsion at the end of the round minus that at its start [rad]."""
-        return float(self.torsion[-1] - self.torsion[self.round][0])
-
-    @property
-    def friction_torque(self) -> Array:
-        """R = T - T_0(x) along the path (n_points,) [N·m]."""
-        torque, place = np.unique(self.torque, return_index=True)
-        # friction shifts x only slightly, so interpolation by value and slope suffices
-        elastic = CubicHermiteSpline(
-            self.elastic_torsion[place], torque, self.stiffness[place]
-        )
-        return np.asarray(self.torque - elastic(self.torsion))
-
-
-def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
-    """Jenkin elements fitted to the friction torque, one set for all positions."""
-    from scipy.optimize import nnls
-
-    travel = max(float(np.ptp(loop.torsion)) for loop in loops)
-    reaches = REACHES * travel
-    rows, wanted = [], []
-    for loop in loops:
-        path = loop.torsion - loop.torsion[0]
-        signals = np.column_stack([stretches(path, d) / d for d in reaches])
-        step = np.abs(np.gradient(path))[loop.round]
-        weight = np.sqrt(step / step.sum())
-        rows.append(weight[:, None] * signals[loop.round])
-        wanted.append(weight * loop.friction_torque[loop.round])
-    target = np.concatenate(wanted)
-    unit = float(np.abs(target).max())
-    if unit == 0.0:
-        return ()
-    yields = unit * nnls(np.concatenate(rows), target / unit)[0]
-    return tuple(
-        Jenkin(stiffness=float(f / d), yield_torque=float(f))
-        for f, d in zip(yields, reaches, strict=True)
-        if f > FAINT * yields.sum()
-    )
 
 
 def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
@@ -172,9 +36,13 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
 
     Args:
         drive: The map of the drive without friction.
-        loops: Loops with friction, at representative input positions.
+        loops: Loops with friction, at representative input positions: large loops to
+            one torque and, if there are any, small loops.
     """
-    fitted = replace(drive, hysteresis=fit_elements(loops))
+    elements = fit_elements(loops, drive.max_stiffness)
+    fitted = replace(drive, hysteresis=elements)
+    small = small_loops(fitted, [loop for loop in loops if not is_large(loop)])
+    loops = [loop for loop in loops if is_large(loop)]
     width = np.array([loop.width for loop in loops])
     shift = np.array([loop.shift for loop in loops])
     played = [played_loop(fitted, loop) for loop in loops]
@@ -203,8 +71,13 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         "round_area_J": [loop.area for loop in loops],
         "round_area_map_J": taken.tolist(),
         "not_closed_arcmin": float(max(abs(loop.gap) for loop in loops) / arcmin),
+        "torques_Nm": grid.tolist(),
+        "widths_arcmin": (width.mean(axis=0) / arcmin).tolist(),
+        "widths_map_arcmin": (widths.mean(axis=0) / arcmin).tolist(),
+        "small_loops": small,
         "elements": len(fitted.hysteresis),
-        "yield_torque_Nm": float(sum(e.yield_torque for e in fitted.hysteresis)),
+        "yield_torque_Nm": total_yield(fitted.hysteresis, 0.0),
+        "yield_torque_at_end_Nm": total_yield(fitted.hysteresis, float(grid[-1])),
     }
     mean, low, high = loss.mean(), loss.min(), loss.max()
     widest = report["widest_arcmin"]
@@ -218,6 +91,35 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
     )
     info = {**drive.info, "friction_loop": report, "hysteresis": label}
     return replace(fitted, info=info)
+
+
+def small_loops(
+    drive: Potential, loops: Sequence[FrictionLoop]
+) -> list[dict[str, float]]:
+    """Width and area of small loops, computed and of a map, as means over positions.
+
+    Args:
+        drive: The map.
+        loops: Small loops; those about the same torque belong together.
+    """
+    rows = []
+    for mean in sorted({loop.mean_torque for loop in loops}):
+        some = [loop for loop in loops if loop.mean_torque == mean]
+        played = [played_loop(drive, loop) for loop in some]
+        rows.append(
+            {
+                "mean_torque_Nm": mean,
+                "amplitude_Nm": float(some[0].branches(some[0].torque)[1][-1] - mean),
+                "width_arcmin": float(np.mean([one.loss for one in some]) / arcmin),
+                "width_map_arcmin": float(
+                    np.mean([one.loss for one in played]) / arcmin
+                ),
+                "friction_work_J": float(np.mean([one.friction_work for one in some])),
+                "round_area_J": float(np.mean([one.area for one in some])),
+                "round_area_map_J": float(np.mean([one.area for one in played])),
+            }
+        )
+    return rows
 
 
 def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:

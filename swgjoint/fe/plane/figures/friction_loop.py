@@ -17,7 +17,7 @@ from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 from swgjoint.gear.mounting import series_compliance
-from swgjoint.maps.fit.hysteresis_loops import FrictionLoop
+from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
@@ -32,6 +32,12 @@ STEPS = 12
 FIRST_STEPS = 4
 """Number of torque steps in each part of the first loading and unloading, which only
 erases the memory of the initial state."""
+SMALL_STEPS = 4
+"""Number of torque steps in each quarter of a small loop."""
+SMALL = 0.25
+"""Amplitude of the small loops as a fraction of the rated torque [-]."""
+APPROACH = 4
+"""Number of torque steps between two small loops."""
 _LOOP, _FIELDS = "friction-loop-{:04d}", fields(FrictionLoop)
 
 
@@ -53,10 +59,40 @@ def loop_torques(top: float, steps: int = STEPS) -> Array:
     return np.asarray(path + 0.0)  # no negative zero
 
 
+def small_loop_torques(top: float, rated: float) -> list[Array]:
+    """Torque paths of small loops, one after the other, which begin at the top torque.
+
+    The loops are about the largest torque that their amplitude permits, and about the
+    full, half and zero rated torque, as far as these are smaller. Each is run twice;
+    the second round is closed.
+
+    Args:
+        top: Largest torque [N·m].
+        rated: Rated torque [N·m].
+    """
+    amplitude = min(SMALL * rated, 0.5 * top)
+    part = np.arange(1, 2 * SMALL_STEPS + 1) / SMALL_STEPS
+    once = np.concatenate([1.0 - part, part - 1.0])
+    paths: list[Array] = []
+    last = top
+    for mean in (top - amplitude, rated, 0.5 * rated, 0.0):
+        start = mean + amplitude
+        if mean > top - amplitude or (paths and start >= last):
+            continue
+        steps = [mean + amplitude * once] * 2
+        if paths:
+            steps.insert(0, np.linspace(last, start, APPROACH + 1)[1:])
+        # equal torques are equal bit for bit, also those of the large loop
+        paths.append(np.round(np.concatenate(steps) / top, 9) * top + 0.0)
+        last = start
+    return paths
+
+
 def friction_loops(
     design: Design,
     *,
     top: float,
+    rated: float | None = None,
     positions: int = POSITIONS,
     steps: int = STEPS,
     progress: Progress = silent,
@@ -70,6 +106,8 @@ def friction_loops(
     Args:
         design: The drive; its friction coefficient may be zero.
         top: Largest torque [N·m].
+        rated: Rated torque, which adds the small loops of
+            :func:`small_loop_torques` [N·m]; None adds none.
         positions: Number of input positions over one period of the gear without errors,
             see :func:`swgjoint.gear.kinematics.periodicity`.
         steps: Number of steps from zero to the largest torque, a multiple of
@@ -80,8 +118,8 @@ def friction_loops(
             stores none.
 
     Returns:
-        One loop per solved position: all of them or, with a symmetric wave generator,
-        the first half.
+        One loop per solved position, followed by its small loops: all positions or,
+        with a symmetric wave generator, the first half.
 
     Raises:
         ComputationError: If an equilibrium cannot be found.
@@ -94,10 +132,14 @@ def friction_loops(
     model = sector_model(perfect, half="auto", cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
-    torque = loop_torques(top, steps)
+    paths = [loop_torques(top, steps)]
+    if rated is not None:
+        paths += small_loop_torques(top, rated)
+    torque, ends = np.concatenate(paths), np.cumsum([path.size for path in paths])
+    quarters = [steps, *[SMALL_STEPS] * (len(paths) - 1)]
     outward = np.unique(torque)
     series = series_compliance(design, cup=True)
-    loops: list[FrictionLoop] = []
+    loops: list[FrictionLoop] = []  # along the whole path
     stage = f"{drive.name}: friction loops"
     # zero torque begins both sides of the elastic path
     each = outward.size + 1 + torque.size
@@ -127,7 +169,7 @@ def friction_loops(
         loops.append(
             FrictionLoop(
                 input_angle=theta,
-                quarter=steps,
+                quarter=quarters[-1],
                 torque=torque,
                 torsion=np.array([ideal - rubbing.output_angle(s) for s in rubbed])
                 + series * torque,
@@ -142,7 +184,11 @@ def friction_loops(
         if keep is not None:
             values = {item.name: getattr(loops[-1], item.name) for item in _FIELDS}
             keep.write(_LOOP.format(k), values)
-    return tuple(loops)
+    return tuple(
+        loop.until(int(end), quarter)
+        for loop in loops
+        for end, quarter in zip(ends, quarters, strict=True)
+    )
 
 
 def _kept(

@@ -1,0 +1,140 @@
+r"""Jenkin elements fitted to the friction torque of computed loops.
+
+For a given yield torsion the torque of an element is its yield torque times a known
+signal, so the yield torques follow from a non-negative least-squares problem. The same
+holds for a yield torsion that is D times a given function of the elastic torque. These
+functions are piecewise linear between the torques of the loop: 1, ramps that begin at
+one of the torques, and functions that differ from 0 at a single torque. Their sums with
+non-negative factors represent any piecewise linear yield torque.
+
+Samples are weighted with the torsion between them. An element that slips throughout
+then takes the mean of R and thereby dissipates the work of friction in a round. The
+small loops of a position have the same weight together as its large loop. They
+determine the yield torsions: after a reversal the teeth stick, and the large loop has
+few steps there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swgjoint.maps.fit.friction_loop import FrictionLoop
+from swgjoint.maps.fit.torsion_fit import FAINT
+from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin, stretches
+from swgjoint.typing import Array
+
+REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
+"""Yield torsions of the candidate elements as fractions of the travel [-], from 1 to
+0.1 %. An element with 1 always sticks, like teeth that do not slide and thereby stiffen
+a drive."""
+TORQUES = 12
+"""Largest number of intervals of a yield curve."""
+STEEPEST = 0.8
+"""Largest slope of a yield torsion over the torsion [-]. The law requires at most 1 at
+the largest stiffness of the map; the rest is a margin for specimens that are stiffer.
+"""
+STEEPEST_SUM = 0.9
+"""Largest sum of the slopes of all yield torques over the elastic torque [-]; the law
+requires less than 1."""
+CLOSE = 0.05
+"""Residual of constant yield torques, relative to the friction torque, below which they
+suffice [-]."""
+BETTER = 0.9
+"""Residual relative to that of constant yield torques below which yield torques that
+depend on the load are used [-]."""
+
+
+def is_large(loop: FrictionLoop) -> bool:
+    """Whether the round of a loop covers all torques of its path."""
+    return bool(np.abs(loop.torque).max() == -loop.branches(loop.torque)[1][0])
+
+
+def fit_elements(loops: Sequence[FrictionLoop], largest: float) -> tuple[Jenkin, ...]:
+    """Jenkin elements fitted to the friction torque, one set for all positions.
+
+    Yield torques depend on the load only if constant ones do not suffice, see
+    :data:`CLOSE` and :data:`BETTER`.
+
+    Args:
+        loops: Large loops and, if there are any, small loops.
+        largest: Largest elastic stiffness of the map [N·m/rad].
+    """
+    travel = max(float(np.ptp(loop.torsion)) for loop in loops)
+    path = next(loop for loop in loops if is_large(loop))
+    at = path.branches(path.torque)[1][path.quarter :]
+    at = at[:: -(-path.quarter // TORQUES)] if path.quarter > TORQUES else at
+    constant = [(reach, np.ones_like(at)) for reach in REACHES * travel]
+    shapes = [np.clip((at - start) / (at[-1] - start), 0.0, 1.0) for start in at[:-1]]
+    shapes += list(np.eye(at.size))
+    steepest = [float(np.abs(np.diff(one) / np.diff(at)).max()) for one in shapes]
+    loaded = [
+        (reach, shape)
+        for shape, steep in zip(shapes, steepest, strict=True)
+        for reach in REACHES * travel
+        if reach * steep * largest <= STEEPEST
+    ]
+    plain, off = _elements(loops, at, constant)
+    if not plain or not loaded or off <= CLOSE:
+        return plain
+    elements, left = _elements(loops, at, constant + loaded)
+    steep_sum = sum(np.abs(np.diff(e.yields(at)) / np.diff(at)) for e in elements)
+    too_many = len(elements) > MAX_ELEMENTS
+    if left > BETTER * off or too_many or np.max(steep_sum) > STEEPEST_SUM:
+        return plain
+    return elements
+
+
+def _elements(
+    loops: Sequence[FrictionLoop], at: Array, candidates: Sequence[tuple[float, Array]]
+) -> tuple[tuple[Jenkin, ...], float]:
+    """Elements chosen from candidates, and the relative residual of the fit [-].
+
+    Args:
+        loops: Large and small loops.
+        at: Torques at which the candidates are given, from zero [N·m]. Shape (m,).
+        candidates: Yield torsion [rad] and its factors at these torques [-], (m,).
+    """
+    from scipy.optimize import nnls
+
+    count = sum(not is_large(loop) for loop in loops) / sum(map(is_large, loops))
+    rows, wanted = [], []
+    for loop in loops:
+        path, elastic = loop.torsion - loop.torsion[0], np.abs(loop.elastic_torque)
+        signals = [
+            stretches(path, d * np.interp(elastic, at, shape)) / d
+            for d, shape in candidates
+        ]
+        step = np.abs(np.gradient(path))[loop.round]
+        weight = np.sqrt(step / step.sum() / (1.0 if is_large(loop) else count))
+        rows.append(weight[:, None] * np.column_stack(signals)[loop.round])
+        wanted.append(weight * loop.friction_torque[loop.round])
+    target = np.concatenate(wanted)
+    unit = float(np.abs(target).max())
+    if unit == 0.0:
+        return (), 0.0
+    factors, off = nnls(np.concatenate(rows), target / unit)
+    yields = unit * factors
+    elements = tuple(
+        _element(float(f), d, at, shape)
+        for f, (d, shape) in zip(yields, candidates, strict=True)
+        if f > FAINT * yields.sum()
+    )
+    return elements, unit * float(off) / float(np.linalg.norm(target))
+
+
+def _element(torque: float, reach: float, at: Array, shape: Array) -> Jenkin:
+    """One element with a yield torque [N·m] times ``shape`` at the torques ``at``."""
+    stiffness = torque / reach
+    if (shape == 1.0).all():
+        return Jenkin(stiffness=stiffness, yield_torque=torque)
+    slopes = np.diff(shape) / np.diff(at)
+    # points where the slope changes, and the last one
+    bends = np.append(np.abs(np.diff(slopes)) > 1e-9 * np.abs(slopes).max(), True)
+    curve = zip(at[1:][bends], torque * shape[1:][bends], strict=True)
+    return Jenkin(
+        stiffness=stiffness,
+        yield_torque=torque * float(shape[0]),
+        yield_curve=tuple((float(t), float(f)) for t, f in curve),
+    )
