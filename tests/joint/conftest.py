@@ -80,7 +80,8 @@ class Bench:
             # the slip of the last step, with its yield torsions
             count = len(drive.hysteresis)
             limit = d.plugin_state[-count:] if vary_with_load(drive.hysteresis) else ()
-            rest = move_rests(self.rest, tuple(limit), float(torsion))
+            limit = tuple(x or np.inf for x in limit)  # 0: there was no step
+            rest = move_rests(self.rest, limit, float(torsion))
             sliders = replace(Sliders.relax(drive.hysteresis), rest=np.array(rest))
             elastic = drive.torque(torsion, *x)
             potential += sliders.energy(torsion, elastic)

@@ -74,6 +74,23 @@ def with_elements(drive, rng):
     return replace(drive, hysteresis=elements)
 
 
+def with_loads(drive, rng):
+    """The same elements with random yield curves, up to the two limits of the law."""
+    drive = with_elements(drive, rng)
+    peak = drive.ratings.repeated_peak
+    at = np.sort(rng.uniform(0.05, 1.2, 3)) * peak
+    elements = []
+    for element in drive.hysteresis:
+        steepest = 0.95 * min(element.stiffness / drive.max_stiffness, 1 / 3)
+        yields = [element.yield_torque]
+        for step in np.diff([0.0, *at]):
+            slope = steepest * rng.choice([-1.0, -0.3, 0.3, 0.99])
+            yields.append(max(0.0, yields[-1] + float(slope * step)))
+        curve = tuple(zip(at.tolist(), yields[1:], strict=True))
+        elements.append(replace(element, yield_curve=curve))
+    return replace(drive, hysteresis=tuple(elements))
+
+
 def with_friction(drive, rng):
     """Friction of 0.1 to 30 % of the peak torque at the input, of every kind."""
     at_input = drive.ratings.repeated_peak / abs(drive.ratio)
@@ -96,6 +113,8 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
     drive = random_map(rng, tooth_order=tooth_order, hardening=hardening)
     if losses == "hysteresis":
         drive = with_elements(drive, rng)
+    if losses == "loaded hysteresis":
+        drive = with_loads(drive, rng)
     if losses == "friction":
         drive = with_friction(drive, rng)
     rotor, link = 10 ** rng.uniform(-7, -3), 10 ** rng.uniform(-4, 2)
@@ -126,7 +145,9 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
 @pytest.mark.parametrize(
     ("seed", "count"), [(11, 15), pytest.param(12, 30, marks=pytest.mark.slow)]
 )
-@pytest.mark.parametrize("losses", ["none", "hysteresis", "friction"])
+@pytest.mark.parametrize(
+    "losses", ["none", "hysteresis", "loaded hysteresis", "friction"]
+)
 @pytest.mark.parametrize("tooth_order", [False, True])
 @pytest.mark.parametrize("loaded", [False, True])
 def test_random_joints_gain_no_energy(bench, loaded, tooth_order, losses, seed, count):
