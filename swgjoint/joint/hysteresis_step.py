@@ -29,7 +29,12 @@ from swgjoint.maps.hysteresis import Jenkin
 
 
 def yield_torsions(elements: Sequence[Jenkin], elastic: float) -> tuple[float, ...]:
-    """Yield torsion f/k of each element [rad] at an elastic torque [N·m]."""
+    """Yield torsion f/k of each element [rad].
+
+    Args:
+        elements: Jenkin elements of the drive.
+        elastic: Elastic torque of the drive [N·m].
+    """
     return tuple(float(element.reach(elastic)) for element in elements)
 
 

@@ -165,7 +165,12 @@ def vary_with_load(elements: Sequence[Jenkin]) -> bool:
 
 
 def total_yield(elements: Sequence[Jenkin], elastic: float) -> float:
-    """Sum of the yield torques at an elastic torque; both [N·m]."""
+    """Sum of the yield torques [N·m].
+
+    Args:
+        elements: Jenkin elements of a drive.
+        elastic: Elastic torque of the drive [N·m].
+    """
     return sum(float(element.yields(elastic)) for element in elements)
 
 
@@ -232,9 +237,8 @@ def check_loads(elements: Sequence[Jenkin], name: str, largest: float) -> None:
 class Sliders:
     """Parameters and state of the Jenkin elements of a drive; immutable.
 
-    The argument ``elastic`` of the methods is the elastic torque of the drive at each
-    torsion [N·m], of the same shape as ``torsion``. It affects only elements whose
-    yield torque depends on the load.
+    The elastic torque of the drive, an argument of the methods, affects only elements
+    whose yield torque depends on the load.
     """
 
     stiffness: Array
@@ -273,7 +277,12 @@ class Sliders:
         return replace(self, rest=rest)
 
     def torque(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
-        """Total torque after a monotone path to each torsion [N·m]."""
+        """Total torque after a monotone path to each torsion [N·m].
+
+        Args:
+            torsion: Torsions, each reached along a monotone path [rad].
+            elastic: Elastic torque T at each of them [N·m].
+        """
         return np.asarray(self._stretch(torsion, elastic) @ self.stiffness)
 
     def tangent(
@@ -300,7 +309,12 @@ class Sliders:
         return np.asarray(total + follows * np.sign(elastic) * np.asarray(stiffness))
 
     def energy(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
-        """Strain energy of the springs after a monotone path to each torsion [J]."""
+        """Strain energy of the springs after a monotone path to each torsion [J].
+
+        Args:
+            torsion: Torsions, each reached along a monotone path [rad].
+            elastic: Elastic torque T at each of them [N·m].
+        """
         return np.asarray(0.5 * self._stretch(torsion, elastic) ** 2 @ self.stiffness)
 
     def _reach(self, elastic: ArrayLike) -> Array:

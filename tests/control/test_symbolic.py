@@ -112,10 +112,22 @@ def assert_forces_agree(drive: DriveMap, states: int) -> None:
         twin = gradient_force(drive, motion, damping=got.damping)
         np.testing.assert_allclose(ours, twin, rtol=0.0, atol=1e-9)
         data.qpos[order], data.qvel[order] = q, v
-        data.plugin_state[:] = 0.0, 0.0, *history, 1.0
+        known = np.array([0.0, 0.0, *history, 1.0])
+        data.plugin_state[: known.size] = known
         mujoco.mj_forward(model, data)
         np.testing.assert_allclose(ours, data.qfrc_passive[order], rtol=0.0, atol=1e-9)
         assert float(torsion) == pytest.approx(float(drive.torsion(*q)), abs=1e-14)
+
+
+def test_loaded_forces_equal_twin_and_plugin(conservative, lossy):
+    """The same with yield torques that depend on the elastic torque."""
+    drive = lossy(conservative, LAYOUTS[0])
+    curves = ((10.0, 4.0), (60.0, 0.5)), ((40.0, 6.0),)
+    elements = tuple(
+        replace(element, stiffness=20 * element.stiffness, yield_curve=curve)
+        for element, curve in zip(drive.hysteresis, curves, strict=True)
+    )
+    assert_forces_agree(replace(drive, hysteresis=elements), 50)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

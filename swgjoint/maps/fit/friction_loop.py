@@ -118,7 +118,7 @@ class FrictionLoop:
         """R = T - T_0(x) along the path (n_points,) [N·m]."""
         return np.asarray(self.torque - self.elastic_torque)
 
-    def until(self, end: int, quarter: int) -> FrictionLoop:
+    def cut_path(self, end: int, quarter: int) -> FrictionLoop:
         """The loop whose path is the first part of this one.
 
         Args:

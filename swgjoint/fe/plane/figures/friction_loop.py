@@ -185,7 +185,7 @@ def friction_loops(
             values = {item.name: getattr(loops[-1], item.name) for item in _FIELDS}
             keep.write(_LOOP.format(k), values)
     return tuple(
-        loop.until(int(end), quarter)
+        loop.cut_path(int(end), quarter)
         for loop in loops
         for end, quarter in zip(ends, quarters, strict=True)
     )
