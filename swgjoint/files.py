@@ -41,8 +41,9 @@ def whole(path: Path) -> Iterator[Path]:
     try:
         yield beside
         os.replace(beside, path)
-    finally:
+    except BaseException:
         beside.unlink(missing_ok=True)
+        raise
 
 
 def _clear(folder: Path, left: re.Pattern[str]) -> None:

@@ -60,18 +60,33 @@ bool factorise(double* matrix, std::size_t size, std::size_t pivots) {
   return true;
 }
 
+// Elimination of a few loads (size, width), in place: the compiler unrolls their loop.
+template <int width>
+void forward_few(const double* matrix, std::size_t size, std::size_t pivots,
+                 double* loads) {
+  for (std::size_t k = 0; k < pivots; ++k) {
+    const double* row = matrix + k * size;
+    double own[width];
+    for (int c = 0; c < width; ++c) {
+      own[c] = loads[k * width + c] *= row[k];
+    }
+    for (std::size_t j = k + 1; j < size; ++j) {
+      for (int c = 0; c < width; ++c) loads[j * width + c] -= row[j] * own[c];
+    }
+  }
+}
+
 // Elimination of loads (size, width), in place.
 void forward(const double* matrix, std::size_t size, std::size_t pivots, double* loads,
              std::size_t width) {
+  if (width == 1) return forward_few<1>(matrix, size, pivots, loads);
+  if (width == 2) return forward_few<2>(matrix, size, pivots, loads);
+  if (width == 3) return forward_few<3>(matrix, size, pivots, loads);
+  if (width == 4) return forward_few<4>(matrix, size, pivots, loads);
   for (std::size_t k = 0; k < pivots; ++k) {
     const double* row = matrix + k * size;
     double* own = loads + k * width;
     for (std::size_t c = 0; c < width; ++c) own[c] *= row[k];
-    if (width == 1) {
-      const double value = *own;
-      for (std::size_t j = k + 1; j < size; ++j) loads[j] -= row[j] * value;
-      continue;
-    }
     for (std::size_t j = k + 1; j < size; ++j) {
       double* other = loads + j * width;
       for (std::size_t c = 0; c < width; ++c) other[c] -= row[j] * own[c];

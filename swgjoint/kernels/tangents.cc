@@ -1,5 +1,6 @@
 #include "tangents.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace swgjoint {
@@ -34,6 +35,21 @@ void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
                         const std::int64_t* tooth, const double* weight, std::size_t n,
                         double* result) {
   std::vector<double> moved(size);
+  // a point moves one flank of its tooth, half of the entries: range of those that the
+  // points from j on with the tooth of j move
+  std::vector<std::size_t> begin(n, size), end(n, 0);
+  for (std::size_t j = n; j-- > 0;) {
+    const double* own = weight + size * j;
+    for (std::size_t b = 0; b < size; ++b) {
+      if (own[b] == 0.0) continue;
+      begin[j] = std::min(begin[j], b);
+      end[j] = b + 1;
+    }
+    if (j + 1 < n && tooth[j + 1] == tooth[j]) {
+      begin[j] = std::min(begin[j], begin[j + 1]);
+      end[j] = std::max(end[j], end[j + 1]);
+    }
+  }
   for (std::size_t i = 0; i < n; ++i) {
     const double* own = weight + size * i;
     for (std::size_t j = 0; j < n; ++j) {
@@ -46,16 +62,15 @@ void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
         for (std::int64_t k = block_of[apart]; k >= 0; k = after[k]) {
           const double* rows = blocks + size * size * static_cast<std::size_t>(k);
           for (std::size_t a = 0; a < size; ++a) {
-            // a point moves one flank of its tooth, half of the entries
             if (own[a] == 0.0) continue;
             const double* row = rows + size * a;
-            for (std::size_t b = 0; b < size; ++b) moved[b] += own[a] * row[b];
+            for (std::size_t b = begin[j]; b < end[j]; ++b) moved[b] += own[a] * row[b];
           }
         }
       }
       const double* other = weight + size * j;
       double sum = 0.0;
-      for (std::size_t b = 0; b < size; ++b) sum += moved[b] * other[b];
+      for (std::size_t b = begin[j]; b < end[j]; ++b) sum += moved[b] * other[b];
       result[n * i + j] = sum;
     }
   }

@@ -99,8 +99,8 @@ def test_the_loops_are_clean(tmp_path):
 
 
 def test_an_access_beyond_an_array_is_found(tmp_path):
-    """One column too many in a loop of the module ends the tests."""
-    wrong = ("tangents.cc", "j < size; j += 2", "j <= size; j += 2")
+    """One point too many in a loop of the module ends the tests."""
+    wrong = ("ellipse.cc", "i < n; ++i, points", "i <= n; ++i, points")
     ended = run_twins(build(tmp_path, wrong))
     assert ended.returncode != 0
     assert "AddressSanitizer" in ended.stderr

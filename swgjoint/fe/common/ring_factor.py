@@ -31,7 +31,8 @@ class RingFactor:
 
         Args:
             blocks: Symmetric sector matrices as in
-                :class:`swgjoint.fe.common.cyclic.CyclicFactor` (N, n, n).
+                :class:`swgjoint.fe.common.cyclic.CyclicFactor` (N, n, n). The array is
+                kept, and updates change it.
             face: Number of degrees of freedom of a face.
             loaded: Sectors (k,) whose rows are passed to :meth:`condense`; others are
                 possible as well.
@@ -39,31 +40,36 @@ class RingFactor:
         Raises:
             SingularCyclicError: If the matrix is singular.
         """
-        self._face, self._loaded = face, loaded
+        self._blocks, self._face, self._loaded = blocks, face, loaded
         self._pivoted: CyclicFactor | None = None
         self._native: compiled.RingFactor | None = None
         if (native := kernels()) is not None:
             self._native = native.RingFactor(*blocks.shape[:2], face)
-        self.update(blocks, np.arange(len(blocks)))
+        self._factorise(np.arange(len(blocks)))
 
     def update(self, blocks: Array, changed: Index) -> None:
         """Factorise the ring anew after a change of some sectors, in place.
 
         Args:
-            blocks: All sector matrices after the change (N, n, n).
+            blocks: Matrices of these sectors after the change (k, n, n).
             changed: Sectors whose matrices changed (k,).
 
         Raises:
             SingularCyclicError: If the matrix becomes singular.
         """
+        self._blocks[changed] = blocks
+        self._factorise(changed)
+
+    def _factorise(self, changed: Index) -> None:
+        """Factorise the ring anew after a change of some matrices."""
         if self._native is not None:
-            if self._native.update(np.ascontiguousarray(blocks), changed):
+            if self._native.update(np.ascontiguousarray(self._blocks), changed):
                 return
             self._native = None
         if self._pivoted is None:
-            self._pivoted = CyclicFactor(blocks, self._face, self._loaded)
+            self._pivoted = CyclicFactor(self._blocks, self._face, self._loaded)
         else:
-            self._pivoted.update(blocks, changed)
+            self._pivoted.update(self._blocks, changed)
 
     def solve(self, rhs: Array) -> Array:
         """Solve for k right-hand sides.
@@ -118,11 +124,11 @@ def _condense(factor: CyclicFactor, loads: Array, sector: Index, rows: Array) ->
     pushes = np.zeros((len(sectors), rows.shape[1], k))
     pushes[which, :, np.arange(k)] = rows
     response = factor.solve_within(sectors, pushes)
-    result[d:, d:] = at_sectors(rows, which, response)
+    result[d:, d:] = _at_sectors(rows, which, response)
     return result
 
 
-def at_sectors(rows: Array, sector: Index, response: Array) -> Array:
+def _at_sectors(rows: Array, sector: Index, response: Array) -> Array:
     """Products of rows with the responses of their sectors (k, n_columns).
 
     Args:

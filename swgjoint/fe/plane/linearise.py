@@ -87,16 +87,22 @@ class Linearised:
         circular_spline = self.search.circular_spline
         return Contacts.none(self.flank.shape[1], circular_spline.flank_dofs)
 
-    def anchor_tangent(self) -> Array:
-        """Tangent with the anchor spring (N, n, n) [N/m].
+    def anchor_tangent(self, sectors: Index | None = None) -> Array:
+        """Tangent with the anchor spring (k, n, n) [N/m].
 
         Rows and columns of fixed degrees of freedom are zero except for their diagonal.
+
+        Args:
+            sectors: Sectors whose matrices are needed (k,); None for all.
         """
-        matrix = self.hessian.copy()
-        matrix[0] += self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
-        matrix[self.fixed] = 0.0
-        matrix.transpose(0, 2, 1)[self.fixed] = 0.0
-        np.einsum("sii->si", matrix)[self.fixed] = self.anchor_stiffness
+        some = np.arange(len(self.hessian)) if sectors is None else sectors
+        matrix = self.hessian[some]
+        spring = self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
+        matrix[some == 0] += spring
+        fixed = self.fixed[some]
+        matrix[fixed] = 0.0
+        matrix.transpose(0, 2, 1)[fixed] = 0.0
+        np.einsum("sii->si", matrix)[fixed] = self.anchor_stiffness
         return matrix
 
     def gap_gradient(self, contacts: Contacts) -> Array:

@@ -197,7 +197,7 @@ class NewtonProblem:
         touching = self.state.touching
         linear = self.linear.exchange(stations, touching)
         changed = np.flatnonzero(stations.any(axis=1))
-        self.factor.update(linear.anchor_tangent(), changed)
+        self.factor.update(linear.anchor_tangent(changed), changed)
         state = replace(self.state, touching=touching ^ stations)
         return replace(self, state=state, linear=linear)
 
