@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,6 +48,11 @@ class ToleranceSamples:
     n_torques, pitches * phases)."""
     perfect: Array
     """The same quantities without tooth errors. Shape (3, n_torques, phases)."""
+    order: tuple[int, int] | None = None
+    """(p, q) of the passage of teeth; None if it is the pattern of the samples."""
+    waves: Index | None = None
+    """Numbers of waves in the cycle that the tables contain; None for any number. Shape
+    (n,)."""
     free: int = 0
     """Number of positions where the unloaded output has clearance; they are sampled in
     the middle of the clearance."""

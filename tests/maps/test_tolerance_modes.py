@@ -102,6 +102,31 @@ def test_known_potential_of_both_angles_comes_back(layout):
         assert np.abs(drive.torque(x, theta, ideal) - torque).max() < 1e-3 * K * 2e-3
 
 
+def test_pattern_of_other_order_than_the_teeth():
+    """Balls pass 8 times a turn, errors are sampled at every pitch: orders of both."""
+    samples = known("circular_spline_fixed", phases=1)
+    balls = 8
+    few = replace(
+        samples,
+        order=(balls, 0),
+        input_angle=2.0 * np.pi / balls * np.arange(12) / 12,
+        tolerances=replace(samples.tolerances, order=samples.order),
+    )
+    drive = fit_map(few, keep=1e-6)
+    theta = np.random.default_rng(1).uniform(0, 200, 300)
+    ideal = theta / drive.ratio
+    e0, _, _ = drive.error_at(drive.phases(theta, ideal))
+    wanted = waves(ERRORS, theta, theta - ideal) + 1e-6 * np.cos(balls * theta)
+    assert np.abs(e0 - wanted).max() < 1e-9
+    # the tables contain no other harmonics than these
+    cycle = np.array([[CYCLE // CIRCULAR_SPLINE, CYCLE // FLEXSPLINE]])
+    named = [(2, 0), (0, 2)]
+    kept = np.sort(np.abs(np.array(named) @ cycle[0]))
+    fewer = replace(few, tolerances=replace(few.tolerances, waves=kept))
+    orders = fit_map(fewer, keep=1e-6).orders.tolist()
+    assert {(p, q) for p, q in orders if p % balls or q} == set(named)
+
+
 def test_stiffness_of_the_linearised_drive_does_not_matter():
     """Only what errors change at a torque counts, unless clearances differ."""
     samples = known("circular_spline_fixed")

@@ -103,17 +103,6 @@ def check_modelled(design: Design) -> None:
             f"wave_generator.kind = {design.wave_generator.kind!r}: the ring model"
             " expects 'elliptical', 'cosine' or 'table'"
         )
-    if design.tolerances.misalignment_arcmin:
-        faults.append(
-            f"tolerances.misalignment_arcmin ="
-            f" {design.tolerances.misalignment_arcmin:g}: the ring model is 2D;"
-            " accepted: 0"
-        )
-    if design.friction.tooth_coefficient:
-        faults.append(
-            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g}: the"
-            " ring model has no friction; accepted: 0, or the 2d model"
-        )
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 

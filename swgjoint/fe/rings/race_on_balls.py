@@ -100,6 +100,13 @@ class RaceOnBalls:
             ratio=design.ratio,
         )
 
+    @property
+    def cage_lag(self) -> float:
+        """Rotation of the cage relative to the cam per rotation of the cam [-]."""
+        if self.cage_held:
+            return 0.0
+        return -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
+
     def balls(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
         """Ball centres on the cam and their derivatives with respect to both angles.
 
@@ -114,9 +121,7 @@ class RaceOnBalls:
             Centres [m] and their derivatives with respect to ``alpha`` and ``phase``
             [m/rad], each (balls, 2).
         """
-        lag = -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
-        if self.cage_held:
-            lag = 0.0
+        lag = self.cage_lag
         spacing = 2.0 * pi / self.bearing.balls * np.arange(self.bearing.balls)
         pose = self.cam.pose(phase + lag * alpha + spacing)
         centre = rotate(pose.point + self.cam_offset, alpha)

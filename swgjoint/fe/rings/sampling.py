@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 from typing import Any
@@ -18,18 +18,26 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.common.clearance import across_clearance
+from swgjoint.fe.common.clearance import FAINT, across_clearance
 from swgjoint.fe.common.stress_state import stress_state_label
-from swgjoint.fe.plane.drive2d import can_halve, unmodelled_parts
+from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.rings import model as thin
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
+from swgjoint.fe.rings.passage import BallPassage, ball_passage
 from swgjoint.fe.rings.state import ThinRingState
+from swgjoint.fe.rings.tolerances import (
+    HELD,
+    RingErrors,
+    named_errors,
+    spring_energy,
+    without_misalignment,
+)
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.design.tolerances import has_errors
+from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.unfinished import Unfinished
@@ -68,40 +76,6 @@ def check_modelled(design: Design) -> None:
             f"{design.drive.name}: wave_generator.kind = 'table': a ring map mirrors"
             " its results for negative torques; accepted: 'elliptical', 'cosine'"
         )
-    if has_errors(design):
-        raise DesignError(
-            f"{design.drive.name}: tolerances: a ring map has no manufacturing errors;"
-            " accepted: 0, or the 2d model"
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class BallPassage:
-    """Periodicity of the positions of the balls relative to the lobes."""
-
-    per_cage_turn: int
-    """Number of periods per turn of the cage relative to the cam. It is the number of
-    balls, or twice that number if it is odd, because balls then reach the two lobes
-    alternately."""
-    per_input_turn: float
-    """Number of periods per input turn if the balls roll without slip."""
-    carried_as: int
-    """Number of periods per input turn that the map uses."""
-
-
-def ball_passage(design: Design, model: ThinRing) -> BallPassage:
-    """Ball passage of a design.
-
-    Args:
-        design: The drive.
-        model: Thin-ring model of the drive.
-    """
-    balls = model.bearing.balls
-    count = balls * (2 if balls % 2 and can_halve(design, bearing=False) else 1)
-    rate = count * model.bearing.cage_share * (1.0 - 1.0 / model.ratio)
-    return BallPassage(
-        per_cage_turn=count, per_input_turn=rate, carried_as=max(1, round(rate))
-    )
 
 
 def sample_thin_rings(
@@ -112,6 +86,10 @@ def sample_thin_rings(
     keep: Unfinished | None = None,
 ) -> MapSamples:
     """Samples of a map over the passage of a ball and both signs of torque.
+
+    They are those of a drive without errors and friction. Manufacturing errors are
+    sampled over the cycle of the teeth as well, see
+    :mod:`swgjoint.fe.rings.tolerances`.
 
     If a solve fails, its torque and all larger ones are omitted, and ``truncated`` in
     the record of the samples is true.
@@ -133,11 +111,12 @@ def sample_thin_rings(
     """
     check_modelled(design)
     begin, ratings = time.perf_counter(), ratings_of(design)
-    model = thin_ring(design)
+    perfect, flawed = without_errors(design), without_misalignment(design)
+    model = thin_ring(perfect)
     sampler = _Sampler(
         design=design,
         model=model,
-        passage=ball_passage(design, model),
+        passage=ball_passage(perfect, model),
         count=PHASES if angles is None else angles,
         small=SMALL * ratings.rated_torque,
         series=series_compliance(design, cup=True),
@@ -146,14 +125,28 @@ def sample_thin_rings(
     )
     torques = [part * ratings.repeated_peak for part in LEVELS]
     rows, free = sampler.sampled_positions(torques)
-    unseen = sampler.unseen_positions([p * ratings.repeated_peak for p in UNSEEN])
+    unseen = None
+    if not has_errors(flawed):  # otherwise full solves with errors validate the map
+        unseen = sampler.unseen_positions([p * ratings.repeated_peak for p in UNSEEN])
     reached = sorted(set.intersection(*(set(row) for row in rows)))
     tables = _both_signs({t: np.array([row[t] for row in rows]).T for t in reached})
     if free:
-        _add_onsets(tables, sampler.small)
+        _add_onsets(tables, sampler.small, HELD if has_errors(flawed) else FAINT)
     record = sampler.record(torques, truncated=len(reached) < len(torques) + 3)
+    tolerances = None
+    if has_errors(flawed):
+        errors = RingErrors(
+            design=flawed,
+            passage=sampler.passage,
+            small=sampler.small,
+            free=free,
+            keep=keep,
+            progress=progress,
+        )
+        tolerances = errors.sample(tables).in_series(sampler.series)
     record["sampling_wall_s"] = time.perf_counter() - begin
-    return sampler.map_samples(tables, free=free, unseen=unseen, info=record)
+    samples = sampler.map_samples(tables, free=free, unseen=unseen, info=record)
+    return replace(samples, tolerances=tolerances)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -252,8 +245,10 @@ class _Sampler:
                 "cup": None if design.cup is None else "closed-form torsion in series",
                 "stress_state": stress_state_label(design),
                 "springs_Nm_rad": springs_of(design),
-                "friction": None,
-                "tolerances": None,
+                "friction": "left out of the potential"
+                if design.friction.tooth_coefficient
+                else None,
+                "tolerances": named_errors(design),
                 "left_out": unmodelled_parts(design, "ring"),
             },
             "ball_passage": {
@@ -314,10 +309,12 @@ def _both_signs(tables: dict[float, Array]) -> dict[float, Array]:
     }
 
 
-def _add_onsets(tables: dict[float, Array], small: float) -> None:
+def _add_onsets(tables: dict[float, Array], small: float, faint: float) -> None:
     """Add the torques at which the teeth begin to hold the output, in place."""
+    if faint != FAINT:
+        tables[0.0][1] -= spring_energy(tables[small][0], tables[-small][0], small)
     for side in (small, -small):
-        start, onset = across_clearance(tables[0.0], tables[side], side)
+        start, onset = across_clearance(tables[0.0], tables[side], side, faint)
         tables[start] = onset
     tables[0.0][2] = onset[2]  # compliance at the ends of the clearance
 

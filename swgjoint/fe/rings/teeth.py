@@ -80,12 +80,15 @@ class ThinRingTeeth:
             return CircularSpline(profile=profile)
         return CircularSpline(profile=profile, weights=_flank_spline(profile))
 
-    def find_contacts(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
+    def find_contacts(
+        self, foot: Array, slope: Array, *, reach: float = 0.0
+    ) -> tuple[Contacts, Array]:
         """Overlapping flanks of the teeth on a deformed rim.
 
         Args:
             foot: Positions of the teeth on the rim's mean line (N, 2) [m].
             slope: Tangents of the mean line at the teeth (N, 2).
+            reach: Largest gap of flanks that do not overlap but are also returned [m].
 
         Returns:
             The contacts, and the angles of the flexspline's teeth (N,) [rad].
@@ -104,9 +107,9 @@ class ThinRingTeeth:
             angle=angle,
             bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
         )
-        # only overlapping flanks carry force, so open gaps are not needed
+        # only overlapping flanks carry force; errors of the teeth may close open gaps
         nodal = np.tile(offset, 2 * NODES)
-        return search.search(nodal, 0.0, None, thorough=False), angle
+        return search.search(nodal, reach, None, thorough=False), angle
 
     def rows(
         self, contacts: Contacts, foot: Array, slope: Array, angle: Array

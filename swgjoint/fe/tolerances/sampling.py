@@ -125,7 +125,9 @@ def sample_tolerances(
         if there is None:
             if own_reference:
                 loaded = rest.under_both_signs(follow, under_load, tick)
-            phase_table, count = _over_torque(loaded, errors, levels, small, tick)
+            phase_table, count = respond_over_torque(
+                loaded, errors, levels, small, tick
+            )
         else:
             phase_table, count = there
             tick(steps + (linearised // 2 if own_reference else 0))
@@ -137,11 +139,11 @@ def sample_tolerances(
             )
         if keep is not None and there is None:
             keep.write(_PHASE.format(k), {"table": phase_table, "free": count})
-        alone, _ = _over_torque(flawless, none, levels, small)
+        alone, _ = respond_over_torque(flawless, none, levels, small)
         if has_play:
             phase_table, alone = (
-                _with_onsets(phase_table, small),
-                _with_onsets(alone, small),
+                with_onsets(phase_table, small),
+                with_onsets(alone, small),
             )
         ideal = pitch_of(design) * k / phases / design.ratio
         phase_table[0] -= ideal
@@ -238,7 +240,7 @@ def full_solves(
     )
 
 
-def _over_torque(
+def respond_over_torque(
     rest: Rest,
     errors: tuple[Array, ...],
     levels: Array,
@@ -247,7 +249,12 @@ def _over_torque(
 ) -> tuple[Array, int]:
     """Output angle, strain energy and compliance at all torques of both signs.
 
-    ``tick`` is called after every :data:`CHUNK` sets of errors at a torque.
+    Args:
+        rest: Linearised drive with perfect teeth.
+        errors: Sets of errors, see :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+        levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
+        small: Torque that takes up the clearance [N·m].
+        tick: Called after every :data:`CHUNK` sets of errors at a torque.
 
     Returns:
         Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
@@ -346,13 +353,14 @@ def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
     return table
 
 
-def _with_onsets(table: Array, small: float) -> Array:
+def with_onsets(table: Array, small: float, faint: float = FAINT) -> Array:
     """Table with rows added at both ends of the clearance.
 
     Args:
         table: Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
             (3, n_torques, n_sets); its compliance at zero torque is replaced.
         small: Torque that takes up the clearance, in the rows next to zero [N·m].
+        faint: Torque at the ends of the clearance as a fraction of ``small`` [-].
 
     Returns:
         Table (3, n_torques + 2, n_sets).
@@ -361,7 +369,9 @@ def _with_onsets(table: Array, small: float) -> Array:
     # the fourth quantity of a pattern, the input torque, is unused here
     rows = np.concatenate([table, np.zeros_like(table[:1])])
     sides = [
-        across_clearance(rows[:, zero], rows[:, zero + side], side * small)[1][:3]
+        across_clearance(rows[:, zero], rows[:, zero + side], side * small, faint)[1][
+            :3
+        ]
         for side in (-1, 1)
     ]
     table[2, zero] = sides[1][2]  # the same stiffness on both sides of the middle

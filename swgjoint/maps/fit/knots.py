@@ -69,6 +69,8 @@ def common_knots(
     elif samples.free:
         coarse[at - 2 : at + 3] = True
     coarse[[0, -1]] = True
+    if tolerances is not None and tolerances.waves is not None:
+        coarse[:] = True  # few harmonics
     return np.asarray(knots), coarse
 
 

@@ -172,7 +172,7 @@ def orders_of(waves: Index, samples: MapSamples) -> Index:
         low = np.concatenate(
             [np.take_along_axis(p, best, 1), np.take_along_axis(q, best, 1)], axis=1
         )
-    pattern = np.array(samples.order, dtype=np.int64)
+    pattern = np.array(tolerances.order or samples.order, dtype=np.int64)
     return np.asarray(tooth[:, None] * pattern + np.sign(pattern.sum()) * low)
 
 
@@ -223,9 +223,9 @@ def combine_modes(
     error[: whole.size] += modes.error[whole]
     potential[0, 0, 0] -= np.interp(0.0, knots, potential[0, 0, 0])
     error[0] = 0.0
-    others = np.setdiff1d(modes.waves, modes.waves[::cycle])
+    sampled = modes.waves if tolerances.waves is None else tolerances.waves
+    others = np.setdiff1d(sampled, modes.waves[::cycle])
     pattern = np.arange(count)
-    waves = np.concatenate([pattern * cycle, others])
     orders = np.concatenate(
         [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
     )
@@ -234,7 +234,10 @@ def combine_modes(
     error = np.concatenate([error, modes.error[others]])
 
     # amplitudes of e0 and of the input torque T de0/dtheta + dV/dtheta at every knot
-    per_turn = waves * abs(sum(samples.order)) / cycle
+    teeth = abs(sum(tolerances.order or samples.order))
+    per_turn = np.concatenate(
+        [pattern * abs(sum(samples.order)), others * teeth / cycle]
+    )
     work = weighed[:, :, 0] + weighed[0, 0, 1] * error[:, :, None]
     ripple = per_turn[:, None] * np.hypot(work[:, 0], work[:, 1])
     size = np.hypot(*error.T)
@@ -280,6 +283,8 @@ def combine_modes(
 
 def _refined(potential: Array, knots: Array, coarse: NDArray[np.bool_]) -> Array:
     """V, V', V'' at all knots from the coarse ones. Shape (n, 2, 3, n_knots)."""
+    if coarse.all():
+        return potential
     refined = np.empty((*potential.shape[:3], knots.size))
     for fine, values in zip(
         refined.reshape(-1, 3, knots.size),

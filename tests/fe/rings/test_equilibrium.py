@@ -325,14 +325,6 @@ def test_clearance_is_what_makes_the_stiffness_rise():
             ("drive.layout", "'flexspline_fixed'", "'circular_spline_fixed'"),
         ),
         (
-            {"friction.tooth_coefficient": 0.1},
-            ("friction.tooth_coefficient", "0.1", "0", "2d model"),
-        ),
-        (
-            {"tolerances.misalignment_arcmin": 1.0},
-            ("tolerances.misalignment_arcmin", "1", "0"),
-        ),
-        (
             {"wave_generator.bearing.ball_diameter_mm": 30.0},
             (
                 "wave_generator.bearing",

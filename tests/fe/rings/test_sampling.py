@@ -147,11 +147,6 @@ def test_odd_ball_counts_run_smoother():
     ("name", "changes", "message"),
     [
         ("reference-2d", {}, ("wave_generator.bearing", "table", "2d model")),
-        (
-            "size-25-100",
-            {"tolerances.random_pitch_um": 1.0},
-            ("tolerances", "0", "2d model"),
-        ),
     ],
 )
 def test_what_a_ring_map_lacks_is_refused(name, changes, message):

@@ -1,0 +1,359 @@
+"""Thin rings with manufacturing errors over the whole cycle of their teeth.
+
+The errors of all pitches are superposed on rings that are linearised under load, as in
+:mod:`swgjoint.fe.tolerances.sampling`: a gap may close or open, so that other teeth
+carry load with errors than without. Errors of the wave generator turn with it and
+belong to the linearised rings. Balls and teeth keep their positions relative to the
+lobes, because the map contains the passage of balls separately.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.rings.contacts import race_on_balls
+from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
+from swgjoint.fe.rings.loading import GOLDEN, solve_loaded, solve_unloaded
+from swgjoint.fe.rings.model import ThinRing, thin_ring
+from swgjoint.fe.rings.passage import BallPassage
+from swgjoint.fe.rings.state import ThinRingState
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.rest import Rest
+from swgjoint.fe.tolerances.sampling import respond_over_torque, with_onsets
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors, with_perfect_teeth
+from swgjoint.maps.samples import FullSolves, ToleranceSamples
+from swgjoint.maps.unfinished import Unfinished
+from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array, Index
+
+STRIDE = 3
+"""Every third sampled torque, counted from the largest one, is also sampled with
+errors, whose effect varies slowly with the torque."""
+CHECKS = 4
+"""Number of positions that are also solved without linearisation to validate the map.
+"""
+CHECK_TORQUE = 0.26
+"""Torque of these solves as a fraction of the repeated peak torque, between the sampled
+ones [-]; zero and the rated torque are solved as well."""
+HELD = 0.1
+"""Torque at the ends of the clearance as a fraction of the torque that takes it up [-].
+
+A map holds the output in the clearance by this torque, 0.1 % of the rated torque. With
+less of it, the harmonics that the map lacks, rather than the middle of the clearance,
+would determine where an unloaded output stands."""
+KEEP = 0.01
+"""A harmonic of the errors is kept if the error of the output reaches this fraction of
+the largest one at any torque [-]. Superposed errors differ from full solves by more."""
+_POSITION, _CHECK = "errors-{:04d}", "error-check-{:04d}"
+
+
+def without_misalignment(design: Design) -> Design:
+    """The same drive with parallel axes: the thin rings are 2D."""
+    return design.with_changes({"tolerances.misalignment_arcmin": 0.0})
+
+
+def named_errors(design: Design) -> dict[str, float] | None:
+    """Nonzero errors that the rings contain, with their seed; None without any."""
+    aligned = without_misalignment(design)
+    values = aligned.tolerances.model_dump()
+    return {k: v for k, v in values.items() if v} if has_errors(aligned) else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingErrors:
+    """Superposition of the errors of one drive."""
+
+    design: Design
+    """The drive with its manufacturing errors."""
+    passage: BallPassage
+    """Passage of the balls without errors."""
+    small: float
+    """Torque that takes up the clearance [N·m]."""
+    free: bool
+    """Whether clearance leaves the unloaded output free without errors."""
+    keep: Unfinished | None = None
+    """Store of finished positions, which a resumed run reads; None stores none."""
+    progress: Progress = silent
+    """Called with the stage, the number of finished parts and their total."""
+
+    @property
+    def phases(self) -> Array:
+        """Angles of ball 0 from the major axis at which the rings are linearised [rad].
+
+        Without errors all of them are equivalent: an odd number of balls reaches both
+        lobes alternately, and errors of the wave generator make the lobes unequal.
+        """
+        count = self.passage.per_cage_turn // self.passage.balls
+        step = 2.0 * np.pi / self.passage.per_cage_turn
+        return np.asarray(-step * np.arange(count), dtype=np.float64)
+
+    def sample(self, perfect: Mapping[float, Array]) -> ToleranceSamples:
+        """Equilibria with errors over the cycle of the teeth, springs not included.
+
+        Args:
+            perfect: Rotation [rad], strain energy [J], compliance [rad/(N·m)] and input
+                torque [N·m] without errors by torque of both signs (4, n); the first
+                column is used, with ball 0 on the major axis.
+
+        Raises:
+            ComputationError: If an equilibrium cannot be found.
+        """
+        positive = sorted(t for t in perfect if t > self.small)
+        levels = np.array([self.small, *positive[::-1][::STRIDE][::-1]])
+        name, phases = self.design.drive.name, self.phases
+        stage = f"{name}: manufacturing errors"
+        pitches = np.arange(pitches_of(self.design), dtype=np.int64)
+        errors = gap_errors(self.design, pitches)
+        model = with_shifting_teeth(thin_ring(with_perfect_teeth(self.design)))
+        total = len(phases) + CHECKS
+        tables = []
+        for k, phase in enumerate(phases.tolist()):
+            tables.append(self._over_cycle(k, model, phase, levels, errors))
+            self.progress(stage, k + 1, total)
+        table, waves = _main_harmonics(np.mean(tables, axis=0))
+        torque = np.concatenate([-levels[::-1], [0.0], levels])
+        if self.free:
+            table, torque = _with_mean_clearance(table, levels)
+        rows, solved = [], thin_ring(self.design)
+        for k in range(CHECKS):
+            rows += self._checked(k, solved, pitches.size, max(positive))
+            self.progress(stage, len(phases) + k + 1, total)
+        input_angle, load, error, input_torque = np.array(rows).reshape(-1, 4).T
+        return ToleranceSamples(
+            pitches=pitches.size,
+            phases=1,
+            torque=torque,
+            table=table,
+            waves=waves,
+            perfect=np.stack([perfect[t][:3, :1] for t in torque.tolist()], axis=1),
+            order=(self.design.periodicity, 0),
+            free=pitches.size if self.free else 0,
+            solved=FullSolves(
+                input_angle=input_angle,
+                torque=load,
+                output_error=error,
+                input_torque=input_torque,
+            ),
+        )
+
+    def _over_cycle(
+        self,
+        number: int,
+        model: ThinRing,
+        phase: float,
+        levels: Array,
+        errors: tuple[Array, ...],
+    ) -> Array:
+        """Output angle, energy and compliance at all pitches (3, n_torques, n).
+
+        Args:
+            number: Number of the position of the balls.
+            model: Rings with perfect teeth and with errors of the wave generator.
+            phase: Angle of ball 0 from the major axis [rad].
+            levels: Torques of both signs, increasing (n_levels,) [N·m].
+            errors: Shifts of the teeth by pitch, see
+                :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+        """
+        name, shape = _POSITION.format(number), (3, 2 * levels.size + 1, len(errors[0]))
+        if self.keep is not None:
+            stored = self.keep.read(name, partial(_stored_table, shape))
+            if stored is not None:
+                return stored
+        rest = self._linearised(model, phase, levels, _largest_change(errors))
+        table, _ = respond_over_torque(rest, errors, levels, self.small)
+        if not np.isfinite(table).all():
+            lost = int(np.isnan(table).any(axis=(0, 1)).sum())
+            raise ComputationError(
+                f"{self.design.drive.name}: no equilibrium of the thin rings with the"
+                f" errors of the teeth at {lost} of {len(errors[0])} pitches; try"
+                " smaller tolerances"
+            )
+        if self.keep is not None:
+            self.keep.write(name, {"table": table})
+        return table
+
+    def _linearised(
+        self, model: ThinRing, phase: float, levels: Array, reach: float
+    ) -> Rest:
+        """The rings at a position of the balls, linearised under torques of both signs.
+
+        Args:
+            model: Rings with perfect teeth and with errors of the wave generator.
+            phase: Angle of ball 0 from the major axis [rad].
+            levels: Torques of both signs, increasing (n_levels,) [N·m].
+            reach: Largest gap that errors may close [m].
+        """
+        rest = self._solved(solve_unloaded(model, 0.0, phase), 0.0, 0.0)
+        loaded = {}
+        for sign in (1.0, -1.0):
+            state = rest
+            for torque in (sign * levels).tolist():
+                state = self._solved(solve_loaded(model, state, torque), torque, 0.0)
+                loaded[torque] = state, tooth_influence(model, state, reach)
+        up, down = loaded[self.small], loaded[-self.small]
+        return Rest(state=up[0], at=up[1], opposite=down, loaded=loaded)
+
+    def _checked(
+        self, number: int, model: ThinRing, pitches: int, largest: float
+    ) -> list[list[float]]:
+        """Full solves at one position: input angle, torque, error, input torque."""
+        ratings = ratings_of(self.design)
+        torques = sorted([CHECK_TORQUE * ratings.repeated_peak, ratings.rated_torque])
+        torques = [torque for torque in torques if torque < largest]
+        # spread over the cycle and over the passages of teeth and balls
+        part = (number + 0.5) * GOLDEN % 1.0
+        theta = pitch_of(self.design) * pitches * part
+        at = np.array([[theta, t] for t in (0.0, *torques)])
+        name = _CHECK.format(number)
+        if self.keep is not None:
+            stored = self.keep.read(name, partial(_stored_check, at))
+            if stored is not None:
+                return stored
+        # the balls have the positions that the map assumes at this input angle
+        cage = -self.passage.carried_as / self.passage.per_cage_turn
+        phase = cage * theta
+
+        def row(state: ThinRingState) -> list[float]:
+            rolled = race_on_balls(model, state, state.q[model.rim.size :])
+            lag = model.cage_lag
+            moment = rolled.input_torque + (cage - lag) * rolled.cage_torque
+            return [state.rotation - theta / model.ratio, moment]
+
+        start = solve_unloaded(model, theta, phase - model.cage_lag * theta)
+        rest = self._solved(start, 0.0, theta)
+        sides = [
+            self._solved(solve_loaded(model, rest, t), t, theta)
+            for t in (-self.small, self.small)
+        ]
+        results = [np.mean([row(side) for side in sides], axis=0).tolist()]
+        state = sides[1]
+        for torque in torques:
+            state = self._solved(solve_loaded(model, state, torque), torque, theta)
+            results.append(row(state))
+        table = np.concatenate([at, np.array(results)], axis=1)
+        if self.keep is not None:
+            self.keep.write(name, {"table": table})
+        return [list(one) for one in table.tolist()]
+
+    def _solved(
+        self, state: ThinRingState, torque: float, theta: float
+    ) -> ThinRingState:
+        """The state, unless its solve failed."""
+        if not state.outcome.ok:
+            raise ComputationError(
+                f"{self.design.drive.name}: no equilibrium of the thin rings with"
+                f" manufacturing errors at {torque:.4g} N·m and input angle"
+                f" {theta:.4g} rad: {state.outcome.value}"
+            )
+        return state
+
+
+def _with_mean_clearance(table: Array, levels: Array) -> tuple[Array, Array]:
+    r"""Table of a drive whose clearance has its mean width at all angles.
+
+    The width of the clearance varies with the errors by as much as the torsion under
+    the torque that takes it up, and a map would need thousands of harmonics for ends
+    that move. Its middle, which is the kinematic error, varies as computed, and so does
+    the torsion from the next torque on. Up to there the torque T(x) is of third degree
+    between the rows, and its integral provides the energy.
+
+    Args:
+        table: Output angle [rad], energy [J] and compliance [rad/(N·m)] at the torques
+            +-levels and zero, increasing (3, n_torques, n).
+        levels: Magnitudes of the torques; the first one takes up the clearance
+            (n_levels,) [N·m].
+
+    Returns:
+        Table with rows at the ends of the clearance (3, n_torques + 2, n), and its
+        torques (n_torques + 2,) [N·m].
+    """
+    table, zero, small = table.copy(), levels.size, float(levels[0])
+    half = 0.5 * float((table[0, zero - 1] - table[0, zero + 1]).mean())
+    soft = float(table[2, [zero - 1, zero + 1]].mean())
+    table[1, zero] = table[1, zero].mean()
+    for end, sign in ((zero - 1, 1.0), (zero + 1, -1.0)):
+        table[0, end] = table[0, zero] + sign * half
+        table[2, end] = soft
+    table = with_onsets(table, small, HELD)
+    torque = np.append(HELD * small, levels)
+    torque = np.concatenate([-torque[::-1], [0.0], torque])
+    zero += 1
+    for step in (-1, 1):
+        for k in range(zero, zero + 3 * step, step):
+            way = table[0, k] - table[0, k + step]
+            begin, end = 1.0 / table[2, [k, k + step]]
+            gain = 0.5 * way * (torque[k] + torque[k + step])
+            gain += way**2 * (begin - end) / 12.0
+            shift = table[1, k] + gain - table[1, k + step]
+            outside = slice(k + 1, None) if step > 0 else slice(None, k)
+            table[1, outside] += shift
+    return table, torque
+
+
+def spring_energy(up: Array, down: Array, small: float) -> Array:
+    """Energy that a map stores between the middle and an end of the clearance [J].
+
+    Args:
+        up: Output angle under the torque that takes up the clearance [rad].
+        down: Output angle under the opposite torque [rad].
+        small: That torque [N·m].
+    """
+    return 0.25 * HELD * small * (down - up)
+
+
+def _main_harmonics(table: Array) -> tuple[Array, Index]:
+    """Table with its mean and main harmonics only, and their numbers of waves.
+
+    Random errors of single teeth spread over thousands of harmonics.
+
+    Args:
+        table: Output angle, energy and compliance over the cycle (3, n_torques, n).
+    """
+    count = table.shape[-1]
+    spectrum = np.fft.rfft(table)
+    spectrum[..., (count + 1) // 2 :] = 0.0  # undetermined phase
+    size = np.abs(spectrum[0, :, 1:])
+    largest = np.maximum(size.max(axis=1, keepdims=True, initial=0.0), 1e-300)
+    kept = np.append(True, (size > KEEP * largest).any(axis=0))
+    spectrum[..., ~kept] = 0.0
+    return np.fft.irfft(spectrum, count), np.flatnonzero(kept)
+
+
+def _largest_change(errors: tuple[Array, ...]) -> float:
+    """Upper bound of the gap that errors of the teeth close [m]."""
+    flexspline, circular_spline, _ = errors
+    return float(
+        sum(np.hypot(*one[0].T).max() for one in (flexspline, circular_spline))
+    )
+
+
+def _stored_table(shape: tuple[int, ...], arrays: Mapping[str, Any]) -> Array:
+    """Table of an interrupted run.
+
+    Raises:
+        ValueError: If its shape differs or it is not finite.
+    """
+    table = np.asarray(arrays["table"], float)
+    if table.shape != shape or not np.isfinite(table).all():
+        raise ValueError(f"table of shape {table.shape}: expected {shape}, finite")
+    return table
+
+
+def _stored_check(at: Array, arrays: Mapping[str, Any]) -> list[list[float]]:
+    """Full solves of an interrupted run.
+
+    Raises:
+        ValueError: If they belong to another position or torque.
+    """
+    table = np.asarray(arrays["table"], float)
+    if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
+        raise ValueError("stored rows belong to another position of the cycle")
+    return [list(one) for one in table.tolist()]

@@ -1,0 +1,184 @@
+"""Thin rings with errors of their teeth: laws of the superposition and of its map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solved import hundred_elements
+
+from swgjoint.fe.rings import sampling
+from swgjoint.fe.rings import tolerances as ring_tolerances
+from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
+from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
+from swgjoint.fe.rings.model import thin_ring
+from swgjoint.fe.rings.sampling import sample_thin_rings
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import with_perfect_teeth
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.unfinished import Unfinished
+
+PERFECT = Design.preset("size-25-50")
+FLAWED = PERFECT.with_changes(
+    {
+        "tolerances.flexspline_cumulative_pitch_um": 8.0,
+        "tolerances.circular_spline_cumulative_pitch_um": 8.0,
+        "tolerances.random_pitch_um": 0.5,
+        "tolerances.wave_generator_eccentricity_um": 3.0,
+        "tolerances.seed": 2,
+    }
+)
+OVAL = PERFECT.with_changes(
+    {
+        "tolerances.circular_spline_ovality_um": 6.0,
+        "tolerances.circular_spline_cumulative_pitch_um": 8.0,
+    }
+)
+SMALL = 0.4
+"""Torque that takes up the clearance [N·m]."""
+REACH = 20e-6
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_elements():
+    """The laws hold for rings of any number of elements."""
+    with hundred_elements():
+        yield
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    """Rings with an eccentric wave generator under two torques of both signs."""
+    model = with_shifting_teeth(thin_ring(with_perfect_teeth(FLAWED)))
+    rest = solve_unloaded(model, 0.0)
+    states = {}
+    for sign in (1.0, -1.0):
+        state = rest
+        for torque in (SMALL, 40.0):
+            state = solve_loaded(model, state, sign * torque)
+            assert state.outcome.ok
+            states[sign * torque] = state
+    return model, states
+
+
+@pytest.mark.parametrize("torque", [SMALL, -SMALL, 40.0, -40.0])
+def test_without_errors_the_equilibrium_returns(loaded, torque):
+    """The linearised drive has angle, compliance and potential of its equilibrium."""
+    model, states = loaded
+    state = states[torque]
+    at = tooth_influence(model, state, REACH)
+    none = np.zeros((1, len(at.sector)))
+    result = at.respond(none, torque)
+    assert result.output_angle == pytest.approx(state.rotation, abs=1e-12)
+    assert result.potential == pytest.approx(0.0, abs=1e-15)
+    assert result.compliance == pytest.approx(state.compliance, rel=1e-6)
+
+
+def test_derivative_of_the_potential_is_the_output_angle(loaded):
+    """Energy and angle of the superposition belong to one potential."""
+    model, states = loaded
+    at = tooth_influence(model, states[40.0], REACH)
+    change = at.gap_change(*gap_errors(FLAWED, np.arange(0, 5100, 400)))
+    low, middle, high = (at.respond(change, t) for t in (39.99, 40.0, 40.01))
+    assert (high.potential - low.potential) / 0.02 == pytest.approx(
+        middle.output_angle, rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("torque", [SMALL, -SMALL, 40.0, -40.0])
+def test_superposed_errors_are_those_of_full_solves(loaded, torque):
+    """Within 5 % of the peak to peak over the cycle, also with errors of the cam."""
+    model, states = loaded
+    pitches = np.array([300, 1700, 3100, 4444])
+    at = tooth_influence(model, states[torque], REACH)
+    errors = gap_errors(FLAWED, pitches)
+    superposed = at.respond(at.gap_change(*errors), torque).output_angle
+    flawed, full = thin_ring(FLAWED), []
+    for theta in (pitch_of(FLAWED) * pitches).tolist():
+        rest = solve_unloaded(flawed, theta, -flawed.cage_lag * theta)
+        state = solve_loaded(flawed, rest, np.sign(torque) * SMALL)
+        state = solve_loaded(flawed, state, torque)
+        assert state.outcome.ok
+        full.append(state.rotation - theta / flawed.ratio)
+    cycle = gap_errors(FLAWED, np.arange(0, 5100, 30))
+    size = np.ptp(at.respond(at.gap_change(*cycle), torque).output_angle)
+    assert size > 100e-6
+    assert superposed == pytest.approx(np.array(full), abs=0.05 * size)
+
+
+def test_twice_the_errors_double_their_effect(loaded):
+    """As long as no contact opens or closes: errors of nanometres under load."""
+    model, states = loaded
+    at = tooth_influence(model, states[40.0], REACH)
+    change = 1e-4 * at.gap_change(*gap_errors(FLAWED, np.arange(0, 5100, 300)))
+    once, twice = (
+        at.respond(k * change, 40.0).output_angle - states[40.0].rotation
+        for k in (1.0, 2.0)
+    )
+    assert twice == pytest.approx(2.0 * once, rel=0.02, abs=1e-11)
+
+
+def test_errors_of_one_member_have_its_orders(monkeypatch):
+    """Those of the circular spline are even orders of alpha; the clearance stays."""
+    monkeypatch.setattr(sampling, "LEVELS", (0.03, 0.1, 0.22, 0.43, 0.7, 1.01))
+    monkeypatch.setattr(ring_tolerances, "CHECKS", 2)
+    drive = fit_map(sample_thin_rings(OVAL, angles=3))
+    size = dict(
+        zip(
+            map(tuple, drive.orders.tolist()),
+            np.hypot(*drive.kinematic_error.T),
+            strict=True,
+        )
+    )
+    assert not drive.orders[:, 1].any()
+    assert min(size[2, 0], size[4, 0]) > 5e-6
+    low = {p: a for (p, _), a in size.items() if p < 10}
+    assert max((a for p, a in low.items() if p % 2), default=0.0) < 0.1 * size[2, 0]
+    # the passage of balls is there as without errors
+    assert (drive.info["ball_passage"]["carried_as"], 0) in size
+    assert drive.info["stiffness_range_Nm_rad"][0] > 0.0
+    assert drive.info["label"]["tolerances"]["circular_spline_ovality_um"] == 6.0
+    rows = drive.info["validation"]["rows"]
+    assert next(row["torque_Nm"] for row in rows) == 0.0
+    # only two torques are sampled with errors, and the map lacks the tooth passage
+    assert all(row["output_error_largest"] < 0.2 for row in rows)
+
+
+class Stop(Exception):
+    """An interruption."""
+
+
+def test_what_the_rings_lack_is_left_out(monkeypatch, tmp_path):
+    """Misalignment and friction change no sample, and the label names them."""
+    monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
+    monkeypatch.setattr(sampling, "UNSEEN", (0.5,))
+    monkeypatch.setattr(sampling, "UNSEEN_PHASES", 1)
+    tilted = PERFECT.with_changes(
+        {"tolerances.misalignment_arcmin": 1.0, "friction.tooth_coefficient": 0.1}
+    )
+    plain, other = (sample_thin_rings(d, angles=2) for d in (PERFECT, tilted))
+    for key in ("output_error", "energy", "compliance", "input_torque"):
+        assert np.array_equal(getattr(plain, key), getattr(other, key))
+    assert other.tolerances is None
+    assert "misalignment" in other.info["label"]["left_out"]
+    assert "misalignment" not in plain.info["label"]["left_out"]
+    assert other.info["label"]["friction"] == "left out of the potential"
+    assert other.info["label"]["tolerances"] is None
+
+
+def test_an_interrupted_map_with_errors_resumes_bit_for_bit(monkeypatch, tmp_path):
+    """Finished positions and checks are read from the store."""
+    monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
+    monkeypatch.setattr(ring_tolerances, "CHECKS", 1)
+    keep = Unfinished(folder=tmp_path)
+    whole = sample_thin_rings(OVAL, angles=2, keep=keep)
+
+    def fail(*others, **options):
+        raise Stop
+
+    monkeypatch.setattr(ring_tolerances, "solve_unloaded", fail)
+    again = sample_thin_rings(OVAL, angles=2, keep=keep)
+    assert np.array_equal(whole.tolerances.table, again.tolerances.table)
+    for key in ("output_error", "input_torque"):
+        pair = (getattr(s.tolerances.solved, key) for s in (whole, again))
+        assert np.array_equal(*pair)
