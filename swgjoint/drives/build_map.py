@@ -10,6 +10,7 @@ from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
 from swgjoint.fe.plane.figures.friction_loop import friction_loops
 from swgjoint.fe.rings import sampling as thin_ring
+from swgjoint.fe.rings.friction_loops import ring_friction_loops
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
@@ -33,9 +34,9 @@ def build_map(
     """Compute the drive map of a design with finite elements.
 
     The potential is that of the drive without friction. If the teeth have a friction
-    coefficient, the fidelities ``2d`` and ``3d`` also compute torque loops with
-    friction in 2D and fit hysteresis elements to them; ``info["friction_loop"]``
-    compares the loops with these elements.
+    coefficient, torque loops with friction are computed as well, with thin rings for
+    ``ring`` and in 2D for ``2d`` and ``3d``, and hysteresis elements are fitted to
+    them; ``info["friction_loop"]`` compares the loops with these elements.
 
     Args:
         design: The drive.
@@ -77,10 +78,10 @@ def build_map(
             samples = thin_ring.sample_thin_rings(
                 design, angles=angles, progress=progress, keep=keep
             )
-            return _without_losses(design, fit_map(samples))
-        samples = sample_map(
-            design, model=model, angles=angles, progress=progress, keep=keep
-        )
+        else:
+            samples = sample_map(
+                design, model=model, angles=angles, progress=progress, keep=keep
+            )
         drive = fit_map(samples)
         if design.friction.tooth_coefficient:
             drive = _with_friction(design, drive, progress, keep)
@@ -100,13 +101,18 @@ def _with_friction(
     """The map with hysteresis from tooth friction, or the reason why it has none."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
-        loops = friction_loops(
-            design,
-            top=top,
-            rated=drive.ratings.rated_torque,
-            progress=progress,
-            keep=keep,
-        )
+        if drive.level == "ring":
+            loops = ring_friction_loops(
+                design, top=top, rated=drive.ratings.rated_torque, progress=progress
+            )
+        else:
+            loops = friction_loops(
+                design,
+                top=top,
+                rated=drive.ratings.rated_torque,
+                progress=progress,
+                keep=keep,
+            )
     except ComputationError as failure:
         reason = f"friction of the teeth gives no hysteresis: {failure}"
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}

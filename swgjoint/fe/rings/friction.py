@@ -24,14 +24,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError, Outcome
+from swgjoint.fe.common.friction import STICK_STIFFNESS
 from swgjoint.fe.rings.contacts import PARTS
 from swgjoint.fe.rings.loading import SMALL, positions, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
-from swgjoint.fe.rings.sliding import sliding_sums
+from swgjoint.fe.rings.sliding import sliding_sums, sticking_sum
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.typing import Array
+from swgjoint.units import mm
 
 POSITIONS = 2
 """Number of wave-generator angles in a mean; the torsion differs by 0.2 % between
@@ -69,6 +71,9 @@ class RubbedPath:
     """Mean number of loaded tooth contacts (n,)."""
     outcome: Outcome
     """``CONVERGED``, or the outcome of a failed solve, before which the path ends."""
+    sticking: Array | None = None
+    """Torsional stiffness that contacts add before they slide, between neighbouring
+    torques (n - 1,) [N·m/rad]; None if it was not computed."""
 
     @property
     def torque_per_mu(self) -> Array:
@@ -129,8 +134,8 @@ def friction_path(
     """Torsion and sliding of a drive that is loaded with its wave generator locked.
 
     Args:
-        design: The drive. Its wave generator must have a ball bearing, and its
-            coefficient of friction must be zero.
+        design: The drive. Its wave generator must have a ball bearing; its coefficient
+            of friction is not used.
         torques: Positive torques T [N·m]. A torque of 1 % of the rated torque is added
             as the first one, and smaller ones are dropped.
         angles: Wave-generator angles [rad]; None chooses :data:`POSITIONS` angles.
@@ -139,44 +144,69 @@ def friction_path(
         DesignError: If the design cannot be built or has features that the model lacks.
     """
     model = thin_ring(design)
+    tangential = tangential_stiffness(design, model)
     small = SMALL * ratings_of(design).rated_torque
     wanted = np.unique(np.append(np.asarray(torques, dtype=float).ravel(), small))
     wanted = wanted[wanted >= small]
     at = positions(model, POSITIONS) if angles is None else np.asarray(angles, float)
     tables, outcome = [], Outcome.CONVERGED
     for alpha in at.ravel():
-        rows, ended = _along(model, float(alpha), wanted)
+        rows, ended = _along(model, float(alpha), wanted, tangential)
         tables.append(rows)
         outcome = ended if outcome.ok else outcome
     reached = min(len(rows) for rows in tables)
     table = np.mean([rows[:reached] for rows in tables], axis=0)
-    table = table.reshape(reached, 6 + len(PARTS))
+    table = table.reshape(reached, 7 + len(PARTS))
     series = series_compliance(design, cup=True)
+    torsion = table[:, 0] + series * wanted[:reached]
     return RubbedPath(
         torque=wanted[:reached],
-        torsion=table[:, 0] + series * wanted[:reached],
+        torsion=torsion,
         series=series,
         teeth_work=table[1:, 1],
         race_work=table[1:, 2],
         compliance=table[:, 5] + series,
         shares={
-            name: table[:, 6 + k] / (table[:, 5] + series)
+            name: table[:, 7 + k] / (table[:, 5] + series)
             for k, name in enumerate(PARTS)
         },
         balls=table[:, 3],
         tooth_pairs=table[:, 4],
         outcome=outcome,
+        sticking=table[1:, 6] / np.diff(torsion) ** 2,
     )
 
 
+def tangential_stiffness(design: Design, model: ThinRing) -> dict[str, float]:
+    r"""Tangential stiffness of sticking contacts [N/m], ``tooth`` and ``race``.
+
+    That of a tooth is the stick spring of the 2D friction law. A contact point of bore
+    and race shears the thicknesses whose compression is its normal stiffness k, so that
+    its tangential stiffness is :math:`k\,G/E = k / 2(1 + \nu)`.
+
+    Args:
+        design: The drive.
+        model: Its thin rings.
+    """
+    steel = design.material_of("flexspline")
+    return {
+        "tooth": STICK_STIFFNESS
+        * steel.youngs_modulus
+        * design.drive.face_width_mm
+        * mm,
+        "race": 0.5 * model.press_per_point / (1.0 + steel.poisson_ratio),
+    }
+
+
 def _along(
-    model: ThinRing, alpha: float, torques: Array
+    model: ThinRing, alpha: float, torques: Array, tangential: Mapping[str, float]
 ) -> tuple[list[list[float]], Outcome]:
     """Rows of a loading path at one angle, and the outcome of the last solve.
 
     A row contains the torsion [rad], the friction work per mu of teeth and race since
-    the previous torque [J], the numbers of loaded balls and tooth contacts, and the
-    compliance [rad/(N·m)], in total and by part. The springs in series are excluded.
+    the previous torque [J], the numbers of loaded balls and tooth contacts, the
+    compliance [rad/(N·m)], the work of sticking contacts since the previous torque [J],
+    and the compliance by part. The springs in series are excluded.
     """
     rest = solve_unloaded(model, alpha)
     if not rest.outcome.ok:
@@ -193,7 +223,10 @@ def _along(
             return rows, loaded.outcome
         if not rows:
             middle = 0.5 * (loaded.rotation + down.rotation)
-        work = sliding_sums(model, state, loaded) if rows else (0.0, 0.0)
+        work, stuck = (0.0, 0.0), 0.0
+        if rows:
+            work = sliding_sums(model, state, loaded)
+            stuck = sticking_sum(model, state, loaded, **tangential)
         assert loaded.ball_force is not None
         balls = float((loaded.ball_force > 0.0).sum())
         c = loaded.compliance
@@ -204,6 +237,7 @@ def _along(
                 balls,
                 float(loaded.loaded_teeth),
                 c,
+                stuck,
                 *(c * loaded.shares.get(name, 0.0) for name in PARTS),
             ]
         )

@@ -24,24 +24,55 @@ def sliding_sums(
         first: Equilibrium before the motion.
         last: Equilibrium after the motion.
     """
+    teeth = [_teeth(model, *pair) for pair in ((first, last), (last, first))]
+    weight, slid = _race(model, first, last)
     return (
-        0.5 * (_teeth(model, first, last) + _teeth(model, last, first)),
-        _race(model, first, last),
+        0.5 * sum(float(force @ np.abs(sigma)) for force, sigma in teeth),
+        float(weight @ np.abs(slid)),
     )
 
 
-def _teeth(model: ThinRing, state: ThinRingState, other: ThinRingState) -> float:
-    """Sum of N abs(sigma) over a state's contacts for the motion to another state."""
+def sticking_sum(
+    model: ThinRing,
+    first: ThinRingState,
+    last: ThinRingState,
+    *,
+    tooth: float,
+    race: float,
+) -> float:
+    r"""Sum of :math:`k \sigma^2` over the loaded contacts between two equilibria [J].
+
+    If no contact slides, each one deforms by sigma along its tangent, so that this sum
+    divided by the squared torsion is the stiffness that sticking adds to the drive.
+
+    Args:
+        model: The rings.
+        first: Equilibrium before the motion.
+        last: Equilibrium after the motion.
+        tooth: Tangential stiffness k of a tooth contact [N/m].
+        race: Tangential stiffness k of a contact point of bore and race [N/m].
+    """
+    teeth = [_teeth(model, *pair)[1] for pair in ((first, last), (last, first))]
+    weight, slid = _race(model, first, last)
+    return 0.5 * tooth * sum(float(sigma @ sigma) for sigma in teeth) + race * float(
+        np.sum(slid[weight > 0.0] ** 2)
+    )
+
+
+def _teeth(
+    model: ThinRing, state: ThinRingState, other: ThinRingState
+) -> tuple[Array, Array]:
+    """Normal forces N and distances sigma of a state's contacts to another state."""
     contacts, force = state.contacts, state.tooth_force
     if contacts is None or force is None or not len(force):
-        return 0.0
+        return np.zeros(0), np.zeros(0)
     j = contacts.sector
     feet, angles = zip(*(_tooth_frames(model, s) for s in (state, other)), strict=True)
     point = rotate(contacts.point, angles[0][j])
     turn = angles[1][j] - angles[0][j]
     moved = feet[1][j] + rotate(point - feet[0][j], turn) - point
     along = rotate(contacts.tangent, angles[0][j])
-    return float(force @ np.abs(np.einsum("ni,ni->n", moved, along)))
+    return force, np.einsum("ni,ni->n", moved, along)
 
 
 def _tooth_frames(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
@@ -51,8 +82,13 @@ def _tooth_frames(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:
     return nodes[:, 0], np.arctan2(-slope[:, 1], -slope[:, 0])
 
 
-def _race(model: ThinRing, first: ThinRingState, last: ThinRingState) -> float:
-    """Sum of N abs(sigma) of bore and race, minimised by the creep of the race."""
+def _race(
+    model: ThinRing, first: ThinRingState, last: ThinRingState
+) -> tuple[Array, Array]:
+    """Normal forces N and distances sigma of bore and race.
+
+    The creep of the race minimises the sum of N abs(sigma).
+    """
     forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
     count = model.race.elements
     slid = np.mod(places[1] - places[0] + 0.5 * count, count) - 0.5 * count
@@ -60,7 +96,7 @@ def _race(model: ThinRing, first: ThinRingState, last: ThinRingState) -> float:
     outside = 1.0 + 0.5 * model.bearing.race_thickness / model.race.radius
     slid *= model.race.step * outside
     weight = 0.5 * (forces[0] + forces[1])
-    return float(weight @ np.abs(slid - weighted_median(slid, weight)))
+    return weight, slid - weighted_median(slid, weight)
 
 
 def _pressed(model: ThinRing, state: ThinRingState) -> tuple[Array, Array]:

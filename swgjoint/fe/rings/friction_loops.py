@@ -1,0 +1,145 @@
+r"""Torque loops of the thin rings with friction, for the hysteresis of a map.
+
+:func:`swgjoint.fe.rings.friction.friction_path` provides the frictionless torque
+:math:`T_0(x)` and the torque mu R of contacts that all slide. In between, the contacts
+stick and act like a spring k in series with a slider, whose torque is t:
+
+.. math:: T = T_0(x) + t, \quad dt = k\,dx, \quad |t| \le \mu R(T_0) .
+
+All contacts are thus assumed to start sliding at the same torsion after a reversal; in
+a drive the less loaded ones slide first. Without load the contacts of the teeth carry
+no force, so that R is zero there; the clearance belongs to the elastic torsion.
+"""
+
+from __future__ import annotations
+
+from math import copysign
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.plane.figures.friction_loop import STEPS, loop_torques
+from swgjoint.fe.rings.friction import POSITIONS, RubbedPath, friction_path
+from swgjoint.fe.rings.loading import positions
+from swgjoint.fe.rings.model import thin_ring
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import without_errors
+from swgjoint.maps.fit.hysteresis_loops import FrictionLoop
+from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array
+
+HELD = 0.1
+"""Torque at the ends of a clearance as a fraction of the torque that takes it up [-].
+It determines the stiffness of the elastic torsion in the clearance."""
+
+
+def ring_friction_loops(
+    design: Design, *, top: float, progress: Progress = silent
+) -> tuple[FrictionLoop, ...]:
+    """Torque loops at a few locked input positions, with friction of teeth and race.
+
+    Manufacturing errors are not included.
+
+    Args:
+        design: A drive with a coefficient of friction.
+        top: Largest torque [N·m].
+        progress: Called with the stage, the number of finished loops and their total.
+
+    Returns:
+        One loop per position.
+
+    Raises:
+        DesignError: If the design cannot be built or has features that the model lacks.
+        ComputationError: If the largest torque cannot be reached.
+    """
+    perfect, name = without_errors(design), design.drive.name
+    torque, stage = loop_torques(top), f"{name}: friction loops of the thin rings"
+    outward = np.unique(torque[torque > 0.0])
+    loops = []
+    places = positions(thin_ring(perfect), POSITIONS).tolist()
+    for k, angle in enumerate(places):
+        progress(stage, k, len(places))
+        path = friction_path(perfect, outward, angles=[angle])
+        if not path.outcome.ok:
+            raise ComputationError(
+                f"{name}: no equilibrium of the thin rings above {path.torque[-1]:.4g}"
+                f" N·m at input angle {angle:.4g} rad: {path.outcome.value}"
+            )
+        loops.append(
+            path_loop(path, torque, design.friction.tooth_coefficient, angle, STEPS)
+        )
+    progress(stage, len(places), len(places))
+    return tuple(loops)
+
+
+def path_loop(
+    path: RubbedPath, torque: Array, mu: float, input_angle: float, quarter: int
+) -> FrictionLoop:
+    """Torque loop of a drive from its frictionless loading path.
+
+    Args:
+        path: Loading path with the stiffness of sticking contacts. Its torques include
+            all positive torques of the loop.
+        torque: Torques of the loop, see :class:`FrictionLoop` (n,) [N·m].
+        mu: Coefficient of friction [-].
+        input_angle: Locked input angle theta [rad].
+        quarter: Number of steps in each quarter of the last round.
+    """
+    assert path.sticking is not None
+    # the torques of the path without the one that only takes up the clearance
+    on = np.isin(path.torque, torque)
+    load, torsion, stiff = path.torque[on], path.torsion[on], 1.0 / path.compliance[on]
+    half, first = path.torsion_at(0.0), 1.0 / float(path.compliance[0])
+    held = min(first, HELD * float(path.torque[0]) / half) if half > 0.0 else first
+    knots = np.concatenate([-torsion[::-1], [0.0], torsion])
+    slopes = np.concatenate([stiff[::-1], [held], stiff])
+    loads = np.concatenate([-load[::-1], [0.0], load])
+    elastic = CubicHermiteSpline(knots, loads, slopes)
+
+    middle = 0.5 * (path.torque[:-1] + path.torque[1:])
+    # friction per load at the ends is that of the outermost intervals
+    share = path.torque_per_mu / middle
+
+    def limit(elastic_torque: float) -> float:
+        """Friction torque of sliding contacts [N·m]."""
+        size = abs(elastic_torque)
+        return mu * size * float(np.interp(size, middle, share))
+
+    def stick(elastic_torque: float) -> float:
+        """Stiffness of sticking contacts [N·m/rad]."""
+        assert path.sticking is not None
+        return float(np.interp(abs(elastic_torque), middle, path.sticking))
+
+    def rubbed(x: float, x_0: float, t_0: float) -> float:
+        """Friction torque at a torsion, after that at an earlier torsion [N·m]."""
+        at = float(elastic(x))
+        most, t = limit(at), t_0 + stick(at) * (x - x_0)
+        return t if abs(t) <= most else copysign(most, t)
+
+    def excess(x: float, x_0: float, t_0: float, wanted: float) -> float:
+        """Torque at a torsion minus the wanted one [N·m]."""
+        return float(elastic(x)) + rubbed(x, x_0, t_0) - wanted
+
+    x, t, work = 0.0, 0.0, 0.0
+    rows = [(x, work)]
+    reach = float(torsion[-1])
+    for wanted in torque[1:].tolist():
+        x_0, t_0 = x, t
+        x = float(brentq(excess, -reach, reach, args=(x_0, t_0, wanted), xtol=1e-15))
+        t = rubbed(x, x_0, t_0)
+        slid = x - x_0 - (t - t_0) / stick(float(elastic(x)))
+        work += max(0.0, t * slid)
+        rows.append((x, work))
+    place = np.searchsorted(loads, torque)
+    torsions, works = np.array(rows).T
+    return FrictionLoop(
+        input_angle=input_angle,
+        quarter=quarter,
+        torque=torque,
+        torsion=torsions,
+        elastic_torsion=knots[place],
+        stiffness=slopes[place],
+        work=works,
+    )
