@@ -102,10 +102,14 @@ def test_known_potential_of_both_angles_comes_back(layout):
         assert np.abs(drive.torque(x, theta, ideal) - torque).max() < 1e-3 * K * 2e-3
 
 
-def test_pattern_of_other_order_than_the_teeth():
-    """Balls pass 8 times a turn, errors are sampled at every pitch: orders of both."""
-    samples = known("circular_spline_fixed", phases=1)
+def test_pattern_of_other_order_than_the_teeth(monkeypatch):
+    """Balls pass 8 times a turn, errors are sampled at every pitch: orders of both.
+
+    Errors of the order of the balls are added to it.
+    """
     balls = 8
+    monkeypatch.setitem(ERRORS, (balls, 0), 2e-6)
+    samples = known("circular_spline_fixed", phases=1)
     few = replace(
         samples,
         order=(balls, 0),
@@ -118,6 +122,7 @@ def test_pattern_of_other_order_than_the_teeth():
     e0, _, _ = drive.error_at(drive.phases(theta, ideal))
     wanted = waves(ERRORS, theta, theta - ideal) + 1e-6 * np.cos(balls * theta)
     assert np.abs(e0 - wanted).max() < 1e-9
+    assert len(np.unique(drive.orders, axis=0)) == len(drive.orders)
     # the tables contain no other harmonics than these
     cycle = np.array([[CYCLE // CIRCULAR_SPLINE, CYCLE // FLEXSPLINE]])
     named = [(2, 0), (0, 2)]

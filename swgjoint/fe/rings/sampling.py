@@ -46,6 +46,9 @@ from swgjoint.typing import Array
 
 PHASES = 12
 """Number of positions of the balls over one passage."""
+FLAWED_PHASES = 6
+"""The same number for a drive with manufacturing errors, which outweigh the passage of
+the balls."""
 LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.01)
 """Sampled torques, of both signs, as fractions of the repeated peak torque [-]. They
 are closer together where additional balls become loaded. The last one exceeds the peak
@@ -96,7 +99,8 @@ def sample_thin_rings(
 
     Args:
         design: The drive.
-        angles: Number of positions over one passage; None chooses :data:`PHASES`.
+        angles: Number of positions over one passage; None chooses :data:`PHASES`, or
+            :data:`FLAWED_PHASES` with manufacturing errors.
         progress: Called with the stage, the number of finished positions and their
             total.
         keep: Store of the results by position, from which an interrupted run resumes
@@ -112,12 +116,14 @@ def sample_thin_rings(
     check_modelled(design)
     begin, ratings = time.perf_counter(), ratings_of(design)
     perfect, flawed = without_errors(design), without_misalignment(design)
+    if angles is None:
+        angles = FLAWED_PHASES if has_errors(flawed) else PHASES
     model = thin_ring(perfect)
     sampler = _Sampler(
         design=design,
         model=model,
         passage=ball_passage(perfect, model),
-        count=PHASES if angles is None else angles,
+        count=angles,
         small=SMALL * ratings.rated_torque,
         series=series_compliance(design, cup=True),
         keep=keep,

@@ -114,11 +114,17 @@ class RingErrors:
         errors = gap_errors(self.design, pitches)
         model = with_shifting_teeth(thin_ring(with_perfect_teeth(self.design)))
         total = len(phases) + CHECKS
-        tables = []
+        # positions of the balls alternate from pitch to pitch if the cycle permits: the
+        # harmonics that one of them resolves are then those of their mean
+        shares = len(phases) if pitches.size % len(phases) == 0 else 1
+        table = np.zeros((3, 2 * levels.size + 1, pitches.size))
         for k, phase in enumerate(phases.tolist()):
-            tables.append(self._over_cycle(k, model, phase, levels, errors))
+            part = slice(k if shares > 1 else 0, None, shares)
+            some = tuple(one[part] for one in errors)
+            found = self._over_cycle(k, model, phase, levels, some)
+            table[..., part] += found * (shares / len(phases))
             self.progress(stage, k + 1, total)
-        table, waves = _main_harmonics(np.mean(tables, axis=0))
+        table, waves = _main_harmonics(table, shares)
         torque = np.concatenate([-levels[::-1], [0.0], levels])
         if self.free:
             table, torque = _with_mean_clearance(table, levels)
@@ -309,17 +315,19 @@ def spring_energy(up: Array, down: Array, small: float) -> Array:
     return 0.25 * HELD * small * (down - up)
 
 
-def _main_harmonics(table: Array) -> tuple[Array, Index]:
+def _main_harmonics(table: Array, shares: int) -> tuple[Array, Index]:
     """Table with its mean and main harmonics only, and their numbers of waves.
 
     Random errors of single teeth spread over thousands of harmonics.
 
     Args:
         table: Output angle, energy and compliance over the cycle (3, n_torques, n).
+        shares: Number of positions of the balls that alternate from pitch to pitch.
     """
     count = table.shape[-1]
     spectrum = np.fft.rfft(table)
-    spectrum[..., (count + 1) // 2 :] = 0.0  # undetermined phase
+    # the phase of half as many waves as pitches is undetermined
+    spectrum[..., (count // shares + 1) // 2 :] = 0.0
     size = np.abs(spectrum[0, :, 1:])
     largest = np.maximum(size.max(axis=1, keepdims=True, initial=0.0), 1e-300)
     kept = np.append(True, (size > KEEP * largest).any(axis=0))

@@ -226,6 +226,15 @@ def combine_modes(
     sampled = modes.waves if tolerances.waves is None else tolerances.waves
     others = np.setdiff1d(sampled, modes.waves[::cycle])
     pattern = np.arange(count)
+    # errors may have an order of a pattern that is not that of the teeth
+    own = pattern[1:, None] * np.array([samples.order])
+    shared = (modes.orders[others][:, None] == own).all(axis=-1)
+    for k, wave in zip(
+        np.nonzero(shared)[1] + 1, others[shared.any(axis=1)], strict=True
+    ):
+        potential[k] += _refined(modes.potential[[wave]], knots, coarse)[0]
+        error[k] += modes.error[wave]
+    others = others[~shared.any(axis=1)]
     orders = np.concatenate(
         [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
     )
