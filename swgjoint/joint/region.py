@@ -42,6 +42,8 @@ runs                                       number failed  criterion of failure
 free, 2 s                                  2302   1       gains > 5 % energy
 one to three hysteresis elements of        2254   2       gains > 5 %, elements
 0.1 to 20 K stiffness, 1 s                                included
+same, yield torques that depend on         820    0       same; largest gain 2.8 %
+the load
 step divided to the edge of the region     ~600   2       gains energy
 step divided with the margin               228    0       gains energy
 dropped on a floor                         5480   9       gains > 5 % more than the
