@@ -54,3 +54,31 @@ def test_a_run_says_where_hysteresis_is(bench):
     linear = bench(LOSSY, defaults__level="linear").contains
     assert linear["joints"]["joint"]["hysteresis_elements"] == 0
     assert any("hysteresis" in item["part"] for item in linear["left_out"])
+
+
+def test_torque_of_a_sweep_follows_the_load(bench):
+    """Elements with yield curves: played on the record, they still move the link.
+
+    The played law takes each sample's elastic torque, the scheme that of the middle of
+    a step.
+    """
+    curve = ((10.0, 6.0), (30.0, 1.0))
+    element = Jenkin(stiffness=6e4, yield_torque=1.0, yield_curve=curve)
+    sweep = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.05, "end_deg": {"joint": 20.0}}
+    run = bench(
+        replace(LOSSY, hysteresis=(element,)),
+        trajectory=sweep,
+        simulation={"duration_s": 1.0, "step_s": 2e-4},
+    )
+    moves = slice(10, -10)
+    needed = (20.0 + np.gradient(run.velocity[:, 0], 2e-4))[moves]
+    torque = run.output_torque[moves, 0]
+    off = torque - needed
+    assert np.sqrt(np.mean(off**2)) < 0.05 * np.ptp(torque)
+    # the element carries more than its yield torque without load
+    spring = 2e4 * run.torsion[moves, 0]
+    assert np.abs(torque - spring).max() > 2.0
+    native = bench(
+        replace(LOSSY, hysteresis=(element,)), defaults__level="native"
+    ).contains
+    assert any("with the load" in item["part"] for item in native["left_out"])
