@@ -227,13 +227,13 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     assert steps == [(k, steps[0][1]) for k in range(len(steps))]
     assert steps[0][1] in (total, total - 4)  # a clearance adds its ends afterwards
     superposed = []
-    table = tolerance_sampling._over_torque
+    table = tolerance_sampling.respond_over_torque
 
     def counted(rest, errors, *others):
         superposed.append(len(errors[0]))
         return table(rest, errors, *others)
 
-    monkeypatch.setattr(tolerance_sampling, "_over_torque", counted)
+    monkeypatch.setattr(tolerance_sampling, "respond_over_torque", counted)
     found = sample_tolerances(design, **options, keep=keep)
     # the drive without errors, twice; with them only what was not finished
     assert sorted(superposed) == [1, 1, 62]

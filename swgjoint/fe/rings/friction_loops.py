@@ -20,13 +20,13 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.plane.figures.friction_loop import STEPS, loop_torques
+from swgjoint.fe.plane.figures.friction_loop import whole_path
 from swgjoint.fe.rings.friction import POSITIONS, RubbedPath, friction_path
 from swgjoint.fe.rings.loading import positions
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
-from swgjoint.maps.fit.hysteresis_loops import FrictionLoop
+from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
@@ -36,7 +36,11 @@ It determines the stiffness of the elastic torsion in the clearance."""
 
 
 def ring_friction_loops(
-    design: Design, *, top: float, progress: Progress = silent
+    design: Design,
+    *,
+    top: float,
+    rated: float | None = None,
+    progress: Progress = silent,
 ) -> tuple[FrictionLoop, ...]:
     """Torque loops at a few locked input positions, with friction of teeth and race.
 
@@ -45,18 +49,22 @@ def ring_friction_loops(
     Args:
         design: A drive with a coefficient of friction.
         top: Largest torque [N·m].
+        rated: Rated torque, which adds the small loops of
+            :func:`swgjoint.fe.plane.figures.friction_loop.small_loop_torques` [N·m];
+            None adds none.
         progress: Called with the stage, the number of finished loops and their total.
 
     Returns:
-        One loop per position.
+        One loop per position, followed by its small loops.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If the largest torque cannot be reached.
     """
     perfect, name = without_errors(design), design.drive.name
-    torque, stage = loop_torques(top), f"{name}: friction loops of the thin rings"
-    outward = np.unique(torque[torque > 0.0])
+    torque, ends = whole_path(top, rated)
+    stage = f"{name}: friction loops of the thin rings"
+    outward = np.unique(np.abs(torque))[1:]
     loops = []
     places = positions(thin_ring(perfect), POSITIONS).tolist()
     for k, angle in enumerate(places):
@@ -67,9 +75,10 @@ def ring_friction_loops(
                 f"{name}: no equilibrium of the thin rings above {path.torque[-1]:.4g}"
                 f" N·m at input angle {angle:.4g} rad: {path.outcome.value}"
             )
-        loops.append(
-            path_loop(path, torque, design.friction.tooth_coefficient, angle, STEPS)
+        loop = path_loop(
+            path, torque, design.friction.tooth_coefficient, angle, ends[-1][1]
         )
+        loops += [loop.cut_path(end, quarter) for end, quarter in ends]
     progress(stage, len(places), len(places))
     return tuple(loops)
 

@@ -247,7 +247,8 @@ def _loop_figures(
         missing["hysteresis_loss_arcmin"] = (
             "the torque loop is conservative: the map has no hysteresis"
             if not drive.hysteresis
-            else "the hysteresis elements of the map do not slip within this loop"
+            else "the loop of the map has no width at zero torque: its hysteresis"
+            " elements do not slip there"
         )
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 

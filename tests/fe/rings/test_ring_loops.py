@@ -108,9 +108,9 @@ def test_no_friction_gives_no_elements(monkeypatch):
         friction_loops, "friction_path", lambda design, torques, angles: known(1e-4)
     )
     design = Design.preset("size-25-50")
-    smooth = fit_elements(ring_friction_loops(design, top=TOP))
+    smooth = fit_elements(ring_friction_loops(design, top=TOP), 1e5)
     assert sum(element.yield_torque for element in smooth) < 1e-12
     rough = design.with_changes({"friction.tooth_coefficient": MU})
     loops = ring_friction_loops(rough, top=TOP)
     assert len(loops) == 2
-    assert fit_elements(loops)
+    assert fit_elements(loops, 1e5)

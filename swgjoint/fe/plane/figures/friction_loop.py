@@ -88,6 +88,29 @@ def small_loop_torques(top: float, rated: float) -> list[Array]:
     return paths
 
 
+def whole_path(
+    top: float, rated: float | None, steps: int = STEPS
+) -> tuple[Array, list[tuple[int, int]]]:
+    """Torques of the large loop, followed by those of the small loops.
+
+    Args:
+        top: Largest torque [N·m].
+        rated: Rated torque, which adds the small loops [N·m]; None adds none.
+        steps: Number of steps from zero to the largest torque, a multiple of
+            :data:`FIRST_STEPS`.
+
+    Returns:
+        Torques (n,) [N·m]; by loop, the number of torques up to its end and the number
+        of steps in a quarter of its last round.
+    """
+    paths = [loop_torques(top, steps)]
+    if rated is not None:
+        paths += small_loop_torques(top, rated)
+    ends = np.cumsum([path.size for path in paths]).tolist()
+    quarters = [steps, *[SMALL_STEPS] * (len(paths) - 1)]
+    return np.concatenate(paths), list(zip(ends, quarters, strict=True))
+
+
 def friction_loops(
     design: Design,
     *,
@@ -132,11 +155,7 @@ def friction_loops(
     model = sector_model(perfect, half="auto", cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
-    paths = [loop_torques(top, steps)]
-    if rated is not None:
-        paths += small_loop_torques(top, rated)
-    torque, ends = np.concatenate(paths), np.cumsum([path.size for path in paths])
-    quarters = [steps, *[SMALL_STEPS] * (len(paths) - 1)]
+    torque, ends = whole_path(top, rated, steps)
     outward = np.unique(torque)
     series = series_compliance(design, cup=True)
     loops: list[FrictionLoop] = []  # along the whole path
@@ -169,7 +188,7 @@ def friction_loops(
         loops.append(
             FrictionLoop(
                 input_angle=theta,
-                quarter=quarters[-1],
+                quarter=ends[-1][1],
                 torque=torque,
                 torsion=np.array([ideal - rubbing.output_angle(s) for s in rubbed])
                 + series * torque,
@@ -184,11 +203,7 @@ def friction_loops(
         if keep is not None:
             values = {item.name: getattr(loops[-1], item.name) for item in _FIELDS}
             keep.write(_LOOP.format(k), values)
-    return tuple(
-        loop.cut_path(int(end), quarter)
-        for loop in loops
-        for end, quarter in zip(ends, quarters, strict=True)
-    )
+    return tuple(loop.cut_path(end, quarter) for loop in loops for end, quarter in ends)
 
 
 def _kept(
