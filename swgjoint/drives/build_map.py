@@ -59,20 +59,14 @@ def build_map(
         ComputationError: If the solver converges at none of the torques.
     """
     model = model or default_model(design)
-    if model == "3d":
-        drive3d.check_modelled(design)
-    elif model == "ring":
-        thin_ring.check_modelled(design)
-    else:
-        drive2d.check_modelled(design, model)
-
+    check_level(design, model)
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     keep = Unfinished.from_parts(parts) if cache else None
 
     def build() -> DriveMap:
         if model == "3d":
-            hint = "takes about 20 min; 2d and ring are faster"
+            hint = "takes 7 to 15 min; 2d and ring are faster"
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
             samples = thin_ring.sample_thin_rings(
@@ -93,6 +87,29 @@ def build_map(
     if keep is not None:
         keep.clear()  # only once the map itself is in the cache
     return drive
+
+
+def check_level(design: Design, model: str) -> None:
+    """Reject designs without a map at a level.
+
+    A feature that a level lacks is no reason: it is left out, and the label of the map
+    names it, see :func:`swgjoint.fe.plane.drive2d.unmodelled_parts`.
+
+    Args:
+        design: The drive.
+        model: Level of the map: ``ring``, ``2d`` or ``3d``.
+
+    Raises:
+        DesignError: If the level is unknown, or the design lacks what the level
+            needs: a cup in 3D; for thin rings a bearing with a smooth cam and a fixed
+            circular spline.
+    """
+    if model == "3d":
+        drive3d.check_modelled(design)
+    elif model == "ring":
+        thin_ring.check_modelled(design)
+    else:
+        drive2d.check_modelled(design, model)
 
 
 def _with_friction(
