@@ -138,7 +138,7 @@ def test_errors_that_repeat_soon_are_not_extrapolated(key):
     cycle = np.arange(pitches_of(alone))
     dense = []
     for k, rest in enumerate(rests):
-        at = rest.at.with_supports()
+        at = rest.at.with_supports
         outline = np.tile(outline_change(rest.at, alone), (cycle.size, 1))
         teeth = rest.at.gap_change(*gap_errors(alone, cycle))
         angle = at.respond(np.hstack([teeth, outline]), 0.0).output_angle

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from messages import naming
@@ -59,10 +62,21 @@ def test_errors_of_the_wave_generator_are_superposed(flawed, perfect, torque):
     teeth = perfect.gap_change(*errors)
     outline = np.tile(outline_change(perfect, DESIGN), (len(teeth), 1))
     both = np.concatenate([teeth, outline], axis=1)
-    found = perfect.with_supports().respond(both, torque).output_angle
+    found = perfect.with_supports.respond(both, torque).output_angle
     left_out = perfect.respond(teeth, torque).output_angle
     # second order in micrometres, other contacts at the flanks
     assert np.abs(found - exact).max() < 0.03 * np.abs(left_out - exact).max()
+
+
+def test_an_influence_is_sent_without_what_it_determines(perfect):
+    """Compiled problems cannot be sent; a copy solves its own with the same result."""
+    teeth = perfect.gap_change(*gap_errors(DESIGN, np.arange(0, 7320, 1800)))
+    both = np.pad(teeth, ((0, 0), (0, len(perfect.matrix) - teeth.shape[1])))
+    ours = perfect.with_supports.respond(both, 5.0)
+    copy = pickle.loads(pickle.dumps(perfect))
+    assert set(vars(copy)) == {item.name for item in fields(perfect)}
+    theirs = copy.with_supports.respond(both, 5.0)
+    assert np.array_equal(ours.output_angle, theirs.output_angle)
 
 
 def test_energy_follows_the_outline(perfect):
@@ -71,7 +85,7 @@ def test_energy_follows_the_outline(perfect):
     teeth = perfect.gap_change(*errors)
     outline = np.tile(outline_change(perfect, DESIGN), (len(teeth), 1))
     both = np.concatenate([teeth, outline], axis=1)
-    at, step = perfect.with_supports(), 1e-4
+    at, step = perfect.with_supports, 1e-4
     low, middle, high = (at.respond(both, 10.0 + d) for d in (-step, 0.0, step))
     slope = (high.potential - low.potential) / (2.0 * step)
     np.testing.assert_allclose(slope, middle.output_angle, rtol=1e-6)

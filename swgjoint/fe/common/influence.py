@@ -18,8 +18,9 @@ its solution.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -97,6 +98,11 @@ class Influence:
     """Positions of the other contacts in the frame of the wave generator (m - n, 2)
     [m]; 2D models only."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what they determine is not sent to other processes."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    @cached_property
     def with_supports(self) -> Influence:
         """Influence that also accepts gap changes at the wave generator.
 
@@ -146,7 +152,7 @@ class Influence:
 
         Args:
             gap_change: Gap changes, one set of errors per row (n_sets, n) [m]; m
-                columns after :meth:`with_supports`.
+                columns with :attr:`with_supports`.
             torque: Torque T [N·m].
             start: Active sets of a nearby solution (n_sets, m); None for empty sets.
         """

@@ -48,10 +48,10 @@ SAMPLES = 12
 """Number of problems that are solved first to find a base for judging similarity."""
 PROBES = 5
 """Number of problems of a part whose solutions determine its base."""
-FEW = 48
-"""Number of active unknowns up to which a part is solved without a base. With a base,
-what is left to solve for are the differences from it, but a base costs as much as
-some ten problems."""
+FEW = 24
+"""Mean number of active unknowns up to which a part is solved without a base, if a base
+would save no more. With a base, what is left to solve for are the differences from it,
+but a base costs as much as some thirty problems."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -290,51 +290,53 @@ class StripProblems:
             result[part], active[part], approach[part] = values, ends, moved
             slope[part], solved[part] = slopes + base.slope, done
 
-        def chosen(ends: Mask, size: int) -> tuple[Base, Any]:
-            """Base for problems whose solutions are near an active set."""
-            if ends.sum() <= FEW or size == 1:
+        def chosen(sets: Mask, size: int) -> tuple[Base, Any]:
+            """Base for problems whose active sets are like these (k, m)."""
+            ends = sets.mean(axis=0) > 0.5
+            saved = sets.sum(axis=1) - (sets ^ ends).sum(axis=1)
+            if size == 1 or not sets.size or saved.mean() <= FEW:
                 return self._origin, self._native_origin
             base = self._origin.exchange(ends)
             return base, self._native(base)
 
         def solve_guessed(parts: list[Index]) -> None:
             for part in parts:
-                ends = active[part].mean(axis=0) > 0.5
-                base, problems = chosen(ends, part.size)
+                base, problems = chosen(active[part], part.size)
                 solve(part, base, problems, np.full(part.size, -1))
 
-        def usual(part: Index, otherwise: Mask) -> Mask:
-            """Active set of most of the problems of a part that were solved."""
+        def collect(part: Index, otherwise: Mask) -> Mask:
+            """Active sets of the problems of a part that were solved (k, m)."""
             sound = part[solved[part]]
-            return active[sound].mean(axis=0) > 0.5 if sound.size else otherwise
+            return active[sound] if sound.size else otherwise
 
         def solve_unguessed(parts: list[Index]) -> None:
             """Start from the most similar problem that is solved already."""
-            last = first_ends
+            last = first_sets
             for part in parts:
                 base, problems = common
                 rows, before = next_to(similar_at[part])
                 part = part[rows]
-                active[part[0]] = last
-                if base.inside.size and part.size > 4 * PROBES:
+                active[part[0]] = last.mean(axis=0) > 0.5
+                if crowded and part.size > 4 * PROBES:
                     probes = part[:: -(-part.size // PROBES)]
                     solve(probes, base, problems, np.arange(probes.size) - 1)
-                    last = usual(probes, last)
+                    last = collect(probes, last)
                     base, problems = chosen(last, part.size)
-                    active[part[0]] = last
+                    active[part[0]] = last.mean(axis=0) > 0.5
                 solve(part, base, problems, before)
-                last = usual(part, last)
+                last = collect(part, last)
 
         if start is None:
-            samples = np.concatenate([p[:1] for p in similar_parts(q, PART)])
+            samples = np.concatenate([part[:1] for part in similar_parts(q, PART)])
             samples = samples[:: -(-samples.size // SAMPLES)]
             first, rest = samples[:1], samples[1:]
             solve(first, self._origin, self._native_origin, np.full(1, -1))
             active[rest[:1]] = active[first]
-            base, problems = chosen(active[first[0]], count)
-            solve(rest, base, problems, np.arange(rest.size) - 1)
-            first_ends = usual(samples, np.zeros(m, bool))
-            common = chosen(first_ends, count)
+            solve(rest, *chosen(active[first], count), np.arange(rest.size) - 1)
+            first_sets = collect(samples, np.zeros((1, m), bool))
+            common = chosen(first_sets, count)
+            # one part is like the samples
+            crowded = count > PART and first_sets.sum(axis=1).mean() > FEW
             similar_at = common[0].offset_of(q)
             parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
         else:

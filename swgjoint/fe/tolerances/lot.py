@@ -109,7 +109,7 @@ def sample_lot(
         errors = [gap_errors(drive, pitch[here]) for drive in drives]
         unloaded[:, here] = _unloaded(rest, drives, errors, rated)
         at = rest.sides[0][1]
-        response = at.with_supports().respond(_gap_changes(at, drives, errors), rated)
+        response = at.with_supports.respond(_gap_changes(at, drives, errors), rated)
         part = (len(drives), -1)
         loaded[:, here] = (response.output_angle - series * rated).reshape(part)
         compliance[:, here] = (response.compliance + series).reshape(part)
@@ -185,7 +185,7 @@ def _unloaded(
     """Unloaded psi, or the middle of its range if free (n, n_positions) [rad]."""
     loads = (0.0,) if rest.opposite is None else (SMALL * rated, -SMALL * rated)
     angles = [
-        at.with_supports().respond(_gap_changes(at, drives, errors), load).output_angle
+        at.with_supports.respond(_gap_changes(at, drives, errors), load).output_angle
         for load, (_, at) in zip(loads, rest.sides, strict=False)
     ]
     return np.asarray(np.mean(angles, axis=0)).reshape(len(drives), -1)
