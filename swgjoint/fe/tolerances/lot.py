@@ -2,7 +2,7 @@
 
 The perfect drive is linearised at a few positions within a pitch. The errors of the
 teeth and the wave generator of every drive are superposed at these positions, which
-takes a fraction of a millisecond per equilibrium.
+takes about a millisecond per equilibrium.
 """
 
 from __future__ import annotations
