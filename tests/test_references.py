@@ -31,6 +31,8 @@ def exists(name: str) -> bool:
                 continue
         except ModuleNotFoundError:
             continue
+        except ImportError:  # the parent package is optional
+            return True
         try:
             found = import_module(".".join(words[:k]))
         except ImportError:  # of an optional package

@@ -48,9 +48,16 @@ needed, up to :data:`MOST_ANGLES`: contact events cause corners in the output er
 with some wave generators at a few torques only and with others at every angle."""
 MOST_ANGLES = 96
 """Largest number of input positions over one pitch in a 2D map."""
-SOLVES = 1050
+SOLVES = 2900
 """Largest number of equilibria of a 2D map, doubled if both signs of torque are
-sampled. An elliptical wave generator needs about half of it."""
+sampled. An elliptical wave generator needs about a fifth of it, a simplified one all of
+it."""
+TOLERANCED_SOLVES = 1050
+"""The same for a map with tooth errors, whose accuracy is limited by the harmonics that
+it leaves out."""
+ANNOUNCED = 0.3
+"""Fraction of the largest number of equilibria that is announced at first [-]. The
+announced number grows with the finished ones."""
 UNSEEN = (16, 7)
 """Numbers of validation torques of one sign and of validation angles of a 2D map."""
 SOLID_ANGLES = 16
@@ -111,8 +118,8 @@ def sample_map(
         angles: Number of input positions over one pitch of the fixed member, with up to
             :data:`FIXED_SOLVES` equilibria each on average. None chooses as many as the
             drive needs, starting from :data:`ANGLES` (2D) or :data:`SOLID_ANGLES` (3D).
-        progress: Called with the stage, the number of finished solves and their largest
-            number.
+        progress: Called with the stage, the number of finished solves and the number
+            announced, which may grow.
         keep: Store of all equilibria, from which an interrupted run resumes with
             bit-identical samples. None stores none.
 
@@ -132,13 +139,14 @@ def sample_map(
     effort = effort_of(
         model, angles, both_signs=not symmetric, errors=has_errors(design)
     )
-    total, done = effort.solves, 0
+    done, total = 0, int(ANNOUNCED * effort.solves)
     stages = len(STAGES) if has_errors(design) else 1
     stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
 
     def tick() -> None:
-        nonlocal done
+        nonlocal done, total
         done += 1
+        total = min(effort.solves, max(total, int(1.2 * done)))
         progress(stage, min(done, total), total)
 
     pattern, shown, surface = _solved(design, model, effort, tick, keep)
@@ -318,7 +326,7 @@ def effort_of(
         solves = angles * FIXED_SOLVES + unseen[0] * unseen[1]
         most = angles
     else:
-        solves = SOLID_SOLVES if solid else SOLVES
+        solves = SOLID_SOLVES if solid else TOLERANCED_SOLVES if errors else SOLVES
         angles = SOLID_ANGLES if solid else ANGLES
         most = angles
         while 2 * most <= (SOLID_MOST_ANGLES if solid else MOST_ANGLES):
