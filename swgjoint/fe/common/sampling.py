@@ -48,7 +48,7 @@ needed, up to :data:`MOST_ANGLES`: contact events cause corners in the output er
 with some wave generators at a few torques only and with others at every angle."""
 MOST_ANGLES = 96
 """Largest number of input positions over one pitch in a 2D map."""
-SOLVES = 2900
+SOLVES = 2700
 """Largest number of equilibria of a 2D map, doubled if both signs of torque are
 sampled. An elliptical wave generator needs about a fifth of it, a simplified one all of
 it."""
