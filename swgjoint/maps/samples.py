@@ -53,6 +53,9 @@ class ToleranceSamples:
     waves: Index | None = None
     """Numbers of waves in the cycle that the tables contain; None for any number. Shape
     (n,)."""
+    onsets: bool = False
+    """Whether the torques next to zero are those at the ends of a clearance, see
+    :func:`swgjoint.fe.common.clearance.across_clearance`."""
     free: int = 0
     """Number of positions where the unloaded output has clearance; they are sampled in
     the middle of the clearance."""
@@ -76,16 +79,6 @@ class ToleranceSamples:
     def zero(self) -> int:
         """Row of zero torque."""
         return int(np.flatnonzero(self.torque == 0.0)[0])
-
-    @property
-    def has_onsets(self) -> bool:
-        """Whether the rows next to zero torque are the ends of a clearance.
-
-        The torque there is a tiny fraction of the next one, see
-        :func:`swgjoint.fe.common.clearance.across_clearance`.
-        """
-        positive = self.torque[self.zero + 1 :]
-        return positive.size > 1 and bool(positive[0] < 1e-6 * positive[1])
 
     def in_series(self, compliance: float) -> ToleranceSamples:
         """The samples of the drive in series with an output spring.

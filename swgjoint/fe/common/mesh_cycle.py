@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.angle_columns import AngleColumn
+from swgjoint.fe.common.clearance import FAINT
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
@@ -51,6 +52,9 @@ class Effort:
     """Number of validation torques of one sign, and number of validation angles."""
     torques: int
     """Largest number of torques of one sign in the table."""
+    faint: float = FAINT
+    """Torque at the ends of a clearance as a fraction of the torque that takes it up
+    [-]."""
     beyond: bool = False
     """Whether to solve, at the end, one torque of each sign beyond the largest one."""
 
@@ -295,7 +299,7 @@ def _table(
     grid: ColumnGrid[AnyState], count: int, effort: Effort, *, symmetric: bool
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Torques, table and mask of the solved torques, as in :class:`Pattern`."""
-    tables, solved = grid.tables(count, effort.torques)
+    tables, solved = grid.tables(count, effort.torques, effort.faint)
     if symmetric:
         tables = with_mirrored_torques(tables)
         solved |= {-t for t in solved}

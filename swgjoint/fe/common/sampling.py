@@ -10,6 +10,7 @@ from math import pi
 from typing import Any
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.clearance import FAINT, HELD
 from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
@@ -337,6 +338,7 @@ def effort_of(
         solves=solves * (2 if both_signs else 1),
         unseen=unseen,
         torques=TOLERANCED_TORQUES if errors else TORQUES,
+        faint=HELD if errors else FAINT,
         # in 3D these solves are better spent on other torques, and a map with tooth
         # errors is extrapolated beyond its samples anyway
         beyond=not solid and not errors,

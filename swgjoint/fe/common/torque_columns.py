@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
-from swgjoint.fe.common.clearance import across_clearance
+from swgjoint.fe.common.clearance import FAINT, across_clearance
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState
 from swgjoint.fe.common.load_path import LoadPath
@@ -318,7 +318,9 @@ class ColumnGrid(SolvedColumns[AnyState]):
             input_torque=moments,
         )
 
-    def tables(self, count: int, most: int) -> tuple[dict[float, Array], set[float]]:
+    def tables(
+        self, count: int, most: int, faint: float = FAINT
+    ) -> tuple[dict[float, Array], set[float]]:
         """Tables of the map by torque.
 
         If clearance leaves the output free, rows are added at its ends, see
@@ -327,6 +329,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
         Args:
             count: Number of columns.
             most: Largest number of torques of one sign in addition to the solved ones.
+            faint: Torque at the ends of the clearance as a fraction of the torque that
+                takes it up [-].
 
         Returns:
             Values (4, count) by torque [N·m], and the torques solved in all columns.
@@ -351,8 +355,16 @@ class ColumnGrid(SolvedColumns[AnyState]):
             table |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
             if self.free:
                 taken_up = table[sign * self.small]
-                begin, onset = across_clearance(rest, taken_up, sign * self.small)
+                begin, onset = across_clearance(
+                    rest, taken_up, sign * self.small, faint
+                )
                 table[begin] = onset
                 # the same stiffness on both sides of the middle
                 rest[2] = onset[2]
+        if self.free and faint != FAINT:
+            begins: list[float] = [s * faint * self.small for s in self.signs]
+            ends = [abs(t) * np.abs(table[t][0] - rest[0]) for t in begins]
+            # work of this torque up to the ends of the clearance
+            for t in (0.0, *begins):
+                table[t][1] -= 0.5 * np.mean(ends)
         return table, {0.0, *self.levels, *self.beyond}

@@ -18,7 +18,12 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.common.clearance import FAINT, across_clearance
+from swgjoint.fe.common.clearance import (
+    FAINT,
+    HELD,
+    across_clearance,
+    spring_energy,
+)
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.rings import model as thin
@@ -29,10 +34,8 @@ from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage, ball_passage
 from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.fe.rings.tolerances import (
-    HELD,
     RingErrors,
     named_errors,
-    spring_energy,
     without_misalignment,
 )
 from swgjoint.gear.catalogue import ratings_of

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
 from swgjoint.fe.rings.loading import GOLDEN, solve_loaded, solve_unloaded
@@ -25,7 +26,7 @@ from swgjoint.fe.rings.passage import BallPassage
 from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerances.rest import Rest
-from swgjoint.fe.tolerances.sampling import respond_over_torque, with_onsets
+from swgjoint.fe.tolerances.sampling import respond_over_torque
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, with_perfect_teeth
@@ -43,12 +44,6 @@ CHECKS = 4
 CHECK_TORQUE = 0.26
 """Torque of these solves as a fraction of the repeated peak torque, between the sampled
 ones [-]; zero and the rated torque are solved as well."""
-HELD = 0.1
-"""Torque at the ends of the clearance as a fraction of the torque that takes it up [-].
-
-A map holds the output in the clearance by this torque, 0.1 % of the rated torque. With
-less of it, the harmonics that the map lacks, rather than the middle of the clearance,
-would determine where an unloaded output stands."""
 KEEP = 0.01
 """A harmonic of the errors is kept if the error of the output reaches this fraction of
 the largest one at any torque [-]. Superposed errors differ from full solves by more."""
@@ -127,7 +122,7 @@ class RingErrors:
         table, waves = _main_harmonics(table, shares)
         torque = np.concatenate([-levels[::-1], [0.0], levels])
         if self.free:
-            table, torque = _with_mean_clearance(table, levels)
+            table, torque = with_mean_clearance(table, levels)
         rows, solved = [], thin_ring(self.design)
         for k in range(CHECKS):
             rows += self._checked(k, solved, pitches.size, max(positive))
@@ -141,6 +136,7 @@ class RingErrors:
             waves=waves,
             perfect=np.stack([perfect[t][:3, :1] for t in torque.tolist()], axis=1),
             order=(self.design.periodicity, 0),
+            onsets=self.free,
             free=pitches.size if self.free else 0,
             solved=FullSolves(
                 input_angle=input_angle,
@@ -260,59 +256,6 @@ class RingErrors:
                 f" {theta:.4g} rad: {state.outcome.value}"
             )
         return state
-
-
-def _with_mean_clearance(table: Array, levels: Array) -> tuple[Array, Array]:
-    r"""Table of a drive whose clearance has its mean width at all angles.
-
-    The width of the clearance varies with the errors by as much as the torsion under
-    the torque that takes it up, and a map would need thousands of harmonics for ends
-    that move. Its middle, which is the kinematic error, varies as computed, and so does
-    the torsion from the next torque on. Up to there the torque T(x) is of third degree
-    between the rows, and its integral provides the energy.
-
-    Args:
-        table: Output angle [rad], energy [J] and compliance [rad/(N·m)] at the torques
-            +-levels and zero, increasing (3, n_torques, n).
-        levels: Magnitudes of the torques; the first one takes up the clearance
-            (n_levels,) [N·m].
-
-    Returns:
-        Table with rows at the ends of the clearance (3, n_torques + 2, n), and its
-        torques (n_torques + 2,) [N·m].
-    """
-    table, zero, small = table.copy(), levels.size, float(levels[0])
-    half = 0.5 * float((table[0, zero - 1] - table[0, zero + 1]).mean())
-    soft = float(table[2, [zero - 1, zero + 1]].mean())
-    table[1, zero] = table[1, zero].mean()
-    for end, sign in ((zero - 1, 1.0), (zero + 1, -1.0)):
-        table[0, end] = table[0, zero] + sign * half
-        table[2, end] = soft
-    table = with_onsets(table, small, HELD)
-    torque = np.append(HELD * small, levels)
-    torque = np.concatenate([-torque[::-1], [0.0], torque])
-    zero += 1
-    for step in (-1, 1):
-        for k in range(zero, zero + 3 * step, step):
-            way = table[0, k] - table[0, k + step]
-            begin, end = 1.0 / table[2, [k, k + step]]
-            gain = 0.5 * way * (torque[k] + torque[k + step])
-            gain += way**2 * (begin - end) / 12.0
-            shift = table[1, k] + gain - table[1, k + step]
-            outside = slice(k + 1, None) if step > 0 else slice(None, k)
-            table[1, outside] += shift
-    return table, torque
-
-
-def spring_energy(up: Array, down: Array, small: float) -> Array:
-    """Energy that a map stores between the middle and an end of the clearance [J].
-
-    Args:
-        up: Output angle under the torque that takes up the clearance [rad].
-        down: Output angle under the opposite torque [rad].
-        small: That torque [N·m].
-    """
-    return 0.25 * HELD * small * (down - up)
 
 
 def _main_harmonics(table: Array, shares: int) -> tuple[Array, Index]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.clearance import FAINT, across_clearance
+from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
@@ -140,11 +140,6 @@ def sample_tolerances(
         if keep is not None and there is None:
             keep.write(_PHASE.format(k), {"table": phase_table, "free": count})
         alone, _ = respond_over_torque(flawless, none, levels, small)
-        if has_play:
-            phase_table, alone = (
-                with_onsets(phase_table, small),
-                with_onsets(alone, small),
-            )
         ideal = pitch_of(design) * k / phases / design.ratio
         phase_table[0] -= ideal
         alone[0] -= ideal
@@ -153,6 +148,8 @@ def sample_tolerances(
         free += count
     # (3, n_torques, n_pitches, n_phases)
     table = np.stack(tables, axis=-1)
+    table = table.reshape(*table.shape[:2], -1)
+    flawless_table = np.stack(perfect, axis=-1)
     # spread the checks over the cycle and over the phases of a pitch
     count = pitches.size * phases
     checks = CHECKS[model]
@@ -160,14 +157,17 @@ def sample_tolerances(
     torques = (0.0, rated_torque)
     tick = _stage(progress, design, 3, checks)
     solved = full_solves(design, follow, linear, chosen % count, torques, tick, keep)
+    torque = np.concatenate([-levels[::-1], [0.0], levels])
     if has_play:
-        levels = np.append(FAINT * small, levels)
+        table, torque = with_mean_clearance(table, levels)
+        flawless_table, _ = with_mean_clearance(flawless_table, levels)
     return ToleranceSamples(
         pitches=pitches.size,
         phases=phases,
-        torque=np.concatenate([-levels[::-1], [0.0], levels]),
-        table=table.reshape(*table.shape[:2], -1),
-        perfect=np.stack(perfect, axis=-1),
+        torque=torque,
+        table=table,
+        perfect=flawless_table,
+        onsets=has_play,
         free=free,
         solved=solved,
     )
@@ -351,29 +351,3 @@ def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
     if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
         raise ValueError("stored rows belong to another position of the cycle")
     return table
-
-
-def with_onsets(table: Array, small: float, faint: float = FAINT) -> Array:
-    """Table with rows added at both ends of the clearance.
-
-    Args:
-        table: Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
-            (3, n_torques, n_sets); its compliance at zero torque is replaced.
-        small: Torque that takes up the clearance, in the rows next to zero [N·m].
-        faint: Torque at the ends of the clearance as a fraction of ``small`` [-].
-
-    Returns:
-        Table (3, n_torques + 2, n_sets).
-    """
-    zero = table.shape[1] // 2
-    # the fourth quantity of a pattern, the input torque, is unused here
-    rows = np.concatenate([table, np.zeros_like(table[:1])])
-    sides = [
-        across_clearance(rows[:, zero], rows[:, zero + side], side * small, faint)[1][
-            :3
-        ]
-        for side in (-1, 1)
-    ]
-    table[2, zero] = sides[1][2]  # the same stiffness on both sides of the middle
-    table = np.insert(table, zero + 1, sides[1], axis=1)
-    return np.insert(table, zero, sides[0], axis=1)

@@ -57,7 +57,7 @@ def common_knots(
         _end_at_largest_torque(knots, tolerances, flawed)
         at, ends = zero, flawed[rest - 2 : rest + 3]
     knots[at] = 0.0
-    if samples.free and (tolerances is None or tolerances.has_onsets):
+    if samples.free and (tolerances is None or tolerances.onsets):
         up, far_up = _clearance_knots(knots[at + 3 :], ends[3:])
         down, far_down = _clearance_knots(-knots[: at - 2][::-1], -ends[:2][::-1])
         knots = np.concatenate([-down[::-1], [0.0], up])

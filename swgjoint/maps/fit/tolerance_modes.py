@@ -96,10 +96,13 @@ def register_by_torque(samples: MapSamples) -> ToleranceSamples:
 
     Returns:
         The samples with both tables changed. They are returned as they are, of the
-        linearised drive, if only one of both drives has clearance.
+        linearised drive, if they have a clearance, whose width is then the mean one at
+        all angles, or if only the nonlinear solves have it.
     """
     tolerances = samples.tolerances
     assert tolerances is not None
+    if tolerances.onsets:
+        return tolerances
     torque, shape = samples.torque[:, None], samples.output_error.shape
     # the output error is the derivative of the complementary potential
     curve = np.stack(

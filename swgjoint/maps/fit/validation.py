@@ -65,9 +65,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     missed = _input_torque(drive, solved) - solved.input_torque
     rows = []
     # the input torque within a clearance depends on where the output stands in it
-    mean_clearance = (
-        samples.free and toleranced is not None and toleranced.waves is not None
-    )
+    mean_clearance = toleranced is not None and toleranced.onsets
     low, high = drive.torque_range
     for torque in np.unique(solved.torque):
         # without tooth errors, zero torque was sampled and only the angles are unseen
