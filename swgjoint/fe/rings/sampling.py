@@ -18,12 +18,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.common.clearance import (
-    FAINT,
-    HELD,
-    across_clearance,
-    spring_energy,
-)
+from swgjoint.fe.common.clearance import FAINT, HELD, across_clearance, spring_energy
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.rings import model as thin
@@ -33,11 +28,7 @@ from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage, ball_passage
 from swgjoint.fe.rings.state import ThinRingState
-from swgjoint.fe.rings.tolerances import (
-    RingErrors,
-    named_errors,
-    without_misalignment,
-)
+from swgjoint.fe.rings.tolerances import RingErrors, named_errors, without_misalignment
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
