@@ -12,9 +12,11 @@ from messages import names, naming
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.fe.rings.accuracy import output_turn_angles
+from swgjoint.gear.bearing.rolling_friction import BASE_OILS
 from swgjoint.gear.catalogue_stated import stated_losses
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 from swgjoint.units import arcmin, mm
 from swgjoint.validation.catalogue import catalogue as study
 from swgjoint.validation.catalogue import runs as runs
@@ -292,14 +294,17 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_friction_of_teeth_and_race_is_below_the_catalogue(monkeypatch, tmp_path):
+def test_friction_of_teeth_race_and_balls_is_below_the_catalogue(monkeypatch, tmp_path):
     """The smallest size by the real rings: less than what grease and seals add to."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     file = CatalogueFile.load()
     tasks = {task.name: task for task in study.tasks_of(file, "losses")}
     assert len(tasks) == 8
-    slow = running_of(run_task(tasks["running 14 100 20"]))
+    task = tasks["running 14 100 20"]
+    slow = running_of(run_task(task), task.design)
     stated = stated_losses(catalogue_row(14, 100))
     for mu in file.coefficients:
-        assert 0.0 < slow.running_torque(mu) < stated.no_load_running
+        for oil in BASE_OILS:
+            running = slow.running_torque(mu, RUNNING_SPEED, oil)
+            assert 0.0 < running < stated.no_load_running
         assert 0.0 < slow.starting_torque(mu) < stated.starting
