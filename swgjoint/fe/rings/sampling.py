@@ -20,7 +20,7 @@ import numpy as np
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.clearance import FAINT, HELD, across_clearance, spring_energy
 from swgjoint.fe.common.stress_state import stress_state_label
-from swgjoint.fe.plane.drive2d import unmodelled_parts
+from swgjoint.fe.plane.drive2d import in_plane, unmodelled_parts
 from swgjoint.fe.rings import model as thin
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.equilibrium import ThinRingSolver
@@ -28,7 +28,7 @@ from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage, ball_passage
 from swgjoint.fe.rings.state import ThinRingState
-from swgjoint.fe.rings.tolerances import RingErrors, named_errors, without_misalignment
+from swgjoint.fe.rings.tolerances import RingErrors, named_errors
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
@@ -109,7 +109,7 @@ def sample_thin_rings(
     """
     check_modelled(design)
     begin, ratings = time.perf_counter(), ratings_of(design)
-    perfect, flawed = without_errors(design), without_misalignment(design)
+    perfect, flawed = without_errors(design), in_plane(design)
     if angles is None:
         angles = FLAWED_PHASES if has_errors(flawed) else PHASES
     model = thin_ring(perfect)

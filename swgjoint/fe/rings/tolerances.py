@@ -18,6 +18,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import with_mean_clearance
+from swgjoint.fe.plane.drive2d import in_plane
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
 from swgjoint.fe.rings.loading import GOLDEN, solve_loaded, solve_unloaded
@@ -50,14 +51,9 @@ the largest one at any torque [-]. Superposed errors differ from full solves by 
 _POSITION, _CHECK = "errors-{:04d}", "error-check-{:04d}"
 
 
-def without_misalignment(design: Design) -> Design:
-    """The same drive with parallel axes: the thin rings are 2D."""
-    return design.with_changes({"tolerances.misalignment_arcmin": 0.0})
-
-
 def named_errors(design: Design) -> dict[str, float] | None:
     """Nonzero errors that the rings contain, with their seed; None without any."""
-    aligned = without_misalignment(design)
+    aligned = in_plane(design)
     values = aligned.tolerances.model_dump()
     return {k: v for k, v in values.items() if v} if has_errors(aligned) else None
 
