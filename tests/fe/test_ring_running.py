@@ -14,11 +14,17 @@ from swgjoint.fe.rings import running as ring_running
 from swgjoint.fe.rings.contacts import linearise, race_on_balls
 from swgjoint.fe.rings.equilibrium import ThinRingSolver, rim_rotation
 from swgjoint.fe.rings.facing import distances_to_ring
-from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
+from swgjoint.fe.rings.loading import (
+    positions,
+    solve_loaded,
+    solve_unloaded,
+    without_torque,
+)
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.running import STEP, RunningFriction, running_friction
 from swgjoint.fe.rings.sliding import weighted_median
 from swgjoint.gear.bearing.rolling_friction import GreasedBearing
+from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 
 ANGLE = 0.3
@@ -157,6 +163,34 @@ def test_work_is_what_friction_forces_take(design, changes, torque, direction):
 def free(design):
     """Turning without load at one angle."""
     return running_friction(design, angles=[ANGLE])
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.5, 5.8])
+def test_output_with_errors_and_play_comes_to_rest(design, angle):
+    """One tooth holds the ideal angle; the output gives way until none does.
+
+    Between the teeth nothing holds the output, where Newton's method without torque
+    jumps to and fro.
+    """
+    flawed = design.with_changes(
+        {
+            "tolerances.flexspline_cumulative_pitch_um": 13.4,
+            "tolerances.circular_spline_cumulative_pitch_um": 13.4,
+            "tolerances.random_pitch_um": 0.92,
+            "tolerances.wave_generator_ovality_um": 5.0,
+            "tolerances.wave_generator_eccentricity_um": 3.0,
+            "tolerances.circular_spline_ovality_um": 6.0,
+            "tolerances.circular_spline_eccentricity_um": 4.0,
+            "tolerances.seed": 1,
+        }
+    )
+    model = thin_ring(flawed)
+    ideal = solve_unloaded(model, angle)
+    free = without_torque(model, angle)
+    assert free.outcome.ok
+    assert abs(ideal.torque) > 1e-3 * ratings_of(design).rated_torque
+    assert abs(free.torque) < 1e-5 * ratings_of(design).rated_torque
+    assert free.energy < ideal.energy
 
 
 def test_rings_that_bend_without_stretching(design):

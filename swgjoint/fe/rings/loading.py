@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
 
+from swgjoint.errors import Outcome
 from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import ThinRingState, initial_state
@@ -13,6 +15,9 @@ from swgjoint.typing import Array
 
 SMALL = 0.01
 """Fraction of the rated torque that takes up the clearance of the teeth [-]."""
+FREE = 1e-3
+"""Torque at which the teeth count as unloaded where Newton's method without torque
+fails, as a fraction of the elastic energy [1/rad]."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """Golden section, whose multiples spread angles over the tooth pitch [-]."""
 HALVINGS = 5
@@ -59,9 +64,33 @@ def without_torque(model: ThinRing, alpha: float) -> ThinRingState:
         alpha: Wave-generator angle, any number of turns [rad].
     """
     state = solve_unloaded(model, alpha)
-    if state.outcome.ok and state.loaded_teeth:
-        state = ThinRingSolver()(model, state, torque=0.0)
-    return state
+    if not (state.outcome.ok and state.loaded_teeth):
+        return state
+    found = ThinRingSolver()(model, state, torque=0.0)
+    return found if found.outcome.ok else _turned_free(model, state)
+
+
+def _turned_free(model: ThinRing, state: ThinRingState) -> ThinRingState:
+    """Turn the output until the teeth hardly hold it.
+
+    A drive with clearance has no stiffness between its teeth, so that Newton's method
+    at a prescribed torque can jump from tooth to tooth. At a prescribed rotation it
+    converges.
+
+    Args:
+        model: The rings.
+        state: Equilibrium at a prescribed rotation, some of whose teeth carry load.
+
+    Returns:
+        The equilibrium, or the state of the last failed rotation.
+    """
+    solver = ThinRingSolver()
+    for _ in range(solver.max_iterations):
+        if not state.outcome.ok or abs(state.torque) < FREE * state.energy:
+            return state
+        turned = state.rotation + state.compliance * state.torque
+        state = solver(model, state, rotation=turned)
+    return replace(state, outcome=Outcome.MAX_ITERATIONS)
 
 
 def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRingState:
