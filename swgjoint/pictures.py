@@ -21,6 +21,7 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
         out: Binary stream that receives the file.
         dpi: Resolution [pixels per inch].
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
     from matplotlib.ticker import FixedFormatter, FuncFormatter
 
@@ -35,7 +36,9 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
                 for tick in axis.get_major_ticks(len(axis.get_majorticklocs())):
                     tick.label1.set_parse_math(False)
                     tick.label2.set_parse_math(False)
-    figure.savefig(out, format="png", dpi=dpi)
+    figure.dpi = dpi
+    # one drawing; savefig draws twice
+    FigureCanvasAgg(figure).print_png(out)
 
 
 def png(figure: Any, *, dpi: float) -> bytes:
