@@ -32,6 +32,7 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
+from swgjoint.maps.hysteresis import sticking_stiffness
 
 NUMERICAL_DAMPING = 0.1
 """Coefficient nu1 of the scheme of level ``full``, see
@@ -154,7 +155,7 @@ def step_mode(
     if drive.rotor is None:
         return None
     h, w, c = timestep, drive.mobility, drive.damping
-    sticking = sum(element.stiffness for element in drive.elements)
+    sticking = sticking_stiffness(drive.elements, torque)
     if drive.level == "full":
         torsion = drive.drive.mean_torsion(torque)
         k = float(drive.drive.coefficients(np.array([torsion]), 2)[0, 0, 0])

@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, input_orders
 from swgjoint.joint.step_damping import left_share
+from swgjoint.maps.hysteresis import sticking_stiffness
 
 SAME = 1e-6
 """Relative difference below which two orders belong to the same line [-]."""
@@ -117,7 +118,7 @@ def _line(
     law, ratio, rotor = drive.drive, drive.ratio, drive.rotor_inertia
     torsion = np.array([law.mean_torsion(torque)])
     k = max(float(law.coefficients(torsion, 2)[0, 0, 0]), 0.0)
-    k += sum(element.stiffness for element in drive.elements)
+    k += sticking_stiffness(drive.elements, torque)
     nu = left_share(h**2 * k * (1.0 / (ratio**2 * rotor) + 1.0 / link))
     total = 0.0 + 0.0j
     amplitudes = [

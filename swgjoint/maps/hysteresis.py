@@ -191,6 +191,26 @@ def yield_table(elements: Sequence[Jenkin]) -> tuple[Array, Array]:
     )
 
 
+def sticking_stiffness(
+    elements: Sequence[Jenkin], elastic: float | None = None
+) -> float:
+    """Stiffness of all elements that carry torque and stick [N·m/rad].
+
+    Args:
+        elements: Jenkin elements of a drive.
+        elastic: Elastic torque of the drive [N·m]; None returns the largest value over
+            all elastic torques.
+    """
+    if elastic is None:
+        yields = yield_table(elements)[1]
+        between = np.maximum(yields[:, :-1], yields[:, 1:])
+        yields = np.concatenate([between, yields[:, -1:]], axis=1)
+    else:
+        yields = np.array([[element.yields(elastic)] for element in elements])
+    stiffness = np.array([element.stiffness for element in elements])
+    return float(np.max(stiffness @ (yields > 0.0), initial=0.0))
+
+
 def check_elements(elements: Sequence[object], name: str) -> None:
     """Reject what is not a list of at most :data:`MAX_ELEMENTS` elements.
 

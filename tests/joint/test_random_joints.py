@@ -91,6 +91,29 @@ def with_loads(drive, rng):
     return replace(drive, hysteresis=tuple(elements))
 
 
+def with_fitted(drive, rng):
+    """Elements as fitted to computed loops: each carries torque around one load.
+
+    The yield torque grows with the load; the elements that stick together are up to 25
+    times as stiff as the drive.
+    """
+    count = int(rng.integers(3, 11))
+    at = np.linspace(0.0, drive.ratings.repeated_peak, count + 1)[1:]
+    friction = rng.uniform(0.02, 0.9) / (2 * count + 1)
+    stiffness = drive.mean_stiffness * 10 ** rng.uniform(0.0, 1.09, count)
+    steepest = friction * np.arange(1, count + 1)
+    stiffness = np.maximum(stiffness, drive.max_stiffness * steepest / 0.95)
+    elements = tuple(
+        Jenkin(
+            stiffness=float(k),
+            yield_torque=0.0,
+            yield_curve=tuple(zip(at.tolist(), (friction * hat).tolist(), strict=True)),
+        )
+        for k, hat in zip(stiffness, np.diag(at), strict=True)
+    )
+    return replace(drive, hysteresis=elements)
+
+
 def with_friction(drive, rng):
     """Friction of 0.1 to 30 % of the peak torque at the input, of every kind."""
     at_input = drive.ratings.repeated_peak / abs(drive.ratio)
@@ -115,6 +138,8 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
         drive = with_elements(drive, rng)
     if losses == "loaded hysteresis":
         drive = with_loads(drive, rng)
+    if losses == "fitted hysteresis":
+        drive = with_fitted(drive, rng)
     if losses == "friction":
         drive = with_friction(drive, rng)
     rotor, link = 10 ** rng.uniform(-7, -3), 10 ** rng.uniform(-4, 2)
@@ -146,7 +171,8 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
     ("seed", "count"), [(11, 15), pytest.param(12, 30, marks=pytest.mark.slow)]
 )
 @pytest.mark.parametrize(
-    "losses", ["none", "hysteresis", "loaded hysteresis", "friction"]
+    "losses",
+    ["none", "hysteresis", "loaded hysteresis", "fitted hysteresis", "friction"],
 )
 @pytest.mark.parametrize("tooth_order", [False, True])
 @pytest.mark.parametrize("loaded", [False, True])

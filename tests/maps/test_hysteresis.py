@@ -12,7 +12,13 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis, stretches
+from swgjoint.maps.hysteresis import (
+    Jenkin,
+    Sliders,
+    play_hysteresis,
+    sticking_stiffness,
+    stretches,
+)
 from swgjoint.maps.sheet.loop import torque_loop
 
 ELEMENTS = (
@@ -291,3 +297,20 @@ def test_curves_that_cannot_be(curve):
     """Points are pairs of numbers >= 0 at increasing torques."""
     with pytest.raises(InputError, match=naming("yield_curve", "N·m", "accepted")):
         Jenkin(stiffness=1.0, yield_torque=1.0, yield_curve=curve)
+
+
+def test_only_elements_that_can_carry_torque_stick():
+    """Three elements around 0, 1 and 2 N·m: two neighbours stick, never all."""
+    first = Jenkin(stiffness=5.0, yield_torque=1.0, yield_curve=((1.0, 0.0),))
+    second = Jenkin(
+        stiffness=7.0, yield_torque=0.0, yield_curve=((1.0, 1.0), (2.0, 0.0))
+    )
+    third = Jenkin(
+        stiffness=2.0, yield_torque=0.0, yield_curve=((1.0, 0.0), (2.0, 1.0))
+    )
+    three = (first, second, third)
+    assert sticking_stiffness(three) == 12.0
+    found = [sticking_stiffness(three, t) for t in (0.0, 0.5, 1.0, -1.5, 9.0)]
+    assert found == [5.0, 12.0, 7.0, 9.0, 2.0]
+    assert sticking_stiffness((*three, Jenkin(stiffness=1.0, yield_torque=1.0))) == 13.0
+    assert sticking_stiffness(()) == 0.0 == sticking_stiffness((), 1.0)

@@ -13,7 +13,7 @@ from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.fit.hysteresis_elements import REACHES, fit_elements
 from swgjoint.maps.fit.hysteresis_loops import played_loop, with_hysteresis
-from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.hysteresis import Jenkin, sticking_stiffness
 from swgjoint.units import arcmin
 
 N = 24
@@ -190,3 +190,19 @@ def test_small_loops_are_compared_by_their_torque(synthetic_map):
         assert row["amplitude_Nm"] == pytest.approx(8.0)
         assert row["width_map_arcmin"] == pytest.approx(row["width_arcmin"], rel=0.1)
         assert row["round_area_map_J"] == pytest.approx(row["round_area_J"], rel=0.1)
+
+
+def test_fit_keeps_to_the_stiffness_that_a_joint_can_integrate(synthetic_map):
+    """Half the stiffness that the loop wants: obeyed, and little work is lost."""
+    (base,) = elements(synthetic_map, (2.0, REACHES[14]))
+    element = Jenkin(
+        stiffness=4.0 * base.stiffness, yield_torque=1.0, yield_curve=((90.0, 7.0),)
+    )
+    drive = replace(synthetic_map, hysteresis=(element,))
+    loop = rubbed(drive)
+    free = fit_elements([loop], synthetic_map.max_stiffness)
+    stiffest = 0.5 * sticking_stiffness(free)
+    found = fit_elements([loop], synthetic_map.max_stiffness, stiffest)
+    assert 0.3 * stiffest < sticking_stiffness(found) <= stiffest
+    back = played_loop(replace(drive, hysteresis=found), loop)
+    assert back.area == pytest.approx(loop.area, rel=0.05)

@@ -17,12 +17,18 @@ few steps there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.fit.torsion_fit import FAINT
-from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin, stretches
+from swgjoint.maps.hysteresis import (
+    MAX_ELEMENTS,
+    Jenkin,
+    sticking_stiffness,
+    stretches,
+)
 from swgjoint.typing import Array
 
 REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
@@ -51,28 +57,45 @@ def is_large(loop: FrictionLoop) -> bool:
     return bool(np.abs(loop.torque).max() == -loop.branches(loop.torque)[1][0])
 
 
-def fit_elements(loops: Sequence[FrictionLoop], largest: float) -> tuple[Jenkin, ...]:
+def fit_elements(
+    loops: Sequence[FrictionLoop], largest: float, stiffest: float = inf
+) -> tuple[Jenkin, ...]:
     """Jenkin elements fitted to the friction torque, one set for all positions.
 
     Yield torques depend on the load only if constant ones do not suffice, see
-    :data:`CLOSE` and :data:`BETTER`.
+    :data:`CLOSE` and :data:`BETTER`. If the elements are too stiff, the smallest yield
+    torsions are left out.
 
     Args:
         loops: Large loops and, if there are any, small loops.
         largest: Largest elastic stiffness of the map [N·m/rad].
+        stiffest: Largest sum of the stiffnesses of elements that stick at a load
+            [N·m/rad].
     """
+    elements = _fit_reaches(loops, REACHES, largest)
+    for count in range(REACHES.size - 1, 0, -1):
+        if sticking_stiffness(elements) <= stiffest:
+            break
+        elements = _fit_reaches(loops, REACHES[:count], largest)
+    return elements
+
+
+def _fit_reaches(
+    loops: Sequence[FrictionLoop], reaches: Array, largest: float
+) -> tuple[Jenkin, ...]:
+    """Elements whose yield torsions are given fractions of the travel [-]."""
     travel = max(float(np.ptp(loop.torsion)) for loop in loops)
     path = next(loop for loop in loops if is_large(loop))
     at = path.branches(path.torque)[1][path.quarter :]
     at = at[:: -(-path.quarter // TORQUES)] if path.quarter > TORQUES else at
-    constant = [(reach, np.ones_like(at)) for reach in REACHES * travel]
+    constant = [(reach, np.ones_like(at)) for reach in reaches * travel]
     shapes = [np.clip((at - start) / (at[-1] - start), 0.0, 1.0) for start in at[:-1]]
     shapes += list(np.eye(at.size))
     steepest = [float(np.abs(np.diff(one) / np.diff(at)).max()) for one in shapes]
     loaded = [
         (reach, shape)
         for shape, steep in zip(shapes, steepest, strict=True)
-        for reach in REACHES * travel
+        for reach in reaches * travel
         if reach * steep * largest <= STEEPEST
     ]
     plain, off = _elements(loops, at, constant)

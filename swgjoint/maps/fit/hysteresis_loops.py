@@ -30,6 +30,12 @@ from swgjoint.units import arcmin
 
 Map = TypeVar("Map", bound=Potential)
 
+STIFFEST = 25.0
+"""Largest stiffness of the elements that stick at a load, over the mean stiffness of
+the map [-]. Teeth that stick can be stiffer, but where the sum exceeds 30
+(:mod:`swgjoint.joint.region`), no step is known to integrate a joint stably.
+"""
+
 
 def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
     """The map with hysteresis elements fitted to loops; its info compares both.
@@ -39,7 +45,7 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         loops: Loops with friction, at representative input positions: large loops to
             one torque and, if there are any, small loops.
     """
-    elements = fit_elements(loops, drive.max_stiffness)
+    elements = fit_elements(loops, drive.max_stiffness, STIFFEST * drive.mean_stiffness)
     fitted = replace(drive, hysteresis=elements)
     small = small_loops(fitted, [loop for loop in loops if not is_large(loop)])
     loops = [loop for loop in loops if is_large(loop)]

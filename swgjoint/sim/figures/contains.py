@@ -177,12 +177,13 @@ def _off_damping(
         if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
             continue
         own, got = mode.own_damping_ratio, mode.damping_ratio
+        full = transmission.attached.level == "full"
+        other = "" if full else " or joints.*.level = 'full'"
         part = f"damping ratio {own:.2g} of the drive"
         reason = (
             f"time steps of {1e3 * assembly.step:.3g} ms raise the damping ratio of the"
             f" torsional vibration at {mode.own_frequency / hertz:.3g} Hz to"
-            f" {got:.2g}{where}; use a shorter simulation.step_s or"
-            " joints.*.level = 'full'"
+            f" {got:.2g}{where}; use a shorter simulation.step_s{other}"
         )
         return [{"part": part, "reason": reason}]
     return []
