@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import sqrt
 
@@ -18,6 +18,7 @@ from swgjoint.bench.stability.joint import (
     Start,
     hardening_drive,
     make_joint,
+    with_friction_of_teeth,
 )
 from swgjoint.bench.stability.reference import TwoMassReference, reference
 from swgjoint.bench.stability.rows import DEFAULT, StabilityRow, outcome_of
@@ -119,6 +120,12 @@ def situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
     }
 
 
+def rubbed_situations(drive: DriveMap) -> dict[str, tuple[Start, float]]:
+    """Initial conditions under load, for a drive with hysteresis of its teeth."""
+    some = situations(drive)
+    return {f"{group}, hysteresis": some[group] for group in ("loaded", "released")}
+
+
 def run_joint(task: GridJoint) -> list[StabilityRow]:
     """Rows of one joint, at all time steps."""
     drive = hardening_drive(task.stiffness)
@@ -129,9 +136,11 @@ def run_joint(task: GridJoint) -> list[StabilityRow]:
         for group, situation in situations(drive).items()
         if group in ("free", "loaded")
     }
+    rubbed = with_friction_of_teeth(drive)
     rows: list[StabilityRow] = []
     for step in task.steps:
-        rows += _default(task, drive, step, references)
+        rows += _default(task, drive, step, situations(drive), references)
+        rows += _default(task, rubbed, step, rubbed_situations(drive), {})
         rows.append(_dropped(task, drive, step))
         if task.others:
             rows += _others(task, drive, step, references)
@@ -142,12 +151,13 @@ def _default(
     task: GridJoint,
     drive: DriveMap,
     step: float,
+    starts: dict[str, tuple[Start, float]],
     references: dict[str, TwoMassReference],
 ) -> Iterator[StabilityRow]:
     """Rows of the default scheme, with the sub-steps that its region requires."""
     joint = make_joint(drive, rotor=task.rotor, link=task.link, step=step)
     plain = _without_error(task, drive, step)
-    for group, (start, speed) in situations(drive).items():
+    for group, (start, speed) in starts.items():
         region = joint.region(speed, torque=start.load)
         parts = region.sub_steps
         if parts is None or parts > MAX_SUB_STEPS:
@@ -241,7 +251,8 @@ def _others(
 
 
 def _without_error(task: GridJoint, drive: DriveMap, step: float, **keys: str) -> Joint:
-    plain = drive.with_harmonics(np.zeros(len(drive.orders), dtype=bool))
+    plain = replace(drive, hysteresis=())
+    plain = plain.with_harmonics(np.zeros(len(drive.orders), dtype=bool))
     return make_joint(plain, rotor=task.rotor, link=task.link, step=step, **keys)
 
 

@@ -27,6 +27,7 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native import native_map
 from swgjoint.joint.region import Region, check_region
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -41,6 +42,14 @@ REACH = 4e-3
 CSG-25-100 has 204 N·m and 5e4 N·m/rad, which also gives about 4 mrad."""
 HARDENING = 2.0
 """Relative increase of the stiffness from zero to full torque [-]."""
+FRICTION = 0.05
+"""Friction torque at the output over the load [-]; the tooth friction of size 25 with a
+coefficient of 0.1 takes about as much."""
+ELEMENTS = 8
+"""Number of elements that share the hysteresis."""
+STICKING = 25.0
+"""Stiffness of the elements that stick at a load over the mean stiffness [-], the
+largest of fitted maps."""
 SAMPLES = 400
 """Default number of energy samples along a run."""
 GAIN = 0.05
@@ -125,6 +134,29 @@ def hardening_drive(stiffness: float) -> DriveMap:
         ),
     )
     return with_kinematic_error(spring_alone)
+
+
+def with_friction_of_teeth(drive: DriveMap) -> DriveMap:
+    """The map with hysteresis as fitted to computed loops.
+
+    The yield torque is :data:`FRICTION` times the load. Each element carries torque
+    around one load, and two of them stick together.
+
+    Args:
+        drive: A map without hysteresis.
+    """
+    loads = np.linspace(0.0, drive.ratings.repeated_peak, ELEMENTS + 1)[1:]
+    elements = tuple(
+        Jenkin(
+            stiffness=0.5 * STICKING * drive.mean_stiffness,
+            yield_torque=0.0,
+            yield_curve=tuple(
+                (float(at), FRICTION * float(at) * float(at == load)) for at in loads
+            ),
+        )
+        for load in loads
+    )
+    return replace(drive, hysteresis=elements)
 
 
 @dataclass(frozen=True, kw_only=True)
