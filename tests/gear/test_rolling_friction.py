@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, pi, sqrt
+from math import acos, exp, pi, sin, sqrt
 
 import pytest
 
@@ -66,3 +66,24 @@ def test_dimensions_of_the_bearing_of_a_design():
     outside = 0.5 * (made.pitch_diameter + made.section)
     assert outside == pytest.approx(bearing.bore_radius, rel=1e-3)
     assert made.friction_torque(84.0, 200.0 * pi / 3.0) > 0.0
+
+
+def test_drag_of_a_flooded_bearing_by_hand():
+    """1000 rpm, level at the pitch diameter, in the units of the catalogue."""
+    t = 2.0 * acos((0.6 * 50.0 - 50.0) / (0.6 * 50.0))
+    assert t == pytest.approx(4.6010, abs=1e-4)
+    f_a = 0.05 * 3.1 * (60.0 + 40.0) / (60.0 - 40.0)
+    r_s = 0.36 * 50.0**2 * (t - sin(t)) * f_a
+    wanted = 1.093e-7 * 1000.0**2 * 50.0**3 * (1000.0 * 2500.0 / 100.0) ** -1.379 * r_s
+    assert 1e3 * BEARING.drag_torque(1000.0 * rpm) == pytest.approx(wanted, rel=1e-12)
+    assert wanted == pytest.approx(45.9, abs=0.5)
+
+
+def test_powers_of_drag():
+    """n^0.621 in speed and nu^1.379 in viscosity; none at rest, either direction."""
+    slow, fast = (BEARING.drag_torque(w) for w in (100.0, 200.0))
+    assert fast / slow == pytest.approx(2.0 ** (2.0 - 1.379))
+    thick = replace(BEARING, viscosity=2.0 * BEARING.viscosity)
+    assert thick.drag_torque(100.0) / slow == pytest.approx(2.0**1.379)
+    assert BEARING.drag_torque(0.0) == 0.0
+    assert BEARING.drag_torque(-100.0) == slow

@@ -16,8 +16,24 @@ the kinematic viscosity nu of the base oil in mm2/s:
 
 M_rr is the rolling resistance of the oil at the inlet of the contacts, less the heating
 there and the starvation between two balls; M_sl is sliding within the contacts, which
-remains at rest. The model has no losses of freshly filled, churning grease, of seals
-and of the cage.
+remains at rest. Neither part contains churning lubricant, seals or the cage.
+
+If the bearing is flooded, the balls also drag through the lubricant. For a bath that
+reaches up to d_m,
+
+.. math::
+    M_{drag} = 1.093\cdot10^{-7}\,n^2 d_m^3
+        \left(\frac{n d_m^2 f_t}{\nu}\right)^{-1.379} R_s, \quad
+    R_s = 0.36\,d_m^2 (t - \sin t)\,f_A, \quad f_A = 0.05\,K_Z \frac{D + d}{D - d},
+
+.. math:: t = 2\arccos\frac{0.6\,d_m - H}{0.6\,d_m}, \quad H = d_m, \quad f_t = 1.
+
+The inertial term of this moment, which the catalogue gives with a diagram of V_M, is
+left out: it does not depend on the viscosity, and with V_M about 1e-3 (from memory) it
+would add 0.8 to 15 mN·m at 2000 rpm for sizes 14 to 25. A grease churns until the balls
+have pushed it aside. The model covers the two limits: pushed aside completely (no
+drag), or not at all (drag in the base oil as if the bearing was flooded with it). The
+thickener, which makes a grease stiffer than its base oil, is not modelled.
 
 The races of a wave generator are thin, so R_1 and S_1 are those of the thinnest series
 (618). They are constants of the model for round races. A wave generator is loaded at
@@ -26,13 +42,14 @@ radial load, too, presses only the balls on its side.
 
 Source:
     SKF (2013), "Rolling bearings", PUB BU/P1 10000/1 EN, chapter "Friction", pages 99
-    to 107 and table 2.
+    to 110 and table 2. The drag term agrees with an independent transcription; its
+    level H ends at d_m here and at 1.2 d_m there, which is 12 % more.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import acos, exp, pi, sin, sqrt
 
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.units import mm, rpm
@@ -47,6 +64,8 @@ GEOMETRY = 3.1
 """Constant K_Z of deep groove ball bearings with one row [-]."""
 BOUNDARY, FULL_FILM = 0.15, 0.05
 """Friction coefficients mu_bl at rest and mu_EHL under a full film, mineral oil [-]."""
+BATH = 1.0
+"""Level H of the lubricant in a flooded bearing, divided by d_m [-]."""
 BASE_OILS = (30e-6, 300e-6)
 """Range of the kinematic viscosity of the base oil of greases at +20 °C [m2/s]. It is
 assumed: base oils of the viscosity classes ISO VG 15 to 100 are in this range."""
@@ -110,3 +129,18 @@ class GreasedBearing:
         coefficient = boundary * BOUNDARY + (1.0 - boundary) * FULL_FILM
         sliding = SLIDING * dm**-0.26 * force ** (5.0 / 3.0) * coefficient
         return heating * fed * rolling * mm, sliding * mm
+
+    def drag_torque(self, speed: float) -> float:
+        """Drag moment of the balls of a flooded bearing [N·m]; load has no effect.
+
+        Args:
+            speed: Speed between the rings, of either sign [rad/s].
+        """
+        n, dm = abs(speed) / rpm, self.pitch_diameter / mm
+        nu, section = self.viscosity / mm**2, self.section / mm
+        if n == 0.0:
+            return 0.0
+        angle = 2.0 * acos((0.6 - BATH) / 0.6)
+        assert angle > pi  # f_t = 1
+        reach = 0.36 * dm**2 * (angle - sin(angle)) * 0.05 * GEOMETRY * dm / section
+        return float(1.093e-7 * n**2 * dm**3 * (n * dm**2 / nu) ** -1.379 * reach * mm)
