@@ -21,7 +21,12 @@ from swgjoint.fe.rings.loading import (
     without_torque,
 )
 from swgjoint.fe.rings.model import thin_ring
-from swgjoint.fe.rings.running import STEP, RunningFriction, running_friction
+from swgjoint.fe.rings.running import (
+    STEP,
+    RunningFriction,
+    running_friction,
+    running_over_load,
+)
 from swgjoint.fe.rings.sliding import weighted_median
 from swgjoint.gear.bearing.rolling_friction import GreasedBearing
 from swgjoint.gear.catalogue import ratings_of
@@ -232,6 +237,7 @@ def test_without_coefficient_nothing_and_with_it_in_proportion(free):
         race=np.array([3.0, 5.0, 4.0]),
         tooth_pairs=np.zeros(3),
         lobe_force=np.zeros((3, 2)),
+        bending=np.zeros(3),
         bearing=free.bearing,
     )
     assert made.running_torque(0.1, 200.0, 1e-4) == pytest.approx(0.6)
@@ -303,3 +309,21 @@ def test_the_coefficient_of_the_design_is_not_looked_at(design, free):
         match=naming("reference-2d", "wave_generator.bearing", "table", "2d model"),
     ):
         running_friction(Design.preset("reference-2d"))
+
+
+def test_loads_on_one_path_equal_loads_alone(design):
+    """Starting from another equilibrium changes no result."""
+    path = running_over_load(design, (0.0, TORQUE, 4.0 * TORQUE), angles=[ANGLE])
+    for one, torque in zip(path, (0.0, TORQUE, 4.0 * TORQUE), strict=True):
+        alone = running_friction(design, torque=torque, angles=[ANGLE])
+        # 1e-6: the solver ends below its tolerance, not at round-off
+        assert one.per_mu == pytest.approx(alone.per_mu, rel=1e-6)
+        assert one.bending == pytest.approx(alone.bending, rel=1e-6)
+        assert one.elastic == pytest.approx(alone.elastic, rel=1e-6)
+
+
+def test_a_flooded_bearing_drags_once(free):
+    """One bearing, however many lobes it has; a start has no drag."""
+    oil = GreasedBearing.from_bearing(free.bearing, 1e-4)
+    assert free.drag_torque(200.0, 1e-4) == oil.drag_torque(200.0) > 0.0
+    assert free.drag_torque(0.0, 1e-4) == 0.0

@@ -11,10 +11,13 @@ from messages import naming
 from swgjoint.gear.catalogue import table
 from swgjoint.gear.catalogue_stated import LOSS_KEYS, StatedLosses
 from swgjoint.gear.design.design import Design
+from swgjoint.gear.shell_theory import cup_stiffness
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.friction_bending import (
     bending_friction,
     bending_torque,
+    cup_bending_energy,
     rim_bending_energy,
 )
 from swgjoint.maps.fit.friction_fit import friction_of_losses
@@ -168,3 +171,26 @@ def test_bending_of_the_rim():
     taken = bending_torque(design) * 1.01
     assert starting_torque(drive) == pytest.approx(taken, rel=1e-6)
     assert no_load_running_torque(drive) == pytest.approx(taken, rel=1e-6)
+
+
+def test_bending_of_the_cup():
+    """Work of two loads at the open end, n = 2 alone, equals the strain energy."""
+    design = Design.load("size-25-100")
+    cup, steel = design.cup, design.material_of("flexspline")
+    w0, L, nu = lobe_height(design), cup.length_mm * 1e-3, steel.poisson_ratio
+    t = cup.thickness_coefficient * design.flexspline.rim_mm * 1e-3
+    R = design.flexspline_inner_radius + 0.5 * t
+    D = steel.youngs_modulus * t**3 / (12.0 * (1.0 - nu**2))
+    # quadrature of the plate energy of w = w0 z/L cos 2 phi, inextensional
+    z = (np.arange(400) + 0.5) / 400 * L
+    k_phi = 3.0 * w0 * z / L / R**2
+    k_twist = 3.0 / 2.0 * w0 / (R * L)
+    area = 2.0 * np.pi * R * L
+    around = 0.5 * D * 0.5 * np.mean(k_phi**2) * area
+    twist = 0.5 * D * 2.0 * (1.0 - nu) * 0.5 * k_twist**2 * area
+    assert cup_bending_energy(design) == pytest.approx(around + twist, rel=1e-5)
+    # the other harmonics of the loads take no part in the compliance of n = 2
+    whole = 1.0 / cup_stiffness(steel.youngs_modulus, nu, t, R, L, L)
+    force = cup_bending_energy(design) / w0  # of each of the two loads
+    assert 0.8 * whole < w0 / force < whole
+    assert cup_bending_energy(Design.load("reference-2d")) == 0.0

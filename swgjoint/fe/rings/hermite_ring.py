@@ -171,6 +171,13 @@ class HermiteRing:
         *_, stretch, turning = self._strains(self.reference)
         return stretch, turning
 
+    def strains(self, q: Array) -> tuple[Array, Array]:
+        """Stretch [-] and change of curvature [1/m] amid the elements (elements,)."""
+        middle = len(GAUSS[0]) // 2
+        *_, stretch, turning = self._strains(q)
+        stretch0, turning0 = self._unstrained
+        return (stretch - stretch0)[:, middle], (turning - turning0)[:, middle]
+
     def energy(self, q: Array) -> float:
         """Strain energy [J]."""
         *_, stretch, turning = self._strains(q)

@@ -18,12 +18,14 @@ flank; the friction at that flank is of second order.
 The coefficient mu is the same between tooth flanks and between rim and race, as in
 :mod:`swgjoint.fe.rings.friction`. Only friction holds the race, which therefore creeps
 in the bore. The loss of the rolling balls follows from the forces at the lobes, see
-:mod:`swgjoint.gear.bearing.rolling_friction`. Seals and churning grease are not
-included, so the result is a lower bound.
+:mod:`swgjoint.gear.bearing.rolling_friction`, and that of bending steel from the shape
+of the rings, see :mod:`swgjoint.fe.rings.bending`. Without the drag of churning grease
+and without seals the result is a lower bound.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.rings.bending import bending_torque_per_loss_factor
 from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.sliding import sliding_sums
@@ -39,6 +42,7 @@ from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.bearing.rolling_friction import BASE_OILS, GreasedBearing
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
+from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 from swgjoint.units import mm, rpm
 
@@ -68,6 +72,9 @@ class RunningFriction:
     """Number of loaded tooth contacts, mean over the step (n,)."""
     lobe_force: Array
     """Resultant force of the balls at each lobe (n, lobes) [N]."""
+    bending: Array
+    """Torque at the input that bending of rim and race takes, per loss factor (n,)
+    [N·m]."""
     bearing: BallBearing
     """Bearing of the wave generator."""
 
@@ -96,6 +103,15 @@ class RunningFriction:
                 for lobes in self.lobe_force.tolist()
             ]
         )
+
+    def drag_torque(self, speed: float, viscosity: float) -> float:
+        """Torque of balls that drag through the oil of a flooded bearing [N·m].
+
+        Args:
+            speed: Speed of the input, of either sign [rad/s].
+            viscosity: Kinematic viscosity of the base oil [m2/s].
+        """
+        return GreasedBearing.from_bearing(self.bearing, viscosity).drag_torque(speed)
 
     def running_torque(self, mu: float, speed: float, viscosity: float) -> float:
         """Mean friction torque at the input [N·m].
@@ -138,6 +154,8 @@ class RunningFriction:
             "lobe_force_N": float(self.lobe_force.mean()),
             "teeth_Nm": mu * float(self.teeth.mean()),
             "race_Nm": mu * float(self.race.mean()),
+            "bending_per_loss_factor_Nm": float(self.bending.mean()),
+            "flooded_drag_Nm": [self.drag_torque(speed, oil) for oil in BASE_OILS],
             "teeth_share": self.teeth_share,
             "tooth_pairs": float(self.tooth_pairs.mean()),
             "bound": "lower",
@@ -161,34 +179,62 @@ def running_friction(
         DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If an equilibrium cannot be solved.
     """
+    return running_over_load(design, (torque,), angles=angles)[0]
+
+
+def running_over_load(
+    design: Design,
+    torques: Sequence[float],
+    *,
+    angles: ArrayLike | None = None,
+    progress: Progress = silent,
+) -> tuple[RunningFriction, ...]:
+    """Input torque and friction under several loads, one result per load.
+
+    At every angle, the equilibrium under one load is the start of the next.
+
+    Args:
+        design: See :func:`running_friction`.
+        torques: Torques T at the output, in an order without large jumps [N·m].
+        angles: See :func:`running_friction`.
+        progress: Called after every angle.
+
+    Raises:
+        DesignError: If the design cannot be built or has features that the model lacks.
+        ComputationError: If an equilibrium cannot be solved.
+    """
     model = thin_ring(design.with_changes({COEFFICIENT: 0.0}))
     theta = positions(model, POSITIONS) if angles is None else np.asarray(angles, float)
     theta = theta.ravel()
-    rows = []
-    for angle in theta.tolist():
-        first, last = (
-            _standing(design, model, angle + part * STEP, torque)
+    table = np.empty((theta.size, len(torques), 5 + model.cam.lobes))
+    for k, angle in enumerate(theta.tolist()):
+        paths = [
+            _standing(design, model, angle + part * STEP, torques)
             for part in (-0.5, 0.5)
-        )
-        teeth, race = sliding_sums(model, first, last)
-        rows.append(
-            [
+        ]
+        for j, (first, last) in enumerate(zip(*paths, strict=True)):
+            teeth, race = sliding_sums(model, first, last)
+            table[k, j] = [
                 0.5 * (first.wave_generator_torque + last.wave_generator_torque),
                 teeth / STEP,
                 race / STEP,
                 0.5 * (first.loaded_teeth + last.loaded_teeth),
+                bending_torque_per_loss_factor(model, first),
                 *lobe_forces(model, first),
             ]
+        progress("running friction", k + 1, theta.size)
+    return tuple(
+        RunningFriction(
+            input_angle=theta,
+            elastic=one[:, 0],
+            teeth=one[:, 1],
+            race=one[:, 2],
+            tooth_pairs=one[:, 3],
+            bending=one[:, 4],
+            lobe_force=one[:, 5:],
+            bearing=model.bearing,
         )
-    elastic, teeth_torque, race_torque, pairs, *lobes = np.array(rows).T
-    return RunningFriction(
-        input_angle=theta,
-        elastic=elastic,
-        teeth=teeth_torque,
-        race=race_torque,
-        tooth_pairs=pairs,
-        lobe_force=np.array(lobes).T,
-        bearing=model.bearing,
+        for one in table.transpose(1, 0, 2)
     )
 
 
@@ -213,15 +259,20 @@ def lobe_forces(model: ThinRing, state: ThinRingState) -> Array:
 
 
 def _standing(
-    design: Design, model: ThinRing, theta: float, torque: float
-) -> ThinRingState:
-    """Frictionless equilibrium under a torque [N·m] at an input angle [rad]."""
-    state = without_torque(model, theta)
-    if state.outcome.ok and torque:
-        state = solve_loaded(model, state, torque)
-    if not state.outcome.ok:
-        raise ComputationError(
-            f"{design.drive.name}: no equilibrium at {torque:.4g} N·m and input angle"
-            f" {theta:.4g} rad: {state.outcome.value}"
-        )
-    return state
+    design: Design, model: ThinRing, theta: float, torques: Sequence[float]
+) -> list[ThinRingState]:
+    """Frictionless equilibria under torques [N·m] at an input angle [rad]."""
+    free = state = without_torque(model, theta)
+    states = []
+    for torque in torques:
+        if not torque:
+            state = free
+        elif state.outcome.ok:
+            state = solve_loaded(model, state, torque)
+        if not state.outcome.ok:
+            raise ComputationError(
+                f"{design.drive.name}: no equilibrium at {torque:.4g} N·m and input"
+                f" angle {theta:.4g} rad: {state.outcome.value}"
+            )
+        states.append(state)
+    return states

@@ -69,6 +69,7 @@ def running_of(found: Found, design: Design) -> RunningFriction:
         race=np.array(found["race_per_mu_Nm"]),
         tooth_pairs=np.array(found["tooth_pairs"]),
         lobe_force=np.array(found["lobe_forces_N"]),
+        bending=np.array(found["bending_per_loss_factor_Nm"]),
         bearing=BallBearing.from_design(design),
     )
 

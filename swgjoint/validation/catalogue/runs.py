@@ -154,6 +154,7 @@ def _running(task: CatalogueTask) -> Found:
         "race_per_mu_Nm": found.race.tolist(),
         "tooth_pairs": found.tooth_pairs.tolist(),
         "lobe_forces_N": found.lobe_force.tolist(),
+        "bending_per_loss_factor_Nm": found.bending.tolist(),
     }
 
 
