@@ -123,9 +123,10 @@ def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
         return coning_tasks(study)
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
     if part == "stiffness":
+        sections = {v.section: v for v in reversed(study.variants)}
         tasks = [
-            _path(size, ratio, variant_design(size, ratio, variant), flank)
-            for flank, variant in flanks.items()
+            _path(size, ratio, variant_design(size, ratio, variant), section)
+            for section, variant in sections.items()
             for ratio in study.ratios
             for size in study.sizes
         ]
@@ -133,7 +134,7 @@ def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
         for ratio in study.ratios:
             design = variant_design(REFERENCE, ratio, first)
             tight = design.with_changes({"wave_generator.bearing.clearance_um": 0.0})
-            tasks.append(_path(REFERENCE, ratio, tight, first.flank_deg, " tight"))
+            tasks.append(_path(REFERENCE, ratio, tight, f"{first.section} tight"))
         return tasks
     if part == "individuals":
         own = study.individuals
@@ -162,24 +163,22 @@ def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
             )
             for size, ratio in cases
         ]
-    tasks = []
+    tasks, first_flank = [], study.variants[0].flank_deg
     for flank, variant in flanks.items():
         for size, ratio in cases:
             design = variant_design(size, ratio, variant)
-            if (size, ratio) == CHECK and variant is not study.variants[0]:
+            if (size, ratio) == CHECK and flank != first_flank:
                 continue
             name = f"ratcheting {size} {ratio} {flank:g}"
             tasks.append(_teeth(name, oval(design), ratio))
-            if size == REFERENCE and variant is study.variants[0]:
+            if size == REFERENCE and flank == first_flank:
                 tasks.append(_teeth(f"{name} fixed", design, 0.5 * ratio))
     return tasks
 
 
-def _path(
-    size: int, ratio: int, design: Design, flank: float, end: str = ""
-) -> CatalogueTask:
+def _path(size: int, ratio: int, design: Design, section: str) -> CatalogueTask:
     return CatalogueTask(
-        name=f"path {size} {ratio} {flank:g}{end}",
+        name=f"path {size} {ratio} {section}",
         kind="path",
         design=design,
         torques=torques_of(catalogue_row(size, ratio)),

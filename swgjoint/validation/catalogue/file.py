@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,32 +13,90 @@ from swgjoint.errors import InputError
 from swgjoint.faults import Section, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.family import BEARING_BORE, CLEARANCE
+from swgjoint.gear.torsional_buckling import wall_for_buckling_torque
 from swgjoint.models_path import find
 from swgjoint.toml_file import read_toml
+from swgjoint.units import mm
+from swgjoint.validation.catalogue.printed import catalogue_buckling_torque
 
 Whole = Annotated[int, Field(gt=0, le=1000)]
 Numbers = Annotated[tuple[Whole, ...], Field(strict=False)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
+Source = Annotated[str, Field(min_length=9, max_length=1000)]
 
 
-class Variant(Section):
-    """Changes of the family design, one of several choices that the sources leave open.
+class CupRule(Section):
+    """Proportions of a cup; its wall is the thinnest that bears the buckling torque.
 
-    Keys of the mappings are dotted keys of the design.
+    Wall and diaphragm have the same thickness.
     """
 
     name: Text
-    cup: Text
-    """Name of the cup in messages."""
+    per_pitch_diameter: Mapping[str, float]
+    """Lengths by dotted key of the design, divided by the pitch diameter [-]."""
+    buckling_torque_over_cube_Nm_mm3: float | None = None
+    """Buckling torque divided by the cube of the pitch diameter; by default the
+    catalogue's buckling torque of the size."""
+    knock_down: float
+    """Buckling stress of a real cylinder over that of a perfect one [-]."""
+    source: Source
+
+
+class FlankChoice(Section):
+    """Flank angle, with the profile that can be built with it."""
+
     flank_deg: float
-    """Pressure angle of the flanks [deg], for the names of computations; it must be
-    that of the changed design."""
-    per_pitch_diameter: Mapping[str, float] = {}
-    """Lengths divided by the pitch diameter [-]."""
+    """Pressure angle of the flanks [deg]."""
     per_module: Mapping[str, float] = {}
-    """Lengths divided by the module [-]."""
-    changes: Mapping[str, Any] = {}
-    """Values in the units of the design file."""
+    """Lengths by dotted key of the design, divided by the module [-]."""
+    source: Source
+
+
+class RimRule(Section):
+    r"""Rule for the rim by the ratio: :math:`s / d = c + k\,i^p`."""
+
+    name: Text
+    constant: float
+    """c [-]."""
+    factor: float
+    """k [-]."""
+    exponent: float
+    """p [-]."""
+    source: Source
+
+    def thickness(self, pitch_diameter: float, ratio: int) -> float:
+        """Thickness s of the rim, in the unit of the pitch diameter d.
+
+        Args:
+            pitch_diameter: Pitch diameter d.
+            ratio: Ratio i, half the number of flexspline teeth.
+        """
+        power = float(ratio**self.exponent)
+        return pitch_diameter * (self.constant + self.factor * power)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """One combination of the choices that the sources leave open."""
+
+    cup: CupRule
+    flank: FlankChoice
+    rim: RimRule
+
+    @property
+    def name(self) -> str:
+        """Name in messages."""
+        return f"{self.cup.name}, {self.section}"
+
+    @property
+    def flank_deg(self) -> float:
+        """Pressure angle of the flanks [deg]."""
+        return self.flank.flank_deg
+
+    @property
+    def section(self) -> str:
+        """Name of what the thin rings depend on: flank angle and rim."""
+        return f"{self.flank_deg:g} deg, {self.rim.name}"
 
 
 class Goal(Section):
@@ -53,6 +112,20 @@ class Goal(Section):
     K3: float
 
 
+class RatioEffect(Section):
+    """Goal for the stiffness at one ratio divided by that at another.
+
+    K of the middles of the brackets is divided for each size; the mean over the sizes
+    is compared with that of the catalogue.
+    """
+
+    ratios: Annotated[tuple[Whole, Whole], Field(strict=False)]
+    """Ratio of the dividend and of the divisor."""
+    sizes: Numbers
+    goal: float
+    """Accepted relative deviation from the catalogue [-]."""
+
+
 class NoClaim(Section):
     """Sizes that are reported without an accuracy goal, listed for the reader."""
 
@@ -63,8 +136,6 @@ class Individuals(Section):
     """Individual gears of one design, one per seed."""
 
     seeds: Numbers
-    variant: Text
-    """Name of the variant."""
     size: Whole
     ratio: Whole
     clearance: Mapping[str, Any]
@@ -77,12 +148,13 @@ class Individuals(Section):
 
 
 class ConingSection(Section):
-    """Comparison of wave generators in 3D, rigid and on a bearing, at one size."""
+    """Comparison of wave generators in 3D, rigid and on a bearing, at one size.
+
+    The drives are those of the family without changes.
+    """
 
     size: Whole
     ratios: Numbers
-    variant: Text
-    """Name of the variant."""
     refinement: float
     """Mesh refinement [-]."""
     straight: Mapping[str, Any]
@@ -98,13 +170,17 @@ class CatalogueFile(Section):
     """Sizes of the drives: the pitch diameter in tenths of an inch."""
     ratios: Numbers
     goals: Annotated[tuple[Goal, ...], Field(strict=False)]
+    figures_within_goals: Whole
+    """Number of stiffness figures that shall meet their goal."""
+    ratio_effect: RatioEffect
     no_claim: Annotated[tuple[NoClaim, ...], Field(strict=False)] = ()
     middle: Literal["mean of smallest and largest"]
     """Definition of the middle of a bracket."""
     stated: Mapping[str, Mapping[str, Any]]
     """Assumed values with their sources; only ``tooth_friction`` is read."""
-    variants: Annotated[tuple[Variant, ...], Field(strict=False, min_length=1)]
-    """Variants; the first one is used where only one is computed."""
+    cups: Annotated[tuple[CupRule, ...], Field(strict=False, min_length=1)]
+    flanks: Annotated[tuple[FlankChoice, ...], Field(strict=False, min_length=1)]
+    rims: Annotated[tuple[RimRule, ...], Field(strict=False, min_length=1)]
     individuals: Individuals
     coning: ConingSection
 
@@ -118,6 +194,16 @@ class CatalogueFile(Section):
         path = find(reference, "studies", ".toml", what="study")
         data = read_toml(path, what="study", error=InputError)
         return validate(cls, data, where=str(path), error=InputError)
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All combinations; the first one is used where only one is computed."""
+        return tuple(
+            Variant(cup=cup, flank=flank, rim=rim)
+            for flank in self.flanks
+            for rim in self.rims
+            for cup in self.cups
+        )
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -146,8 +232,7 @@ class CatalogueFile(Section):
             straight: Whether relief along the face width is omitted.
         """
         own = self.coning
-        variant = next(v for v in self.variants if v.name == own.variant)
-        design = variant_design(own.size, ratio, variant)
+        design = Design.preset(f"size-{own.size}-{ratio}")
         changes = {"mesh.refinement": own.refinement}
         return design.with_changes({**changes, **(own.straight if straight else {})})
 
@@ -158,8 +243,7 @@ class CatalogueFile(Section):
         uniformly distributed over its class.
         """
         own = self.individuals
-        variant = next(v for v in self.variants if v.name == own.variant)
-        design = variant_design(own.size, own.ratio, variant)
+        design = variant_design(own.size, own.ratio, self.variants[0])
         bore = BEARING_BORE * 2.54 * own.size
         low, high = next(band for limit, band in CLEARANCE if bore <= limit)
         drawn = float(np.random.default_rng(seed).uniform(low, high))
@@ -173,18 +257,47 @@ class CatalogueFile(Section):
 
 
 def variant_design(size: int, ratio: int, variant: Variant) -> Design:
-    """Member of the drive family with the changes of a variant.
+    """Member of the drive family with the cup, flanks and rim of a variant.
 
     Args:
         size: Size of the drive.
         ratio: Ratio of the drive.
-        variant: Changes of the family design.
+        variant: Choices of cup, flanks and rim.
     """
     design = Design.preset(f"size-{size}-{ratio}")
-    changes = dict(variant.changes)
-    for table, unit in (
-        (variant.per_pitch_diameter, 2.54 * size),
-        (variant.per_module, design.drive.module_mm),
-    ):
-        changes |= {key: value * unit for key, value in table.items()}
-    return design.with_changes(changes)
+    diameter, module = 2.54 * size, design.drive.module_mm
+    angle = variant.flank_deg
+    rim_mm = variant.rim.thickness(diameter, ratio)
+    cup, flank = variant.cup.per_pitch_diameter, variant.flank.per_module
+    design = design.with_changes(
+        {
+            **{key: value * diameter for key, value in cup.items()},
+            **{key: value * module for key, value in flank.items()},
+            "flexspline.pressure_angle_deg": angle,
+            "circular_spline.pressure_angle_deg": angle,
+            "flexspline.rim_mm": rim_mm,
+        }
+    )
+    wall = cup_wall(design, variant.cup, size)
+    return design.with_changes({"cup.thickness_coefficient": wall / (rim_mm * mm)})
+
+
+def cup_wall(design: Design, cup: CupRule, size: int) -> float:
+    """Wall of a cup by the rule of the study [m].
+
+    Args:
+        design: Drive with the length of the cup and the rim.
+        cup: Rule for the wall.
+        size: Size of the drive, for the buckling torque of the catalogue.
+    """
+    assert design.cup is not None
+    torque = catalogue_buckling_torque(size)
+    if cup.buckling_torque_over_cube_Nm_mm3 is not None:
+        torque = cup.buckling_torque_over_cube_Nm_mm3 * (2.54 * size) ** 3
+    return wall_for_buckling_torque(
+        torque,
+        inner_radius=design.flexspline_inner_radius,
+        length=design.cup.length_mm * mm,
+        material=design.material_of("flexspline"),
+        knock_down=cup.knock_down,
+    )

@@ -56,6 +56,21 @@ def catalogue_stiffness(row: CatalogueRow) -> Array:
     raise ValueError(f"no stiffness of size {row.size}, ratio {row.ratio}")
 
 
+def catalogue_buckling_torque(size: int) -> float:
+    """Printed torque at which the cup of a component set buckles [N·m].
+
+    It is the same for all ratios of a size.
+
+    Raises:
+        ValueError: If the catalogue does not list the size.
+    """
+    for line in table("ratings"):
+        torque = line["buckling_Nm"]
+        if line["size"] == float(size) and isinstance(torque, float):
+            return torque
+    raise ValueError(f"no buckling torque of size {size}")
+
+
 def printed_accuracy(row: CatalogueRow) -> dict[str, float | None]:
     """Printed upper bounds of transmission accuracy, hysteresis loss and lost motion.
 

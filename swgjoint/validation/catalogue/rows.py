@@ -82,7 +82,7 @@ def stiffness_rows(
     values: dict[str, list[float]] = {}
     faults = []
     for variant in study.variants:
-        one = found[f"path {row.size} {row.ratio} {variant.flank_deg:g}"]
+        one = found[f"path {row.size} {row.ratio} {variant.section}"]
         if "fault" in one:
             faults.append(f"{variant.name}: {one['fault']}")
             continue

@@ -40,12 +40,12 @@ def cube_scaling(
     rows, worst = [], np.zeros(len(STIFFNESS))
     first = study.variants[0]
     for ratio in study.ratios:
-        base = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        base = found[f"path {size} {ratio} {first.section}"]
         if "fault" in base:
             continue
         here = friction_of_path(base, variant_design(size, ratio, first))
         for other in study.sizes:
-            one = found[f"path {other} {ratio} {first.flank_deg:g}"]
+            one = found[f"path {other} {ratio} {first.section}"]
             if "fault" in one or other == size:
                 continue
             scale = (other / size) ** 3
@@ -99,12 +99,12 @@ def shares(
     rows, lines = [], []
     first = study.variants[0]
     for ratio in study.ratios:
-        name = f"path {size} {ratio} {first.flank_deg:g}"
+        name = f"path {size} {ratio} {first.section}"
         if "fault" in found[name]:
             continue
         row, design = catalogue_row(size, ratio), variant_design(size, ratio, first)
         path = friction_of_path(found[name], design)
-        parts = {f"{first.cup} cup": path.series / path.compliance, **path.shares}
+        parts = {first.cup.name: path.series / path.compliance, **path.shares}
         rows += [
             {
                 "size": size,
@@ -245,7 +245,7 @@ def friction(
     rows, lines = [], []
     first = study.variants[0]
     for ratio in study.ratios:
-        one = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        one = found[f"path {size} {ratio} {first.section}"]
         if "fault" in one:
             continue
         path = friction_of_path(one, variant_design(size, ratio, first))

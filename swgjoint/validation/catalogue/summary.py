@@ -55,7 +55,7 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
                 if lost:
                     text += f" ({lost} with missing variants count as not met)"
             lines.append(text)
-    return lines + _rising(rows)
+    return lines + _rising(rows) + _goals_met(study, rows) + _ratio_effect(study, rows)
 
 
 def _range(rows: Sequence[Row]) -> str:
@@ -89,6 +89,48 @@ def _rising(rows: Sequence[Row]) -> list[str]:
     line = f"K1 < K2 < K3 fails in {fails} of {len(cases)} cases"
     lost = len(cases) - len(known)
     return [line + f" and is unknown in {lost}" * (lost > 0)]
+
+
+def _goals_met(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
+    """Line on the number of stiffness figures that meet their goal."""
+    judged = [row for row in rows if row.more["goal"] is not None]
+    if not judged:
+        return []
+    met = sum(bool(row.more["met"]) for row in judged)
+    return [
+        f"stiffness figures within their goal: {met} of {len(judged)} (goal:"
+        f" {study.figures_within_goals})"
+    ]
+
+
+def _ratio_effect(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
+    """Lines on K at one ratio over K at another, mean over the sizes with both."""
+    own = study.ratio_effect
+    values = {(row.quantity, row.more["size"], row.more["ratio"]): row for row in rows}
+    lines = []
+    for key in STIFFNESS:
+        pairs = [
+            [values.get((key, size, ratio)) for ratio in own.ratios]
+            for size in own.sizes
+        ]
+        both = [
+            (row.ours / other.ours, row.source_value / other.source_value)
+            for row, other in pairs
+            if row and other and row.ours and other.ours
+            if row.source_value and other.source_value
+        ]
+        if not both:
+            continue
+        ours, theirs = (sum(column) / len(both) for column in zip(*both, strict=True))
+        deviation = ours / theirs - 1.0
+        met = len(both) == len(own.sizes) and abs(deviation) <= own.goal
+        lines.append(
+            f"{key}({own.ratios[0]})/{key}({own.ratios[1]}), mean over {len(both)} of"
+            f" {len(own.sizes)} sizes: model {ours:.2f}, catalogue {theirs:.2f},"
+            f" {100 * deviation:+.0f} % (goal {100 * own.goal:.0f} %:"
+            f" {'met' if met else 'missed'})"
+        )
+    return lines
 
 
 def ratcheting_orders(
