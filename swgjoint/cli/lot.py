@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import Any
 
 from swgjoint.cli.shared.text import table
@@ -12,6 +13,7 @@ from swgjoint.files import Outputs, output_folder
 
 MAX_DRIVES = 100_000
 MAX_JOBS = 256
+MAX_CLEARANCE_UM = 2000.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -20,6 +22,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "design",
         metavar="DESIGN",
         help="design file or bundled name; the design has a [tolerances] table",
+    )
+    parser.add_argument(
+        "--model",
+        choices=("2d", "ring"),
+        default="2d",
+        help="2d: 2D elements on a rigid wave generator (default); ring: thin rings on"
+        " the bearing of the wave generator, with lost motion and K1",
+    )
+    parser.add_argument(
+        "--clearance-um",
+        type=float,
+        nargs=2,
+        metavar=("LOW", "HIGH"),
+        help="with --model ring: draw the bearing clearance uniformly between these"
+        " limits; default: the clearance of the design",
     )
     parser.add_argument(
         "--drives",
@@ -45,7 +62,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--spec",
         metavar="FILE",
         help="TOML file with a [spec] table of limits for the yield; keys:"
-        " transmission_accuracy_arcmin, ripple_rms_percent, torsional_stiffness_Nm_rad",
+        " transmission_accuracy_arcmin, ripple_rms_percent, torsional_stiffness_Nm_rad;"
+        " with --model ring: transmission_accuracy_arcmin, lost_motion_arcmin,"
+        " K1_Nm_rad",
     )
     parser.add_argument(
         "--jobs",
@@ -65,7 +84,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Draw the errors of the drives at random and evaluate the lot.
 
     Returns:
-        The result of :func:`swgjoint.explore.lot.run_lot`, and ``files``.
+        The result of :func:`swgjoint.explore.lot.run_lot` or
+        :func:`swgjoint.explore.bearing_lot.run_bearing_lot`, and ``files``.
 
     Raises:
         InputError: If a number is out of range.
@@ -77,14 +97,28 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     ):
         if not 1 <= value <= most:
             raise InputError(f"--{name} {value}; accepted: 1 to {most}")
+    limits = args.clearance_um
+    if limits is not None and (args.model != "ring" or not _accepts(limits)):
+        raise InputError(
+            f"--clearance-um {limits[0]:g} {limits[1]:g}; accepted: with --model ring,"
+            f" two increasing values from 0 to {MAX_CLEARANCE_UM:g}"
+        )
     folder = output_folder(args.out) if args.out else None
+    from swgjoint.explore.bearing_lot import FIGURES as RING_FIGURES
+    from swgjoint.explore.bearing_lot import run_bearing_lot
     from swgjoint.explore.compare.compare import read_spec
     from swgjoint.explore.lot import FIGURES, LOWER, run_lot
     from swgjoint.gear.design.design import Design
     from swgjoint.view.plots.lot import lot_picture
 
-    spec = read_spec(args.spec, FIGURES) if args.spec else None
-    result = run_lot(
+    ring = args.model == "ring"
+    figures = RING_FIGURES if ring else FIGURES
+    spec = read_spec(args.spec, figures) if args.spec else None
+    solve = run_lot
+    if ring:
+        between = None if limits is None else (limits[0], limits[1])
+        solve = partial(run_bearing_lot, clearance_um=between)
+    result = solve(
         Design.load(args.design),
         count=args.drives,
         seed=args.seed,
@@ -100,6 +134,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         outputs.write("lot.png", lambda: lot_picture(result, lower=LOWER))
         outputs.write_json("lot.json", result)
     return result
+
+
+def _accepts(limits: list[float]) -> bool:
+    """Whether two limits of the bearing clearance can be used."""
+    return 0.0 <= limits[0] <= limits[1] <= MAX_CLEARANCE_UM
 
 
 def report(result: dict[str, Any]) -> str:

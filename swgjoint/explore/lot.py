@@ -38,11 +38,14 @@ from swgjoint.progress import Progress, silent
 from swgjoint.store import json_file, keep
 from swgjoint.units import arcmin
 
-UPPER = ("transmission_accuracy_arcmin", "ripple_rms_percent")
-"""Figures with an upper limit."""
-LOWER = ("torsional_stiffness_Nm_rad",)
-"""Figures with a lower limit."""
-FIGURES = UPPER + LOWER
+FIGURES = (
+    "transmission_accuracy_arcmin",
+    "ripple_rms_percent",
+    "torsional_stiffness_Nm_rad",
+)
+"""Figures of a lot in 2D."""
+LOWER = ("torsional_stiffness_Nm_rad", "K1_Nm_rad")
+"""Figures with a lower limit; the others have an upper one."""
 SIZES = ("limit", "uniform")
 """Meanings of the tolerances: sizes of the errors, or upper limits of these sizes."""
 
@@ -74,15 +77,6 @@ class Drawn:
     def failed(self) -> bool:
         """Whether a position has no equilibrium."""
         return self.transmission_accuracy_arcmin is None
-
-    def meets(self, spec: Mapping[str, float]) -> bool:
-        """Whether the drive meets every limit; a drive without solution meets none."""
-        if self.failed:
-            return False
-        return all(
-            getattr(self, key) <= limit if key in UPPER else getattr(self, key) >= limit
-            for key, limit in spec.items()
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +136,7 @@ def run_lot(
         count: Number of drives.
         seed: Seed of the first drive; the others follow consecutively.
         sizes: Meaning of the tolerances of the design, see :data:`SIZES`.
-        spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
+        spec: Limits by figure, see :data:`FIGURES` and :data:`LOWER`.
         jobs: Number of processes.
         progress: Called with the stage, the number of finished drives and their total.
 
@@ -215,18 +209,9 @@ def run_lot(
     )
     rows = [*found.values(), *(row for part in solved_now for row in part)]
     rows.sort(key=lambda row: row.seed)
-    solved = [row for row in rows if not row.failed]
-    return {
+    return summarise_lot(rows, FIGURES, spec) | {
         "design": design.drive.name,
         "sizes": sizes,
-        "spec": None if spec is None else dict(spec),
-        "rows": [
-            vars(row) | ({} if spec is None else {"passed": row.meets(spec)})
-            for row in rows
-        ],
-        "figures": {
-            key: distribution([getattr(row, key) for row in solved]) for key in FIGURES
-        },
         "validity": {
             "level": "2d, errors superposed",
             "torque_Nm": ratings_of(design).rated_torque,
@@ -235,9 +220,49 @@ def run_lot(
             "cup": None if design.cup is None else "closed-form torsion in series",
             "superposition_error": off,
         },
-        "yield": None if spec is None else _yields(rows, spec),
-        "failed": len(rows) - len(solved),
         "wall_s": time.perf_counter() - begin,
+    }
+
+
+def summarise_lot(
+    rows: Sequence[Any], figures: Sequence[str], spec: Mapping[str, float] | None
+) -> dict[str, Any]:
+    """Distributions and yield of the drives of a lot.
+
+    Args:
+        rows: Data of the drives, with ``figures`` and ``failed`` as attributes.
+        figures: Names of the figures, which are None for drives without a solution.
+        spec: Limits by figure; those in :data:`LOWER` are lower limits.
+
+    Returns:
+        ``rows``, ``figures``, ``yield``, ``failed`` and ``spec`` of :func:`run_lot`.
+    """
+    solved = [row for row in rows if not row.failed]
+
+    def meets(row: Any, limits: Mapping[str, float]) -> bool:
+        return not row.failed and all(
+            getattr(row, key) >= limit if key in LOWER else getattr(row, key) <= limit
+            for key, limit in limits.items()
+        )
+
+    def part(limits: Mapping[str, float]) -> dict[str, float]:
+        return wilson(sum(meets(row, limits) for row in rows), len(rows))
+
+    yields = None
+    if spec is not None:
+        by_limit = {key: part({key: spec[key]}) for key in spec}
+        yields = {**part(spec), "by_limit": by_limit}
+    return {
+        "spec": None if spec is None else dict(spec),
+        "rows": [
+            vars(row) | ({} if spec is None else {"passed": meets(row, spec)})
+            for row in rows
+        ],
+        "figures": {
+            key: distribution([getattr(row, key) for row in solved]) for key in figures
+        },
+        "yield": yields,
+        "failed": len(rows) - len(solved),
     }
 
 
@@ -267,13 +292,6 @@ def wilson(passed: int, count: int) -> dict[str, float]:
         "low": float(interval.low),
         "high": float(interval.high),
     }
-
-
-def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
-    def of(limits: Mapping[str, float]) -> dict[str, float]:
-        return wilson(sum(row.meets(limits) for row in rows), len(rows))
-
-    return of(spec) | {"by_limit": {key: of({key: spec[key]}) for key in spec}}
 
 
 @lru_cache

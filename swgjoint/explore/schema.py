@@ -116,17 +116,22 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[str, str]]:
 
 def _limits(kind: str) -> dict[str, Any]:
     """Schema of a file with a table of limits."""
-    from swgjoint.explore import lot
+    from swgjoint.explore import bearing_lot, lot
     from swgjoint.explore.compare import compare
 
-    command = "compare" if kind == "spec" else "lot"
-    of: type = compare.Compared if kind == "spec" else lot.Drawn
-    upper: tuple[str, ...] = keys.UPPER if kind == "spec" else lot.UPPER
-    lower: tuple[str, ...] = keys.LOWER if kind == "spec" else lot.LOWER
-    meaning = meanings(of)
+    lower: tuple[str, ...]
+    names: tuple[str, ...]
+    if kind == "spec":
+        command, lower = "compare", keys.LOWER
+        names = (*keys.UPPER, *keys.LOWER)
+        meaning = meanings(compare.Compared)
+    else:
+        command, lower = "lot", lot.LOWER
+        names = tuple(dict.fromkeys((*lot.FIGURES, *bearing_lot.FIGURES)))
+        meaning = meanings(bearing_lot.DriveOnBearing) | meanings(lot.Drawn)
     figures = {}
-    for key in (*upper, *lower):
-        bound = "Largest" if key in upper else "Smallest"
+    for key in names:
+        bound = "Smallest" if key in lower else "Largest"
         text = f"{bound} accepted value. {meaning.get(key, '')}".strip()
         unit = {"unit": unit_of(key)} if unit_of(key) else {}
         entry = {"type": "number", "exclusiveMinimum": 0, "description": text}

@@ -45,6 +45,15 @@ def test_lot_writes_rows_and_picture(tmp_path, capsys):
         (["--drives", "0"], ("--drives", "0", "1", "100000")),
         (["--jobs", "0"], ("--jobs", "0", "1", "256")),
         (["--seed", "-1"], ("--seed", "-1", "1", "2147483147")),
+        (["--clearance-um", "6", "23"], ("--clearance-um", "6", "23", "ring")),
+        (
+            ["--model", "ring", "--clearance-um", "23", "6"],
+            ("--clearance-um", "23", "6", "increasing"),
+        ),
+        (
+            ["--model", "ring", "--clearance-um", "nan", "6"],
+            ("--clearance-um", "nan", "6", "increasing"),
+        ),
     ],
 )
 def test_bad_numbers_are_one_line(arguments, said, capsys):

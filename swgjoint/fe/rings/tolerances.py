@@ -165,7 +165,7 @@ class RingErrors:
             stored = self.keep.read(name, partial(_stored_table, shape))
             if stored is not None:
                 return stored
-        rest = self._linearised(model, phase, levels, _largest_change(errors))
+        rest = self.linearise(model, phase, levels, errors)
         table, _ = respond_over_torque(rest, errors, levels, self.small)
         if not np.isfinite(table).all():
             lost = int(np.isnan(table).any(axis=(0, 1)).sum())
@@ -178,8 +178,12 @@ class RingErrors:
             self.keep.write(name, {"table": table})
         return table
 
-    def _linearised(
-        self, model: ThinRing, phase: float, levels: Array, reach: float
+    def linearise(
+        self,
+        model: ThinRing,
+        phase: float,
+        levels: Array,
+        errors: tuple[Array, ...],
     ) -> Rest:
         """The rings at a position of the balls, linearised under torques of both signs.
 
@@ -187,8 +191,13 @@ class RingErrors:
             model: Rings with perfect teeth and with errors of the wave generator.
             phase: Angle of ball 0 from the major axis [rad].
             levels: Torques of both signs, increasing (n_levels,) [N·m].
-            reach: Largest gap that errors may close [m].
+            errors: Shifts of the teeth by pitch; the largest gap that they may close
+                limits the contacts.
+
+        Raises:
+            ComputationError: If an equilibrium cannot be found.
         """
+        reach = _largest_change(errors)
         rest = self._solved(solve_unloaded(model, 0.0, phase), 0.0, 0.0)
         loaded = {}
         for sign in (1.0, -1.0):

@@ -99,7 +99,7 @@ def sample_lot(
     # a whole output turn even if the errors repeat sooner: the orders of the two
     # members can be separated only by their beat
     turn = round(2.0 * np.pi * abs(design.ratio) / pitch_of(design))
-    pitch, phase = np.divmod(_stratified(turn * phases, positions), phases)
+    pitch, phase = np.divmod(stratified_numbers(turn * phases, positions), phases)
     # theta/i within the first pitch, to which the errors of every pitch are referred
     ideal = pitch_of(design) * phase / phases / design.ratio
     shape = (len(drives), pitch.size)
@@ -208,10 +208,14 @@ def _gap_changes(
     return np.concatenate(rows)
 
 
-def _stratified(count: int, wanted: int) -> Index:
+def stratified_numbers(count: int, wanted: int) -> Index:
     """Random numbers from 0 to count - 1, one in each of ``wanted`` equal parts.
 
     The random choice avoids aliasing. All numbers are used if no more are available.
+
+    Args:
+        count: Number of numbers to choose from.
+        wanted: Number of parts.
     """
     if wanted >= count:
         return np.arange(count)

@@ -13,6 +13,8 @@ _LABELS = {
     "transmission_accuracy_arcmin": "transmission accuracy [arcmin]",
     "ripple_rms_percent": "torque ripple, output held [% of rated, rms]",
     "torsional_stiffness_Nm_rad": "torsional stiffness at rated torque [N·m/rad]",
+    "lost_motion_arcmin": "lost motion [arcmin]",
+    "K1_Nm_rad": "torsional stiffness K1 [N·m/rad]",
 }
 
 
