@@ -119,5 +119,5 @@ def test_everything_stated_has_a_source():
     for name, entry in STUDY.stated.items():
         assert len(entry["source"]) > 8, name
     assert len(STUDY.individuals.source) > 8
-    for choice in (*STUDY.cups, *STUDY.flanks, *STUDY.rims):
+    for choice in (*STUDY.cups, *STUDY.flanks, *STUDY.rims, *STUDY.experiments):
         assert len(choice.source) > 8

@@ -9,6 +9,8 @@ The parts are:
 - ``accuracy``: transmission accuracy over an output turn, from the same rings;
 - ``ratcheting``: ratcheting torque from 2D finite elements;
 - ``losses``: no-load running and starting torque from the friction of teeth and race;
+- ``experiments``, only if requested: changes of one thing at a time, which show what
+  K at ratio 50 over K at ratio 100 depends on, from the same rings;
 - ``coning``, only if requested: K1, K2, K3 from 3D finite elements with a rigid wave
   generator and with one on its bearing, at two ratios (about 20 CPU minutes).
 
@@ -27,6 +29,10 @@ from swgjoint.validation.catalogue.coning import (
     coning_picture,
     coning_summary,
     coning_tasks,
+)
+from swgjoint.validation.catalogue.experiments import (
+    experiment_summary,
+    experiment_tasks,
 )
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.losses import loss_lines, loss_rows, loss_tasks
@@ -52,7 +58,7 @@ from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 from swgjoint.validation.runner import compute_all
 
 PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
-EXTRA = ("coning",)
+EXTRA = ("experiments", "coning")
 """Parts that run only if requested."""
 REFERENCE = 25
 """Size at which shares and friction are listed, and from which ratcheting torque and
@@ -94,6 +100,9 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     if "individuals" in parts:
         more["individuals"] = individual_summary(study, found)
         lines += more["individuals"]["lines"]
+    if "experiments" in parts:
+        more["experiments"] = experiment_summary(study, found, REFERENCE)
+        lines += more["experiments"]["lines"]
     if "coning" in parts:
         more["coning"] = coning_summary(study, found)
         lines += more["coning"]["lines"]
@@ -121,6 +130,8 @@ def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
         return loss_tasks(study)
     if part == "coning":
         return coning_tasks(study)
+    if part == "experiments":
+        return experiment_tasks(study, REFERENCE)
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
     if part == "stiffness":
         sections = {v.section: v for v in reversed(study.variants)}
@@ -191,7 +202,7 @@ def _teeth(name: str, design: Design, work: float) -> CatalogueTask:
 
 
 def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:
-    """Rows of a part; none for ``individuals`` and ``coning``.
+    """Rows of a part; none for ``individuals``, ``experiments`` and ``coning``.
 
     Args:
         study: Study file.

@@ -147,6 +147,25 @@ class Individuals(Section):
     """Source of the tolerances."""
 
 
+class Experiment(Section):
+    """One change of the first variant, to test what causes the effect of the ratio."""
+
+    name: Text
+    ratios: Numbers | None = None
+    """Ratios at which the drive is changed; by default all."""
+    rim: RimRule | None = None
+    """Other rule for the rim; the wall keeps its thickness."""
+    flank_deg: float | None = None
+    """Other flank, one of the study file [deg]."""
+    per_pitch_diameter: Mapping[str, float] = {}
+    """Lengths by dotted key of the design, divided by the pitch diameter [-]."""
+    changes: Mapping[str, Any] = {}
+    """Values by dotted key, in the units of the design file."""
+    play_arcsec: Mapping[str, float] = {}
+    """Play at the output by ratio, added to the torsion."""
+    source: Source
+
+
 class ConingSection(Section):
     """Comparison of wave generators in 3D, rigid and on a bearing, at one size.
 
@@ -182,6 +201,7 @@ class CatalogueFile(Section):
     flanks: Annotated[tuple[FlankChoice, ...], Field(strict=False, min_length=1)]
     rims: Annotated[tuple[RimRule, ...], Field(strict=False, min_length=1)]
     individuals: Individuals
+    experiments: Annotated[tuple[Experiment, ...], Field(strict=False)]
     coning: ConingSection
 
     @classmethod
