@@ -136,7 +136,12 @@ def _top(arguments: list[str]) -> int:
     parser.error(f"unknown command {command!r}; {hint}accepted: {', '.join(COMMANDS)}")
 
 
-def _command(name: str, arguments: list[str]) -> int:
+def command_parser(name: str) -> Parser:
+    """Parser of one command, with the options that all commands share.
+
+    Args:
+        name: One of :data:`COMMANDS`.
+    """
     module = import_module(f"swgjoint.cli.{name}")
     parser = Parser(
         prog=f"swgjoint {name}", description=COMMANDS[name], allow_abbrev=False
@@ -160,7 +165,12 @@ def _command(name: str, arguments: list[str]) -> int:
         help="print the traceback after an internal error",
     )
     parser.epilog = f"{parser.epilog or ''} {STATUSES}".strip()
-    args = parser.parse_args(arguments)
+    return parser
+
+
+def _command(name: str, arguments: list[str]) -> int:
+    module = import_module(f"swgjoint.cli.{name}")
+    args = command_parser(name).parse_args(arguments)
     progress = StderrProgress(verbose=args.verbose)
     args.progress = silent if args.quiet else progress
     incomplete: list[str] = []

@@ -6,6 +6,8 @@ import argparse
 import textwrap
 from typing import Any
 
+from swgjoint.files import check_output_file, write_whole
+
 KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
 WIDTH = 88
 """Width of the list in characters."""
@@ -15,8 +17,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the kind of file."""
     parser.epilog = (
         "With --json, the output is a JSON Schema (draft 2020-12) for TOML editors and"
-        " validators, with the unit of each key under 'unit'. Without --json, the keys"
-        " are listed as text."
+        " validators, with the unit of each key under 'unit'; -o writes it to a file."
+        " Without both, the keys are listed as text. An editor with taplo (such as Even"
+        " Better TOML) completes and checks the keys of a TOML file whose first line is"
+        " '#:schema FILE'."
     )
     parser.add_argument(
         "kind",
@@ -24,24 +28,37 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="kind of file; spec: limits for compare; lot: limits for lot; optimise:"
         " search file for optimise",
     )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="schema file to write (.json)"
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the schema of one kind of file.
+    """Return the schema of one kind of file, or write it to a file.
 
     Returns:
-        JSON Schema with ``unit``, range, ``default`` and ``description`` of each key.
-    """
-    from swgjoint.explore.schema import file_schema
+        JSON Schema with ``unit``, range, ``default`` and ``description`` of each key;
+        if it is written to a file, ``files`` instead.
 
-    return file_schema(args.kind)
+    Raises:
+        InputError: If the output file cannot be written.
+    """
+    from swgjoint.explore.schema import file_schema, schema_text
+
+    if args.output is None:
+        return file_schema(args.kind)
+    path = check_output_file(args.output, ".json")
+    write_whole(path, schema_text(args.kind))
+    return {"files": [str(path)]}
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format one line per key, followed by its meaning."""
+    """Format one line per key, followed by its meaning; or the name of the file."""
     from swgjoint.explore.schema import described_keys
     from swgjoint.json_text import json_text
 
+    if "files" in result:
+        return f"schema: {result['files'][0]}"
     lines = []
     for one in described_keys(result):
         default = one["default"]

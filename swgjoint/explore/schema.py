@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,6 +29,19 @@ KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
 """Kinds of input files."""
 _ROLE = re.compile(r":[a-z]+:`~?([^`]+)`")
 """Cross-reference of a docstring."""
+_TYPES = {
+    "object": "table",
+    "array": "list",
+    "string": "text",
+    "boolean": "true or false",
+}
+_PLURALS = {
+    "integer": "integers",
+    "number": "numbers",
+    "string": "texts",
+    "array": "lists",
+}
+"""Types of the values of lists and tables."""
 _SIGNS = {
     "exclusiveMinimum": ">",
     "minimum": ">=",
@@ -49,6 +63,15 @@ def file_schema(kind: str) -> dict[str, Any]:
     model = _model(kind)
     schema = model.model_json_schema(schema_generator=_WithMeaning)
     return {"$schema": DIALECT, **schema}
+
+
+def schema_text(kind: str) -> str:
+    """JSON Schema of one kind of file as the text of a file.
+
+    Args:
+        kind: One of :data:`KINDS`.
+    """
+    return json.dumps(file_schema(kind), indent=1, ensure_ascii=False) + "\n"
 
 
 def _model(kind: str) -> type[BaseModel]:
@@ -81,6 +104,8 @@ class _WithMeaning(GenerateJsonSchema):
                 entry["unit"] = unit
             if key in meaning:
                 entry["description"] = meaning[key]
+        if known := getattr(schema["cls"], "known", None):  # names of figures
+            found["properties"]["figures"]["items"] = {"enum": list(known)}
         return found
 
 
@@ -160,7 +185,7 @@ def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
         ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of
         a list), ``of_kind`` (value of ``kind`` in the table of the key; None if the
         table has no kinds), ``type``, ``unit``, ``range``, ``default`` (None if there
-        is none), ``required``, ``meaning``.
+        is none), ``required``, ``meaning``, ``forms`` (schemas of the accepted types).
     """
     return list(_keys(schema, schema, "", None))
 
@@ -183,6 +208,7 @@ def _keys(
             "default": default if not isinstance(default, Mapping) else None,
             "required": name in required,
             "meaning": _meaning(name, entry, values, table),
+            "forms": values,
         }
         for form in values:
             yield from _below(form, root, key)
@@ -238,15 +264,22 @@ def _type(form: Mapping[str, Any]) -> str:
         return repr(form["const"])
     if "enum" in form:
         return " or ".join(map(repr, form["enum"]))
-    names = {
-        "object": "table",
-        "array": "list",
-        "integer": "integer",
-        "string": "text",
-        "boolean": "true or false",
-    }
     kind = str(form.get("type", "any value"))
-    return names.get(kind, kind)
+    return _contents(form) or _TYPES.get(kind, kind)
+
+
+def _contents(form: Mapping[str, Any]) -> str:
+    """Type of a list or a table of plain values; the empty string for other types."""
+    items = form.get("prefixItems")
+    inner = items[0] if items else form.get("additionalProperties") or form.get("items")
+    if isinstance(inner, Mapping) and "enum" in inner:
+        return f"list of {_type(inner)}"
+    if not isinstance(inner, Mapping) or inner.get("type") not in _PLURALS:
+        return ""
+    many = _PLURALS[inner["type"]]
+    if form["type"] == "object":
+        return f"table of {many}"
+    return f"list of {len(items)} {many}" if items else f"list of {many}"
 
 
 def _range(form: Mapping[str, Any]) -> str:

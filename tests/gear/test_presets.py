@@ -15,6 +15,7 @@ from swgjoint.gear.design.feasibility import design_checks
 from swgjoint.models_path import bundled_names, models_path
 
 NAMES = bundled_names("drives", ".toml")
+SCHEMA = "#:schema ../schemas/design.json\n"
 SHIPPED = [(size, ratio) for size in (14, 17, 20, 25, 32) for ratio in (50, 80, 100)]
 
 
@@ -30,9 +31,10 @@ def test_presets_load_and_check(name):
 
 
 def test_no_preset_names_another_folder():
-    """The files stand alone: no paths in them."""
+    """The files stand alone: no paths in them but that of their schema."""
     for name in NAMES:
         text = (models_path() / "drives" / f"{name}.toml").read_text()
+        text = text.removeprefix(SCHEMA)
         assert "../" not in text
         assert "shared" not in text
 
@@ -75,7 +77,7 @@ def test_shipped_family_equals_the_rule(size, ratio):
     name = f"size-{size}-{ratio}"
     assert name in NAMES
     path = models_path() / "drives" / f"{name}.toml"
-    assert path.read_text() == family_text(size, ratio)
+    assert path.read_text() == SCHEMA + family_text(size, ratio)
     by_rule = Design.model_validate(family_design(size, ratio))
     assert Design.load(name) == Design.preset(name) == by_rule
 
