@@ -78,7 +78,8 @@ def pages() -> dict[Path, str]:
 def rows_of(kind: str) -> list[dict]:
     """Keys of one kind of file, each once; ``table`` tells whether it holds others."""
     rows = described_keys(file_schema(kind))
-    above = {re.sub(r"(\.NAME|\[\])?\.\w+$", "", row["key"]) for row in rows}
+    below = [row["key"] for row in rows if "." in row["key"]]
+    above = {re.sub(r"(\.NAME|\[\])?\.\w+$", "", key) for key in below}
     once = {(row["key"], row["of_kind"]): row for row in reversed(rows)}
     return [row | {"table": row["key"] in above} for row in reversed(once.values())]
 

@@ -116,8 +116,8 @@ def attach(
             :mod:`swgjoint.joint.variation`.
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the time
             step cannot resolve at this speed are omitted. None keeps all harmonics.
-        max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
-            [rad].
+        max_phase_step: Largest phase step ``h n |theta rate|`` of a harmonic that is
+            kept [rad].
         integrator: If a level has a rotor, ``discrete`` replaces Euler, ``implicit``
             and ``implicitfast`` (the last two with a warning), raises iteration limits
             of the solver below MuJoCo's defaults, and replaces a tolerance that is too

@@ -1,0 +1,263 @@
+"""The guide: links lead somewhere, commands are accepted, examples and site work."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import shlex
+import subprocess
+import sys
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import swgjoint
+from swgjoint.cli.main import COMMANDS, command_parser, main
+from swgjoint.models_path import bundled_names
+
+ROOT = Path(__file__).parents[2]
+GUIDE = ROOT / "notebooks" / "guide"
+PAGES = [ROOT / "README.md", *sorted(GUIDE.rglob("*.md"))]
+LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
+
+
+def name_of(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+@cache
+def text_of(page):
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(page, language):
+    pattern = rf"^```{language}\n(.*?)^```"
+    return re.findall(pattern, text_of(page), re.DOTALL | re.MULTILINE)
+
+
+def prose(page):
+    """Text of a page without its blocks of code."""
+    return re.sub(r"^```.*?^```", "", text_of(page), flags=re.DOTALL | re.MULTILINE)
+
+
+@cache
+def anchors(page):
+    """Anchors that the headings of a page get."""
+    found = Counter()
+    names = set()
+    for heading in re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE):
+        slug = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        names.add(f"{slug}-{found[slug]}" if found[slug] else slug)
+        found[slug] += 1
+    return names
+
+
+def broken(page, text):
+    """Links of a text, read as part of a page, that lead nowhere."""
+    found = []
+    for link in LINK.findall(text):
+        path, _, anchor = link.partition("#")
+        if path.startswith(("http", "<http")):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            found.append(link)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page):
+    """Pages, anchors and pictures that a page names are there."""
+    assert broken(page, prose(page)) == []
+
+
+def test_a_broken_link_is_noticed():
+    """A page, an anchor and a picture that are not there."""
+    page = GUIDE / "levels.md"
+    wrong = "[a](none.md) [b](changes.md#none) ![c](../pictures/none.png) [d](#none)"
+    assert len(broken(page, wrong)) == 4
+    assert broken(page, "[a](changes.md#fixed) [b](#which-step)") == []
+
+
+def shown_commands(page):
+    """Command lines in the blocks of a page."""
+    lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
+    parts = [part.strip() for line in lines for part in line.split("&&")]
+    return [part for part in parts if part.startswith("swgjoint ")]
+
+
+def mentioned_commands(page):
+    """Commands in the text of a page, which may be incomplete."""
+    spans = [" ".join(one.split()) for one in re.findall(r"`([^`]+)`", prose(page))]
+    return [one for one in spans if one.startswith("swgjoint ")]
+
+
+COMMAND_LINES = sorted({line for page in PAGES for line in shown_commands(page)})
+
+
+def test_there_are_command_lines():
+    """The search for commands finds those of the tutorials."""
+    assert "swgjoint run arm.urdf --out first" in COMMAND_LINES
+    assert len(COMMAND_LINES) > 50
+
+
+@pytest.mark.parametrize("line", COMMAND_LINES)
+def test_shown_commands_are_accepted(line):
+    """Each command line is accepted by the parser of its command."""
+    _, name, *arguments = shlex.split(line, comments=True)
+    assert name in COMMANDS
+    args = command_parser(name).parse_args(arguments)
+    design = getattr(args, "design", None)
+    if design is not None and re.fullmatch(r"(reference|size|dca|xb1)[\w-]+", design):
+        assert design in bundled_names("drives", ".toml")
+    scene = getattr(args, "scene", None)
+    if scene is not None and re.fullmatch(r"(bench|ur5e|iiwa14|panda)[\w-]*", scene):
+        names = (*bundled_names("scenes", ".toml"), *bundled_names("arms", ".xml"))
+        assert scene in names
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_mentioned_commands_exist(page):
+    """So do the options that the text gives them."""
+    for line in mentioned_commands(page):
+        name, *rest = line.split()[1:]
+        if name.isupper() or name.startswith("-"):  # COMMAND, --version
+            continue
+        assert name in COMMANDS, line
+        known = {
+            option
+            for action in command_parser(name)._actions
+            for option in action.option_strings
+        }
+        options = [word.partition("=")[0] for word in rest if word[0] == "-"]
+        assert set(options) <= known, line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_python_examples_use_public_names(page):
+    """Examples compile and use names that the package has."""
+    for block in blocks(page, "python"):
+        for node in ast.walk(ast.parse(block)):
+            if (
+                isinstance(node, ast.Attribute)
+                and ast.unparse(node.value) == "swgjoint"
+            ):
+                assert hasattr(swgjoint, node.attr), node.attr
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_named_files_exist(page):
+    """Paths in the repository that a page names exist."""
+    folders = "models|notebooks|tests|swgjoint"
+    named = re.findall(rf"`((?:{folders})/[\w./-]+)`", text_of(page))
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def follow(page, folder, monkeypatch, capsys, skip=()):
+    """Do what a tutorial says, in a folder: save its files, run code and commands."""
+    monkeypatch.chdir(folder)
+    for urdf in blocks(page, "xml"):
+        (folder / "arm.urdf").write_text(urdf)
+    for number, block in enumerate(blocks(page, "python")):
+        exec(compile(block, f"{page.name}:{number}", "exec"), {"__name__": "example"})
+    for block in blocks(page, "sh"):
+        for line in block.splitlines():
+            _, *arguments = shlex.split(line, comments=True)
+            if arguments[0] not in skip:
+                assert main(arguments) == 0, line
+    return capsys.readouterr().out
+
+
+def test_own_arm_tutorial(tmp_path, monkeypatch, capsys):
+    """Every command and the program; the printed table is that of the page."""
+    page = GUIDE / "tutorials" / "my-own-arm.md"
+    out = follow(page, tmp_path, monkeypatch, capsys)
+    table = blocks(page, "text")[0].splitlines()
+    shown = [line.split()[:8] for line in table if line.split()[1:2] == ["full"]]
+    printed = [line.split()[:8] for line in out.splitlines()]
+    assert len(shown) == 2 and all(line in printed for line in shown)
+    assert (tmp_path / "first" / "run.rrd").exists()
+
+
+def test_measured_loop_tutorial(tmp_path, monkeypatch, capsys):
+    """The map of the example has the width and the stiffness that the loop has."""
+    page = GUIDE / "tutorials" / "measured-loop.md"
+    out = follow(page, tmp_path, monkeypatch, capsys)
+    found = dict(re.findall(r"^(hysteresis loss|K1)\s+([\d.e+]+)", out, re.MULTILINE))
+    assert float(found["hysteresis loss"]) == pytest.approx(0.6, rel=0.05)
+    assert float(found["K1"]) == pytest.approx(31_000, rel=0.05)
+
+
+def test_first_drive_tutorial(tmp_path, monkeypatch, capsys):
+    """All steps that need no finite elements of a whole drive."""
+    page = GUIDE / "tutorials" / "first-drive.md"
+    slow = ("meshing", "map", "spec", "compare", "run", "view")
+    follow(page, tmp_path, monkeypatch, capsys, skip=slow)
+    assert {"my.toml", "steeper.toml", "teeth"} == {p.name for p in tmp_path.iterdir()}
+
+
+def test_citation_names_the_version():
+    """The version of the citation file and of the page is that of the package."""
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {swgjoint.__version__}\n" in text
+    assert f"version {swgjoint.__version__}," in text_of(GUIDE / "sources.md")
+
+
+def cited_names(text):
+    """Family names in front of a year, as in ``Júdice and Pires (1994)``."""
+    found = re.findall(r"((?:[A-Z][^\W\d_]+,? (?:and |et al\. )?)+)\(\d{4}\)", text)
+    names = {name for part in found for name in re.findall(r"[^\W\d_]+", part)}
+    return names - {"and", "et", "al", "De", "Source"}
+
+
+def test_cited_sources_are_listed():
+    """Authors that a docstring names before a year are on the page of sources."""
+    page = text_of(GUIDE / "sources.md")
+    page += page.replace("ä", "ae").replace("é", "e")
+    missing = {}
+    for path in sorted((ROOT / "swgjoint").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        kinds = ast.Module | ast.ClassDef | ast.FunctionDef
+        texts = [
+            ast.get_docstring(n) or "" for n in ast.walk(tree) if isinstance(n, kinds)
+        ]
+        names = {name for text in texts for name in cited_names(" ".join(text.split()))}
+        if names := {name for name in names if name not in page}:
+            missing[path.name] = names
+    assert missing == {}
+    assert cited_names("as in Taylor, Beresford and Wilson (1976), and") == {
+        "Taylor",
+        "Beresford",
+        "Wilson",
+    }
+
+
+@pytest.mark.slow
+def test_tune_tutorial(tmp_path, monkeypatch, capsys):
+    """The environment by hand, a short tuning and the closed form of the response."""
+    page = GUIDE / "tutorials" / "tune-a-controller.md"
+    assert "held-out" in follow(page, tmp_path, monkeypatch, capsys)
+
+
+@pytest.mark.slow
+def test_site_builds_without_a_warning(tmp_path):
+    """Sphinx treats warnings as errors: references, headings, pages in no contents."""
+    missing = [
+        name
+        for name in ("sphinx", "myst_parser", "furo")
+        if not importlib.util.find_spec(name)
+    ]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not installed: pip install '.[docs]'")
+    command = ["-W", "--keep-going", "-q", "-b", "html", "-d", tmp_path / "trees"]
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", *command, GUIDE, tmp_path / "html"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    pages = {p.relative_to(GUIDE).with_suffix(".html") for p in GUIDE.rglob("*.md")}
+    assert all((tmp_path / "html" / page).exists() for page in pages)
