@@ -1,30 +1,25 @@
-"""What the README tells to type is there."""
+"""The README is short, with its two commands and the figures of the guide."""
 
 from __future__ import annotations
 
-import ast
 import re
-import shlex
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-import swgjoint
-from swgjoint.cli.main import COMMANDS, Parser
-from swgjoint.models_path import bundled_names
+from swgjoint.cli.main import main
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+NUMBER = re.compile(r"(?<![\w./-])\d[\d,]*(?:\.\d+)?(?![\w/]|\.\d)")
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
 
 
-def shown_commands() -> list[str]:
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
-    parts = [part.strip() for line in lines for part in line.split("&&")]
-    return [part for part in parts if part.startswith("swgjoint")]
+def section(heading: str) -> str:
+    return README.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
 
 
 def test_the_two_commands():
@@ -34,36 +29,51 @@ def test_the_two_commands():
     assert "python3 -m pip install '.[test]' && pytest -n 2" in lines
 
 
-@pytest.mark.parametrize("shown", shown_commands())
-def test_shown_commands_parse(shown):
-    """Each command line of the README is accepted by that command's parser."""
-    _, name, *arguments = shlex.split(shown, comments=True)
-    assert name in COMMANDS
-    parser = Parser(prog=name, allow_abbrev=False)
-    import_module(f"swgjoint.cli.{name}").configure(parser)
-    args = parser.parse_args(arguments)
-    if getattr(args, "design", None) is not None:
-        assert args.design in bundled_names("drives", ".toml")
-    if hasattr(args, "scene"):
-        arms = bundled_names("arms", ".xml") if name == "run" else []
-        assert args.scene in (*bundled_names("scenes", ".toml"), *arms)
+def test_it_is_short():
+    """A first screen and not a record: details are in the guide."""
+    assert README.count("\n") <= 200
+    (example,) = blocks("python")
+    assert len([line for line in example.splitlines() if line]) == 9
+    assert len(re.findall(r"^!\[", section("Three questions"), re.MULTILINE)) == 3
 
 
-def test_shown_python_uses_public_names():
-    """The Python examples compile and use names that the package has."""
-    assert blocks("python")
-    for block in blocks("python"):
-        for node in ast.walk(ast.parse(block)):
-            if (
-                isinstance(node, ast.Attribute)
-                and ast.unparse(node.value) == "swgjoint"
-            ):
-                assert hasattr(swgjoint, node.attr), node.attr
+def paragraphs() -> list[str]:
+    """Questions and rows that state figures."""
+    questions = re.split(r"\n\n(?=\*\*)", section("Three questions"))
+    texts = [re.sub(r"```.*", "", text, flags=re.DOTALL) for text in questions]
+    table = section("How true it is").splitlines()
+    return [*texts, *(row for row in table if row.startswith("| ") and "](" in row)]
 
 
-def test_named_files_exist():
-    """Paths that the README names in the repository exist."""
-    root = Path(__file__).parents[1]
-    named = re.findall(r"`((?:models|notebooks|tests|swgjoint)/[\w./-]+)`", README)
-    assert named
-    assert [path for path in named if not (root / path).exists()] == []
+def unsupported(text: str) -> list[str]:
+    """Figures of a text that are not on a page to which it links."""
+    links = re.findall(r"\]\((notebooks/guide/[\w/.-]+\.md)", text)
+    pages = [(ROOT / link).read_text(encoding="utf-8") for link in links]
+    known = {number for page in pages for number in NUMBER.findall(page)}
+    plain = re.sub(r"\]\([^)]*\)|`[^`]*`", " ", text)
+    return [number for number in NUMBER.findall(plain) if number not in known]
+
+
+@pytest.mark.parametrize("text", paragraphs(), ids=lambda text: text.strip()[:40])
+def test_figures_are_those_of_the_linked_page(text):
+    """Every number is printed on the page, beside the command that computes it."""
+    if "back_driving_torque_Nm" not in text:  # computed below
+        assert unsupported(text) == []
+
+
+def test_a_wrong_figure_is_noticed():
+    """A number that is not on the page."""
+    row = next(text for text in paragraphs() if text.startswith("| K3, ratio 100"))
+    assert unsupported(row) == []
+    assert unsupported(row.replace("1.39", "1.38")) == ["1.38"]
+
+
+def test_back_driving_torque(capsys):
+    """The cheap command of the table prints its figures."""
+    row = next(text for text in paragraphs() if "back_driving_torque_Nm" in text)
+    ours, stated = re.findall(r"\d\.\d\d", row)
+    assert main("spec CSG-25-100 --only back_driving_torque_Nm".split()) == 0
+    printed = re.search(
+        r"back driving torque +([\d.]+) +([\d.]+)", capsys.readouterr().out
+    )
+    assert f"{float(printed[1]):.2f}" == ours and printed[2] == stated

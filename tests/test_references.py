@@ -16,6 +16,7 @@ NO_MODULES = {"drive", "toml", "swg", "nothing", "no_such_name", "envs"}
 """Plugin, files, names that tests make up, and an environment's optional part."""
 FILES = [
     *(ROOT / "README.md", *sorted((ROOT / "swgjoint").rglob("*.py"))),
+    *sorted((ROOT / "notebooks").rglob("*.md")),
     *sorted((ROOT / "tests").rglob("*.py")),
     *sorted((ROOT / "notebooks").rglob("*.py")),
 ]
