@@ -34,7 +34,7 @@ FAULTS = {
         "[joint.x]",
         ("bad.toml", "wave_generator", "table"),
     ),
-    "no TOML": ("[drive]", "[drive", ("bad.toml", "TOML", "line 2", "column 7")),
+    "no TOML": ("[drive]", "[drive", ("bad.toml", "TOML", "line 3", "column 7")),
 }
 COMMANDS = {
     "profile": ["--out", "out"],
