@@ -24,6 +24,7 @@ _UNITS = {
     "per_mm": "1/mm",
     "kg_m3": "kg/m³",
     "kgm2": "kg·m²",
+    "mm2_s": "mm²/s",
     "Nms_rad": "N·m·s/rad",
     "Nm_rad": "N·m/rad",
     "Nm_A": "N·m/A",
@@ -48,6 +49,8 @@ _UNITS = {
     "Hz": "Hz",
     "s": "s",
     "percent": "%",
+    "mNm": "mN·m",
+    "C": "°C",
 }
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _BOUND_ERRORS = {

@@ -11,8 +11,7 @@ from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
-    from swgjoint.maps.fit.overlay import Overlay
-    from swgjoint.maps.sheet.spec_sheet import SpecSheet
+    from swgjoint.drives.spec_sheet import DriveSheet
 
 _SHOWN_ORDERS = 6
 """Largest number of orders in the table."""
@@ -72,20 +71,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     wall = evaluated.result.pop("wall_s")
     result = {**evaluated.result, "files": [], "wall_s": wall}
     if folder is not None:
-        _write(folder, result, evaluated.sheet, evaluated.overlay)
+        _write(folder, result, evaluated)
     return result
 
 
-def _write(
-    folder: Any,
-    result: dict[str, Any],
-    sheet: SpecSheet,
-    overlay: Overlay | None,
-) -> None:
+def _write(folder: Any, result: dict[str, Any], evaluated: DriveSheet) -> None:
     from swgjoint.view.plots.spec import spec_picture
 
-    outputs = Outputs(folder)
-    outputs.write("spec.png", lambda: spec_picture(result["design"], sheet))
+    outputs, overlay = Outputs(folder), evaluated.overlay
+    outputs.write(
+        "spec.png",
+        lambda: spec_picture(result["design"], evaluated.sheet, evaluated.efficiency),
+    )
     if overlay is not None:
         from swgjoint.view.plots.overlay import overlay_picture
 
@@ -186,6 +183,10 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" balls that roll under {slow['lobe_force_N']:.3g} N at each lobe (a"
             f" bearing maker's model); not included: {slow['left_out']}"
         )
+    if losses := result.get("losses"):
+        lines += _losses(losses)
+    if efficiency := result.get("efficiency"):
+        lines += _efficiency(efficiency)
     if fatigue := result.get("fatigue"):
         worst, middle = fatigue["worst_section"], fatigue["mid_face"]
         lines.append(
@@ -198,6 +199,40 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" factors; shell theory {fatigue['shell_theory']['S']:.3g}"
         )
     return lines
+
+
+def _losses(losses: dict[str, Any]) -> list[str]:
+    """Format the friction of the parts over the load."""
+    header = ("", *(f"{load:.4g} N·m" for load in losses["load_Nm"]))
+    parts = losses["friction_Nm"]
+    rows = [(key, *(1e3 * value for value in parts[key])) for key in parts]
+    total = [sum(values) for values in zip(*parts.values(), strict=True)]
+    share = (100.0 * value for value in losses["bending_share"])
+    rows += [("total", *(1e3 * value for value in total)), ("bending [%]", *share)]
+    return [
+        f"friction at the input [mN·m] at {losses['speed_rpm']:g} rpm by output torque:"
+        f" {losses['grease'].replace('_', ' ')} grease with a base oil of"
+        f" {losses['base_oil_mm2_s']:.3g} mm²/s at {losses['temperature_C']:g} °C;"
+        f" coefficient {losses['coefficient']:g} of teeth and of rim on race, loss"
+        f" factor {losses['loss_factor']:g} of the bending steel",
+        table(rows, header=header),
+    ]
+
+
+def _efficiency(found: dict[str, Any]) -> list[str]:
+    """Format the efficiency over load, speed and temperature."""
+    header = ("", *(f"{load:.4g} N·m" for load in found["load_Nm"]))
+    rows = [
+        (f"{celsius:g} °C, {speed:g} rpm", *values)
+        for celsius, block in zip(
+            found["temperature_C"], found["efficiency_percent"], strict=True
+        )
+        for speed, values in zip(found["speed_rpm"], block, strict=True)
+    ]
+    return [
+        "efficiency [%] by temperature, input speed and output torque:",
+        table(rows, header=header),
+    ]
 
 
 def _comparison(measured: dict[str, Any]) -> list[str]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from swgjoint.drives.fidelity import default_model
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
 from swgjoint.fe.plane.figures.friction_loop import friction_loops
 from swgjoint.fe.rings import sampling as thin_ring
 from swgjoint.fe.rings.friction_loops import ring_friction_loops
+from swgjoint.fe.rings.losses import loss_model
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
@@ -18,7 +19,9 @@ from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.friction_bending import without_friction
+from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.fit.hysteresis_loops import with_hysteresis
+from swgjoint.maps.friction_temperature import KEY, at_temperature, friction_table
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
@@ -36,7 +39,9 @@ def build_map(
     The potential is that of the drive without friction. If the teeth have a friction
     coefficient, torque loops with friction are computed as well, with thin rings for
     ``ring`` and in 2D for ``2d`` and ``3d``, and hysteresis elements are fitted to
-    them; ``info["friction_loop"]`` compares the loops with these elements.
+    them; ``info["friction_loop"]`` compares the loops with these elements. With a table
+    ``[losses]``, the map has the friction of :mod:`swgjoint.fe.rings.losses` at speed,
+    for all temperatures.
 
     Args:
         design: The drive.
@@ -60,6 +65,12 @@ def build_map(
     """
     model = model or default_model(design)
     check_level(design, model)
+    if design.losses is not None:  # not part of the finite elements
+        plain = design.with_changes({"losses": None})
+        drive = build_map(
+            plain, model=model, angles=angles, progress=progress, cache=cache
+        )
+        return _with_losses(design, drive, progress)
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     keep = Unfinished.from_parts(parts) if cache else None
@@ -135,6 +146,39 @@ def _with_friction(
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
         return replace(drive, info={**drive.info, "missing": missing})
     return with_hysteresis(drive, loops)
+
+
+def _with_losses(design: Design, drive: DriveMap, progress: Progress) -> DriveMap:
+    """The map with friction at speed from ``[losses]``, or the reason why not."""
+    assert design.losses is not None
+    info = {**drive.info, "design_hash": design.content_hash()}
+    try:
+        model = loss_model(design, progress=progress)
+        own = model.conditions
+        laws = {
+            temperature: friction_of_losses(
+                model.catalogue_losses(temperature),
+                design.ratio,
+                film=model.film(temperature),
+                source="bearing maker's model, teeth, race, bending and seals of the"
+                " design",
+            )
+            for temperature in sorted({*own.temperatures(), own.temperature})
+        }
+    except (ComputationError, DesignError) as failure:
+        why = "; ".join(str(failure).splitlines())
+        missing = {**info.get("missing", {}), **dict.fromkeys(LOSS_KEYS, why)}
+        return replace(drive, info={**info, "missing": missing})
+    missing = {k: v for k, v in info["missing"].items() if k not in LOSS_KEYS}
+    section = design.losses
+    table = friction_table(
+        laws,
+        lubricant=f"{section.grease.replace('_', ' ')} grease, base oil of"
+        f" {section.base_oil_40C_mm2_s:g} and {section.base_oil_100C_mm2_s:g} mm²/s at"
+        " 40 and 100 °C",
+    )
+    drive = replace(drive, info={**info, "missing": missing, KEY: table})
+    return at_temperature(drive, own.temperature, where=design.drive.name)
 
 
 def _without_losses(design: Design, drive: DriveMap) -> DriveMap:

@@ -21,6 +21,7 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.cache import recall
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.friction_bending import without_friction
+from swgjoint.maps.sheet.efficiency import EfficiencyTable, efficiency_of_map
 from swgjoint.maps.sheet.spec_sheet import (
     RATCHETING_KEY,
     SLOW_KEYS,
@@ -56,6 +57,9 @@ class DriveSheet:
     """The sheet under the keys of ``swgjoint spec --json``."""
     overlay: Overlay | None
     """Comparison of a measured loop with the prediction; None without measurement."""
+    efficiency: EfficiencyTable | None
+    """Efficiency over load, speed and temperature; None if not requested, or without
+    friction over temperature."""
 
 
 def spec_sheet(
@@ -88,7 +92,8 @@ def spec_sheet(
         against solves that were not used in the fit (None with
         ``validation_reason``) and ``validation_notes``; ``stated`` by the catalogue;
         the data behind figures of a design (``radial_stiffness``, ``fatigue``,
-        ``ratcheting``, ``running``); ``measured``, see
+        ``ratcheting``, ``running``, ``losses``); ``efficiency`` over load, speed and
+        temperature, if the drive has friction over temperature; ``measured``, see
         :meth:`swgjoint.maps.fit.overlay.Overlay.as_dict`; ``wall_s``.
 
     Raises:
@@ -131,7 +136,10 @@ def measure_drive(
 
         loop = read_loop(measured)
     source = find_drive(drive)
-    drive_map = _map(source, model, keys, always=loop is not None, progress=progress)
+    design = source if isinstance(source, Design) else None
+    lossy = design is not None and design.losses is not None
+    always = loop is not None or (lossy and "back_driving_torque_Nm" in keys)
+    drive_map = _map(source, model, keys, always=always, progress=progress)
     ratings = ratings_of(source) if isinstance(source, Design) else source.ratings
     if drive_map is not None:
         ratings = drive_map.ratings
@@ -140,7 +148,12 @@ def measure_drive(
         more.add_solid(source, model, keys, ratings, progress)
         if only:
             more.add_ratcheting(source, keys, progress)
-        more.add_running(source, keys)
+        if lossy:
+            more.add_losses(source, keys, progress)
+        else:
+            more.add_running(source, keys)
+    elif drive_map is not None and "efficiency_percent" in keys:
+        more.efficiency = efficiency_of_map(drive_map)
     sheet = measure_spec(
         drive_map,
         ratings=ratings,
@@ -149,6 +162,8 @@ def measure_drive(
         unknown=more.reasons,
         progress=progress,
     )
+    if more.efficiency is not None:
+        more.details["efficiency"] = more.efficiency.as_dict()
     name = source.drive.name if isinstance(source, Design) else source.name
     result: dict[str, Any] = {"design": name, **sheet.as_dict(), **more.details}
     result |= _validity(drive_map, ratings, keys)
@@ -164,7 +179,13 @@ def measure_drive(
         content["warnings"] = [*doubts, *content["warnings"]]
         result["measured"] = {"file": str(measured), **content}
     result |= {"wall_s": time.perf_counter() - start}
-    return DriveSheet(design=name, sheet=sheet, result=result, overlay=overlay)
+    return DriveSheet(
+        design=name,
+        sheet=sheet,
+        result=result,
+        overlay=overlay,
+        efficiency=more.efficiency,
+    )
 
 
 def _map(
@@ -224,6 +245,8 @@ class _Figures:
     """Reason why a figure is missing, by key."""
     details: dict[str, Any] = field(default_factory=dict)
     """Data behind the figures."""
+    efficiency: EfficiencyTable | None = None
+    """Efficiency over load, speed and temperature."""
 
     def add_solid(
         self,
@@ -272,6 +295,31 @@ class _Figures:
                 f" with: {path['outcome']}): the 2D model has a rigid wave generator"
                 f" and a circular spline whose outside is {rim}"
             )
+
+    def add_losses(
+        self, design: Design, keys: tuple[str, ...], progress: Progress
+    ) -> None:
+        """Add the losses of a design with ``[losses]``, or the reason why not."""
+        wanted = [key for key in (*SLOW_KEYS, "efficiency_percent") if key in keys]
+        if not wanted:
+            return
+        from swgjoint.fe.rings.losses import loss_model
+
+        try:
+            model = loss_model(design, progress=progress)
+        except (ComputationError, DesignError) as error:
+            why = "; ".join(str(error).splitlines())
+            self.reasons |= dict.fromkeys(wanted, why)
+            return
+        stated = model.catalogue_losses(model.conditions.temperature)
+        self.values |= {
+            "no_load_running_torque_Nm": stated.no_load_running,
+            "starting_torque_Nm": model.starting_torque(),
+            "efficiency_percent": 100.0 * stated.efficiency,
+        }
+        self.details["losses"] = model.as_dict()
+        if "efficiency_percent" in keys:
+            self.efficiency = model.table()
 
     def add_running(self, design: Design, keys: tuple[str, ...]) -> None:
         """Report the friction of teeth, race and balls as a bound on no-load torque.

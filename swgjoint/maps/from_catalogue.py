@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.gear.bearing.base_oil import MAKER_GREASES, ROOM
 from swgjoint.gear.catalogue import CatalogueRow, named_rows
 from swgjoint.gear.catalogue_stated import (
     LOSS_KEYS,
@@ -31,11 +32,13 @@ from swgjoint.gear.catalogue_stated import (
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.maps.fit.friction_fit import friction_of_losses
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.friction_temperature import KEY, friction_table
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import largest_torque, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
-from swgjoint.units import arcmin
+from swgjoint.units import ZERO_CELSIUS, arcmin
 
 SHARED_SERIES = ("CSF", "CSG", "SHG", "HFUC", "HFUS", "CHA")
 """Series that share ``stiffness.csv``; ``ratings.csv`` covers CSG only."""
@@ -51,6 +54,12 @@ CLOSE = 1e-4
 """Relative tolerance of the slopes and the hysteresis loss of the loop."""
 ROUNDS = 50
 """Largest number of iterations that adjust the loop."""
+
+CATALOGUE_TEMPERATURES = (-10, 81, 5)
+"""Range of temperatures of a catalogue drive with friction [°C]. Catalogues state
+running torques from -10 °C."""
+PALMGREN_EXPONENT = 2.0 / 3.0
+"""Exponent of the viscosity in the load-independent moment of a bearing [-]."""
 
 _NAME = re.compile(r"([A-Z]+)-(\d{1,4})-(\d{1,4})")
 _NO_ERROR = (
@@ -205,9 +214,37 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
             " rated torque, second-hand; the back-driving torque is a prediction"
         )
         friction = friction_of_losses(losses, drive.ratio, source=label)
-        drive = replace(drive, friction=friction)
+        info = {**drive.info, KEY: _friction_table(friction)}
+        drive = replace(drive, friction=friction, info=info)
     loss = stated["hysteresis_loss_arcmin"]
     return drive if loss is None else _with_hysteresis(drive, row, s, loss * arcmin)
+
+
+def _friction_table(law: Friction) -> dict[str, Any]:
+    r"""Friction over temperature of a catalogue drive whose losses apply at 20 °C.
+
+    The part that grows with speed follows the load-independent moment of greased
+    bearings, :math:`M_0 \propto (\nu n)^{2/3}`. The other parts do not change. The
+    grease is assumed, because the table does not state it.
+
+    Source:
+        Palmgren (1959), "Ball and Roller Bearing Engineering"; also in ISO 15312.
+    """
+    name = "SK-1A, SK-2"
+    oil = MAKER_GREASES[name]
+    grid = [float(T) + ZERO_CELSIUS for T in range(*CATALOGUE_TEMPERATURES)]
+    laws = {
+        T: replace(
+            law,
+            viscous=law.viscous
+            * (oil.viscosity(T) / oil.viscosity(ROOM)) ** PALMGREN_EXPONENT,
+        )
+        for T in grid
+    }
+    return friction_table(
+        laws,
+        lubricant=f"grease {name} assumed, speed-dependent part with (viscosity)^(2/3)",
+    )
 
 
 def _spring(row: CatalogueRow, s: dict[str, float]) -> dict[str, Any]:

@@ -9,15 +9,24 @@ can rely on its type. ``validation`` has its own reader, see
 from __future__ import annotations
 
 import warnings
-from typing import Annotated, Any
+from itertools import pairwise
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from swgjoint.errors import MapFileError
 
 MOST_DEPTH = 30
 """Deepest accepted nesting of objects and lists; a validation record has 5 levels."""
 Number = Annotated[float, Field(ge=-1e60, le=1e60, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e30, allow_inf_nan=False, strict=True)]
 Text = Annotated[str, Field(strict=True)]
 
 
@@ -42,6 +51,40 @@ class Label(BaseModel):
     stress_state: Text | None = None
 
 
+class FrictionTable(BaseModel):
+    """Friction over temperature, see :mod:`swgjoint.maps.friction_temperature`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    temperature_C: Annotated[list[Number], Field(min_length=2, max_length=1000)]
+    lubricant: Text
+    source: Text
+    coulomb_Nm: list[NotNegative]
+    static_Nm: list[NotNegative]
+    stribeck_rad_s: list[NotNegative]
+    viscous_Nms_rad: list[NotNegative]
+    load: list[NotNegative]
+    stiffness_Nm_rad: list[NotNegative]
+    damping_Nms_rad: list[NotNegative]
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        grid = self.temperature_C
+        columns = [
+            *(self.coulomb_Nm, self.static_Nm, self.viscous_Nms_rad, self.load),
+            *(self.stribeck_rad_s, self.stiffness_Nm_rad, self.damping_Nms_rad),
+        ]
+        if any(len(column) != len(grid) for column in columns):
+            raise ValueError("columns of different lengths")
+        if any(b <= a for a, b in pairwise(grid)):
+            raise ValueError("temperatures do not increase")
+        if min(*self.stiffness_Nm_rad, *self.stribeck_rad_s) < 1e-30:
+            raise ValueError("stiffness or Stribeck speed is not positive")
+        if any(s < c for s, c in zip(self.static_Nm, self.coulomb_Nm, strict=True)):
+            raise ValueError("static friction below Coulomb friction")
+        return self
+
+
 KINDS: dict[str, TypeAdapter[Any]] = {
     **dict.fromkeys(
         (
@@ -51,6 +94,7 @@ KINDS: dict[str, TypeAdapter[Any]] = {
         TypeAdapter(Text),
     ),
     "pruned": TypeAdapter(Pruned),
+    "friction_over_temperature": TypeAdapter(FrictionTable),
     "stated": TypeAdapter(dict[str, Number | None]),
     "missing": TypeAdapter(dict[str, Text]),
     "label": TypeAdapter(Label),

@@ -16,6 +16,7 @@ OIL = BaseOil(at_40=100e-6, at_100=11.1e-6)
 def test_the_line_passes_through_both_values():
     """40 and 100 °C return the given viscosities."""
     assert OIL.viscosity(40.0 + ZERO_CELSIUS) == pytest.approx(OIL.at_40, rel=1e-12)
+    assert OIL.temperature(OIL.viscosity(300.0)) == pytest.approx(300.0, rel=1e-12)
     assert OIL.viscosity(100.0 + ZERO_CELSIUS) == pytest.approx(OIL.at_100, rel=1e-12)
 
 

@@ -87,3 +87,12 @@ def test_powers_of_drag():
     assert thick.drag_torque(100.0) / slow == pytest.approx(2.0**1.379)
     assert BEARING.drag_torque(0.0) == 0.0
     assert BEARING.drag_torque(-100.0) == slow
+
+
+def test_film_separates_the_surfaces_at_its_speed():
+    """phi_bl is 1/e there, and far above it only the film is left."""
+    rest = BEARING.parts(500.0, 0.0)[1]
+    film = BEARING.film_torque(500.0)
+    mixed = BEARING.parts(500.0, BEARING.film_speed)[1]
+    assert (mixed - film) / (rest - film) == pytest.approx(exp(-1.0), rel=1e-9)
+    assert BEARING.parts(500.0, 100.0 * BEARING.film_speed)[1] == pytest.approx(film)

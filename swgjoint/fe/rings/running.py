@@ -56,6 +56,17 @@ LEFT_OUT = "churning of grease, seals, cage, bending loss of the rim"
 """Losses of a real drive that the model omits."""
 
 
+_KEYS = {
+    "input_angle": "input_angles_rad",
+    "elastic": "elastic_Nm",
+    "teeth": "teeth_per_mu_Nm",
+    "race": "race_per_mu_Nm",
+    "tooth_pairs": "tooth_pairs",
+    "lobe_force": "lobe_forces_N",
+    "bending": "bending_per_loss_factor_Nm",
+}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunningFriction:
     """Frictionless input torque, and friction torque at the input per mu."""
@@ -77,6 +88,23 @@ class RunningFriction:
     [N·m]."""
     bearing: BallBearing
     """Bearing of the wave generator."""
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any], bearing: BallBearing) -> RunningFriction:
+        """Friction from stored values.
+
+        Args:
+            data: Values of :meth:`to_json`.
+            bearing: Bearing of the wave generator.
+        """
+        return cls(
+            **{field: np.array(data[key]) for field, key in _KEYS.items()},
+            bearing=bearing,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """All arrays as lists; the keys contain the units."""
+        return {key: getattr(self, field).tolist() for field, key in _KEYS.items()}
 
     @property
     def per_mu(self) -> Array:

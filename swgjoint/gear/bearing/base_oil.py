@@ -20,6 +20,9 @@ from swgjoint.units import ZERO_CELSIUS, mm
 
 ROOM = 20.0 + ZERO_CELSIUS
 """Temperature at which catalogues state losses [K]."""
+THICKEST = 500e-6
+"""Largest viscosity for which the drag of a flooded bearing is modelled [m2/s]: a
+condition of the bearing maker, from memory."""
 _SHIFT = 0.7
 _COLD, _HOT = 40.0 + ZERO_CELSIUS, 100.0 + ZERO_CELSIUS
 
@@ -39,12 +42,28 @@ class BaseOil:
         Args:
             temperature: Absolute temperature [K].
         """
-        cold, hot = (
-            log10(log10(value / mm**2 + _SHIFT)) for value in (self.at_40, self.at_100)
-        )
-        slope = (cold - hot) / (log10(_HOT) - log10(_COLD))
-        twice = cold - slope * (log10(temperature) - log10(_COLD))
+        slope, at_cold = self._line
+        twice = at_cold - slope * (log10(temperature) - log10(_COLD))
         return float((10.0 ** (10.0**twice) - _SHIFT) * mm**2)
+
+    def temperature(self, viscosity: float) -> float:
+        """Absolute temperature at which the oil has a viscosity [K].
+
+        Args:
+            viscosity: Kinematic viscosity [m2/s].
+        """
+        slope, at_cold = self._line
+        return float(_COLD * 10.0 ** ((at_cold - _twice_log(viscosity)) / slope))
+
+    @property
+    def _line(self) -> tuple[float, float]:
+        """Slope B, and value of the line at 40 °C."""
+        cold, hot = _twice_log(self.at_40), _twice_log(self.at_100)
+        return (cold - hot) / (log10(_HOT) - log10(_COLD)), cold
+
+
+def _twice_log(viscosity: float) -> float:
+    return log10(log10(viscosity / mm**2 + _SHIFT))
 
 
 MAKER_GREASES = {

@@ -130,6 +130,20 @@ class GreasedBearing:
         sliding = SLIDING * dm**-0.26 * force ** (5.0 / 3.0) * coefficient
         return heating * fed * rolling * mm, sliding * mm
 
+    def film_torque(self, force: float) -> float:
+        """Sliding moment under a full film, at any speed [N·m].
+
+        Args:
+            force: Radial force F [N], not negative.
+        """
+        return self.parts(force, 0.0)[1] * FULL_FILM / BOUNDARY
+
+    @property
+    def film_speed(self) -> float:
+        """Speed between the rings at which phi_bl has fallen to 1/e [rad/s]."""
+        dm, nu = self.pitch_diameter / mm, self.viscosity / mm**2
+        return float((2.6e-8 * dm) ** (-1.0 / 1.4) / nu * rpm)
+
     def drag_torque(self, speed: float) -> float:
         """Drag moment of the balls of a flooded bearing [N·m]; load has no effect.
 

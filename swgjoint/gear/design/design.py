@@ -15,6 +15,7 @@ from swgjoint.errors import DesignError, InputError
 from swgjoint.faults import Fault, Section, validate
 from swgjoint.gear import kinematics
 from swgjoint.gear.design.family import family_design, family_member
+from swgjoint.gear.design.losses import LossesSection
 from swgjoint.gear.design.material import Material
 from swgjoint.gear.design.sections import (
     Boss,
@@ -74,6 +75,8 @@ class Design(Section):
     """Manufacturing errors."""
     friction: FrictionSection = FrictionSection()
     """Friction of the teeth."""
+    losses: LossesSection | None = None
+    """Lubricant, seals and loss factor; absent if losses at speed are not modelled."""
     ratings: RatingsSection = RatingsSection()
     """Catalogue torques at the output."""
     joint: JointDampingSection = JointDampingSection()
@@ -245,13 +248,15 @@ class Design(Section):
     def content_hash(self) -> str:
         """SHA-256 of everything that affects results: all keys except name and source.
 
-        Two keys are omitted if they have the values that applied before the keys were
-        introduced, so that older cached results remain valid: an absent coupling and
-        the stress state ``plane_stress``.
+        Three keys are omitted if they have the values that applied before the keys were
+        introduced, so that older cached results remain valid: an absent coupling, an
+        absent table of losses and the stress state ``plane_stress``.
         """
         data = self.model_dump(exclude={"drive": {"name", "source"}})
         if self.coupling is None:
             del data["coupling"]
+        if self.losses is None:
+            del data["losses"]
         if self.mesh.stress_state == "plane_stress":
             del data["mesh"]["stress_state"]
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -44,7 +44,7 @@ ENGAGEMENT = "engagement"
 slowest."""
 COARSE: dict[str, int] = {"positions": 241, "points": 101}
 """Coarse resolution of the passage of a tooth, used in the search for a bound."""
-_KEPT = ("material", "tolerances", "friction", "joint", "mesh")
+_KEPT = ("material", "tolerances", "friction", "losses", "joint", "mesh")
 """Tables that are not scaled."""
 # the module is set by itself, and clearances keep their value
 _KEPT_KEYS = ("module_mm", "clearance_um", "fit_clearance_um")

@@ -167,8 +167,8 @@ def measure_spec(
         drive: The map; may be None if :func:`needs_map` is false.
         ratings: Ratings; those of the map if None. Required without a map.
         only: Keys of the sheet; all if empty.
-        known: Figures from other computations, by key: those of :data:`SOLID_KEYS` and
-            :data:`RATCHETING_KEY`.
+        known: Figures from other computations, by key: those of :data:`SOLID_KEYS`,
+            :data:`RATCHETING_KEY` and losses.
         unknown: Reasons why such figures are missing, by key; also for those of
             :data:`SLOW_KEYS`.
         progress: Called while an output turn is evaluated.
@@ -202,9 +202,11 @@ def measure_spec(
         if set(keys) & set(TURN_KEYS):
             turns = _turns(drive, keys, progress)
             _turn_figures(drive, turns, values, missing)
-        if drive.friction is not None and set(keys) & set(LOSS_KEYS):
-            _loss_figures(drive, keys, values, missing)
-            if "efficiency_percent" in keys:
+        # the law of a map approximates the losses that are known of its design
+        asked = set(keys) & set(LOSS_KEYS) - set(known or {})
+        if drive.friction is not None and asked:
+            _loss_figures(drive, asked, values, missing)
+            if "efficiency_percent" in asked:
                 losses = _loss_curve(drive)
         # a reason stated by the source of the map is more specific
         stated = drive.info.get("missing")

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from swgjoint.fe.rings.running import LEFT_OUT, RunningFriction
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.bearing.rolling_friction import BASE_OILS
@@ -62,16 +60,7 @@ def running_of(found: Found, design: Design) -> RunningFriction:
         found: The result.
         design: The drive.
     """
-    return RunningFriction(
-        input_angle=np.array(found["input_angles_rad"]),
-        elastic=np.array(found["elastic_Nm"]),
-        teeth=np.array(found["teeth_per_mu_Nm"]),
-        race=np.array(found["race_per_mu_Nm"]),
-        tooth_pairs=np.array(found["tooth_pairs"]),
-        lobe_force=np.array(found["lobe_forces_N"]),
-        bending=np.array(found["bending_per_loss_factor_Nm"]),
-        bearing=BallBearing.from_design(design),
-    )
+    return RunningFriction.from_json(found, BallBearing.from_design(design))
 
 
 def loss_rows(

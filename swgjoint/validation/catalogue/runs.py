@@ -146,16 +146,7 @@ def _running(task: CatalogueTask) -> Found:
     """Input torque in slow rotation without load, and friction torques per mu."""
     from swgjoint.fe.rings.running import running_friction
 
-    found = running_friction(task.design)
-    return {
-        "input_angles_rad": found.input_angle.tolist(),
-        "elastic_Nm": found.elastic.tolist(),
-        "teeth_per_mu_Nm": found.teeth.tolist(),
-        "race_per_mu_Nm": found.race.tolist(),
-        "tooth_pairs": found.tooth_pairs.tolist(),
-        "lobe_forces_N": found.lobe_force.tolist(),
-        "bending_per_loss_factor_Nm": found.bending.tolist(),
-    }
+    return running_friction(task.design).to_json()
 
 
 def _coning(task: CatalogueTask) -> Found:

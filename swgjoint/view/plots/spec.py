@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 from swgjoint.pictures import png
-from swgjoint.units import arcmin, rpm
+from swgjoint.units import ZERO_CELSIUS, arcmin, rpm
 
 if TYPE_CHECKING:
+    from swgjoint.maps.sheet.efficiency import EfficiencyTable
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 _AT_MOST = 20_000
@@ -22,22 +24,32 @@ _FEW = 5
 _ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab:red")}
 
 
-def spec_picture(name: str, sheet: SpecSheet) -> bytes:
+def spec_picture(
+    name: str, sheet: SpecSheet, efficiency: EfficiencyTable | None = None
+) -> bytes:
     """Draw the curves from which the figures of a spec sheet were read as PNG.
 
-    A panel without a curve shows the reason; without friction there is no efficiency
-    panel.
+    A panel without a curve shows the reason; without friction there are no panels of
+    the efficiency.
 
     Args:
         name: Name of the drive.
         sheet: Figures and curves.
+        efficiency: Efficiency over load, speed and temperature.
     """
     from matplotlib.figure import Figure
 
-    panels = [_loop, _turn, _orders] + ([_losses] if sheet.losses else [])
-    figure = Figure(figsize=(1 + 4 * len(panels), 4.2), layout="constrained")
-    for ax, draw in zip(figure.subplots(1, len(panels)), panels, strict=True):
+    panels = [_loop, _turn, _orders]
+    if sheet.losses and efficiency is None:
+        panels.append(_losses)
+    count = len(panels) + 2 * (efficiency is not None)
+    figure = Figure(figsize=(1 + 4 * count, 4.2), layout="constrained")
+    axes = figure.subplots(1, count)
+    for ax, draw in zip(axes, panels, strict=False):
         draw(ax, sheet)
+    if efficiency is not None:
+        _efficiency_by_load(axes[-2], efficiency)
+        _efficiency_by_speed(axes[-1], efficiency)
     figure.suptitle(f"{name}: spec sheet")
     return png(figure, dpi=130)
 
@@ -136,6 +148,45 @@ def _losses(ax: Any, sheet: SpecSheet) -> None:
     rated = sheet.figures.get("rated_torque_Nm")
     if rated:
         ax.axvline(rated, color="0.6", lw=1.0, ls="--", label="rated torque")
+    _end_efficiency(ax)
+
+
+def _efficiency_by_load(ax: Any, found: EfficiencyTable) -> None:
+    """Efficiency over the load at the speed of catalogues, by temperature."""
+    at = int(np.argmin(np.abs(found.speed - RUNNING_SPEED)))
+    ax.set_title(f"efficiency, input at {found.speed[at] / rpm:.0f} rpm")
+    ax.set_xlabel("output torque [N·m]")
+    ax.set_ylabel("efficiency [%]")
+    for colour, T, block in _by_temperature(found):
+        label = f"{T - ZERO_CELSIUS:.0f} °C"
+        x = np.concatenate([[0.0], found.load])
+        y = np.concatenate([[0.0], block[at]])
+        ax.plot(x, 100.0 * y, color=colour, marker=".", label=label)
+    _end_efficiency(ax)
+
+
+def _efficiency_by_speed(ax: Any, found: EfficiencyTable) -> None:
+    """Efficiency over the speed at the largest load, by temperature."""
+    ax.set_title(f"efficiency at {found.load[-1]:.4g} N·m")
+    ax.set_xlabel("input speed [rpm]")
+    ax.set_ylabel("efficiency [%]")
+    for colour, T, block in _by_temperature(found):
+        label = f"{T - ZERO_CELSIUS:.0f} °C"
+        y = 100.0 * block[:, -1]
+        ax.plot(found.speed / rpm, y, color=colour, marker=".", label=label)
+    _end_efficiency(ax)
+
+
+def _by_temperature(found: EfficiencyTable) -> list[tuple[Any, float, Any]]:
+    """Colour from cold to hot, temperature [K] and efficiencies, by temperature."""
+    from matplotlib import colormaps
+
+    colours = colormaps["coolwarm"](np.linspace(0.0, 1.0, found.temperature.size))
+    return list(zip(colours, found.temperature.tolist(), found.efficiency, strict=True))
+
+
+def _end_efficiency(ax: Any) -> None:
+    """Limits, legend and grid of a panel of the efficiency."""
     ax.set_xlim(left=0.0)
     ax.set_ylim(0.0, 100.0)
     ax.legend(fontsize="small", loc="lower right")
