@@ -14,6 +14,7 @@ from swgjoint.errors import InputError
 from swgjoint.gear.design.family import family_member
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
+from swgjoint.maps.friction_temperature import at_temperature
 from swgjoint.maps.from_catalogue import (
     catalogue_names,
     is_catalogue_name,
@@ -21,7 +22,7 @@ from swgjoint.maps.from_catalogue import (
 )
 from swgjoint.models_path import bundled_names, is_file, named_kind, near_names
 from swgjoint.progress import Progress, silent
-from swgjoint.units import arcmin
+from swgjoint.units import ZERO_CELSIUS, arcmin
 
 if TYPE_CHECKING:
     from swgjoint.gear.design.design import Design
@@ -39,7 +40,8 @@ def drive_of(
 ) -> DriveMap:
     """The map of a joint's drive; ``known`` collects the maps that are loaded or built.
 
-    The map omits hysteresis if the section switches it off and, at levels that use
+    The friction is that at the temperature of the section, if it states one. The map
+    omits hysteresis if the section switches it off and, at levels that use
     harmonics, the harmonics below the tolerance of the section. A catalogue drive gets
     the kinematic error of its tables or of the section, with different phases at every
     joint. Maps in ``known`` are neither loaded nor built again.
@@ -62,6 +64,13 @@ def drive_of(
     if section.hysteresis is False and drive.hysteresis:
         info = {**drive.info, "hysteresis_left_out": len(drive.hysteresis)}
         drive = replace(drive, hysteresis=(), info=info)
+    if section.temperature_C is not None:
+        where = f"joints.{joint}." if joint else ""
+        drive = at_temperature(
+            drive,
+            section.temperature_C + ZERO_CELSIUS,
+            where=f"{where}temperature_C = {section.temperature_C:g} °C",
+        )
     tolerance = section.harmonics_tolerance_arcmin
     if tolerance is None or section.level in WITHOUT_HARMONICS:
         return drive

@@ -96,6 +96,11 @@ class JointSection(Section):
     friction: bool | None = None
     """Whether the levels native and full include the friction of the drive; by
     default true."""
+    temperature_C: Annotated[float, Field(ge=-60, le=200)] | None = None
+    """Temperature of the lubricant [°C], which determines the friction at the levels
+    native and full. The drive must state its friction over temperature: a design with
+    ``[losses]``, a map built from one, or a catalogue drive with stated losses. By
+    default, the friction is that of the drive, at +20 °C in catalogues."""
     harmonics_tolerance_arcmin: Positive | None = None
     """Tolerance for omitting harmonics [arcmin]: at constant torque, the omitted
     harmonics together turn the output by less than this, see

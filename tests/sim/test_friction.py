@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from messages import names
+from messages import names, naming
 
 from swgjoint.cli.run import left_out_lines
 from swgjoint.drives.references import drive_of
 from swgjoint.drives.sections import JointSection
+from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
+from swgjoint.maps.friction_temperature import KEY, friction_table
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.figures.rating_use import first_ratcheting
 
@@ -101,3 +103,45 @@ def test_one_joint_switches_off_what_the_scene_asks_for(bench):
     )
     assert run.assembly.model.ntendon == 1
     assert run.contains["joints"]["joint"]["friction"] is None
+
+
+@pytest.mark.parametrize("level", ["full", "native"])
+def test_the_motor_feels_the_temperature(bench, level):
+    """Viscous torque of the table at the temperature; without the key as the map is."""
+    laws = {
+        T + 273.15: replace(LAW, load=0.0, viscous=v)
+        for T, v in ((0.0, 0.04), (20.0, 0.01), (40.0, 0.0025))
+    }
+    table = {KEY: friction_table(laws, lubricant="an oil")}
+    drive = replace(LINEAR, friction=laws[293.15], info=table)
+    runs = {
+        None: bench(drive, defaults__level=level),
+        0.0: bench(drive, defaults__level=level, defaults__temperature_C=0.0),
+        30.0: bench(drive, defaults__level=level, defaults__temperature_C=30.0),
+    }
+    torque = {
+        key: abs(run.motor_torque[run.steady, 0].mean()) for key, run in runs.items()
+    }
+    speed = {
+        key: abs(run.motor_velocity[run.steady, 0].mean()) for key, run in runs.items()
+    }
+    along = 1.0 + 1.0 / 60.0 if level == "full" else 1.0
+    for key, viscous in ((0.0, 0.04), (30.0, 0.005)):
+        change = torque[key] - torque[None]
+        wanted = (viscous * speed[key] - 0.01 * speed[None]) * along**2
+        assert change == pytest.approx(wanted, rel=0.02)
+    label = runs[30.0].contains["joints"]["joint"]["friction"]
+    assert names(label, "30 °C", "an oil")
+
+
+def test_a_temperature_without_friction_is_refused(bench):
+    """One line with the joint; out of the table with its range."""
+    with pytest.raises(
+        InputError, match=naming("joints.joint.temperature_C", "[losses]")
+    ):
+        bench(LINEAR, joints__joint__temperature_C=30.0)
+    cold = replace(
+        RUBBING, info={KEY: friction_table({280.0: LAW, 290.0: LAW}, lubricant="x")}
+    )
+    with pytest.raises(InputError, match=naming("-40 °C", "6.85 to 16.85 °C")):
+        bench(cold, joints__joint__temperature_C=-40.0)
