@@ -299,6 +299,7 @@ def turning(monkeypatch):
             race=np.array([0.3, 0.6]),
             tooth_pairs=np.array([2.0, 4.0]),
             lobe_force=np.full((2, 2), 100.0),
+            bending=np.full(2, 0.09),
             bearing=BallBearing.from_design(design),
         )
 

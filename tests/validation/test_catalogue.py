@@ -69,6 +69,7 @@ def turning(task):
         "race_per_mu_Nm": [scale * 0.03, scale * 0.06],
         "tooth_pairs": [2.0, 4.0],
         "lobe_forces_N": [[0.0, 0.0], [0.0, 0.0]],  # balls that do not press
+        "bending_per_loss_factor_Nm": [0.0, 0.0],
     }
 
 
