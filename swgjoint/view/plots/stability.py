@@ -92,7 +92,7 @@ def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
     axis.set_xscale("log")
     axis.set_xlim(0.9, 100)
     axis.set_ylim(0, 101)
-    axis.set_xlabel("number of sub-steps (runs that need more than 64 are refused)")
+    axis.set_xlabel("number of sub-steps (more than 64: refused)")
     axis.set_ylabel("share of the runs [%]")
     axis.legend(fontsize="small", title="time step")
     axis.grid(alpha=0.3)
@@ -158,9 +158,7 @@ def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
     for limit in (-5.0, 5.0):
         axis.axhline(limit, color="0.6", lw=1)
     axis.set_xlabel("step times torsion frequency [rad]")
-    axis.set_title(
-        "energy change [%], catalogue drives, 10 s free at 1 ms", fontsize=10
-    )
+    axis.set_title("energy change [%], catalogue drives, 10 s", fontsize=10)
     axis.grid(alpha=0.3)
 
 
