@@ -129,3 +129,9 @@ class Contacts:
         return Contacts(
             **{key: getattr(self, key)[index] for key in self.__dataclass_fields__}
         )
+
+
+def touch_twice(contacts: Contacts) -> bool:
+    """Whether two of the contacts are on the same flank of the flexspline."""
+    flank = 2 * contacts.sector + contacts.side
+    return len(np.unique(flank)) < len(flank)

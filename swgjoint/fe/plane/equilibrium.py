@@ -16,6 +16,7 @@ from swgjoint.fe.common.complementarity import ActiveSetError
 from swgjoint.fe.common.cyclic import SingularCyclicError
 from swgjoint.fe.common.friction import SlipHistory, dissipated_work, spring_energy
 from swgjoint.fe.common.indentation import strain_energy
+from swgjoint.fe.plane.contact_points import touch_twice
 from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised, linearise
 from swgjoint.fe.plane.newton_step import (
@@ -45,6 +46,11 @@ class NewtonSolver:
     step_tolerance: float = 2e-12
     """Increment of the nodes below which the iteration ends [m]. It is about 1e-5 of
     the smallest effect of interest, a tenth of a micrometre."""
+    conforming_tolerance: float = np.inf
+    """Upper bound of this increment if a flank touches at several points [m]. With one
+    point per flank the iteration converges quadratically, and its remaining error is
+    far below the last increment. On conforming flanks points replace each other, and
+    the remaining error is as large as the last increment."""
     thorough_below: float = 1e-7
     """Increment below which the contact search is thorough, see
     :meth:`swgjoint.fe.plane.tooth_contact.ToothContact.search` [m]."""
@@ -119,7 +125,10 @@ class NewtonSolver:
                     damping,
                     one_at_a_time=repeats,
                 )
-                small = step.largest < self.step_tolerance and damping == 1.0
+                tolerance = self.step_tolerance
+                if state.contacts is not None and touch_twice(state.contacts):
+                    tolerance = min(tolerance, self.conforming_tolerance)
+                small = step.largest < tolerance and damping == 1.0
                 if settled and small and thorough:
                     # without tooth contact nothing determines the output angle
                     free = load.torque is not None and load.teeth
