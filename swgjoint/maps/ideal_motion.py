@@ -9,12 +9,14 @@ Their effect is linearised in s at each theta:
 
 Where the highest harmonics change more, psi_0 is the solution found so far.
 
-The sums over the harmonics are then matrix products. They are computed once per
-position and interval of the torsion instead of once per iteration.
+The sums over the harmonics are then matrix products or, at equal steps over the whole
+period of a map, Fourier transforms. They are computed once per position and interval of
+the torsion instead of once per iteration.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +34,8 @@ _BEND = 1e-3
 [-]."""
 _FLAT = 1e-8
 """The same where the map is linearised about the solution found so far [-]."""
+_CHUNK = 256
+"""Number of positions that are linearised again at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +56,7 @@ class Polynomials:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdealMotion:
-    """Factors of the harmonics at n input angles, and the sums over the harmonics."""
+    """Sums over the harmonics at n input angles."""
 
     drive: Potential
     """The full map."""
@@ -62,9 +66,9 @@ class IdealMotion:
     """Output angles psi_0 about which the map is linearised [rad]. Shape (n,)."""
     error: Array
     """a [rad] and b [-], which are e0 and de0/dpsi at psi_0. Shape (2, n)."""
-    factors: Array
-    """Factors of the cosine and sine amplitudes in a value and in its derivative by psi
-    [-]. Shape (2, n, 2 n_harmonics).
+    sums: Callable[[Array, Index | slice], Array]
+    """Function of amplitudes (n_harmonics, 2, m) and of positions (n_there,). It
+    returns the sums over the harmonics and their derivatives by psi (2, n_there, m).
     """
     ends: Array
     """V_0'' [N·m/rad] and V_1'' [N·m/rad²] below and above the knots.
@@ -94,19 +98,62 @@ class IdealMotion:
         np.multiply(-n_psi, value[..., 1], out=slope[..., 0])
         np.multiply(n_psi, value[..., 0], out=slope[..., 1])
         both = factors.reshape(2, theta.size, -1)
+
+        def sums(amplitudes: Array, there: Index | slice) -> Array:
+            return both[:, there] @ amplitudes.reshape(both.shape[2], -1)
+
+        return cls._summed(drive, theta, about, sums)
+
+    @classmethod
+    def over_period(cls, drive: Potential, turns: float, count: int) -> IdealMotion:
+        """The harmonics of a map, summed at psi_0 = theta/i over its whole period.
+
+        Args:
+            drive: The map.
+            turns: Period of the map [input turns].
+            count: Number of equal steps of theta, more than two per shortest wave.
+        """
+        theta = 2.0 * np.pi * turns * np.arange(count) / count
+        n_theta, n_psi = drive.angle_orders.T
+        waves = np.rint((n_theta + n_psi / drive.ratio) * turns).astype(np.int64)
+
+        def transform(amplitudes: Array) -> Array:
+            a, b = amplitudes[:, 0], amplitudes[:, 1]
+            # cosines are even and sines are odd in the number of waves
+            terms = a - 1j * np.where(waves < 0, -1.0, 1.0)[:, None] * b
+            spectrum = np.zeros((count // 2 + 1, terms.shape[1]), dtype=complex)
+            np.add.at(spectrum, np.abs(waves), 0.5 * count * terms)
+            spectrum[0] *= 2.0
+            return np.asarray(np.fft.irfft(spectrum, count, axis=0))
+
+        def sums(amplitudes: Array, there: Index | slice) -> Array:
+            turned = amplitudes[:, ::-1] * (n_psi[:, None] * [1, -1])[..., None]
+            return np.stack([transform(part)[there] for part in (amplitudes, turned)])
+
+        return cls._summed(drive, theta, theta / drive.ratio, sums)
+
+    @classmethod
+    def _summed(
+        cls,
+        drive: Potential,
+        theta: Array,
+        about: Array,
+        sums: Callable[[Array, Index | slice], Array],
+    ) -> IdealMotion:
+        """The map with the sums that do not depend on the torsion."""
         return cls(
             drive=drive,
             theta=theta,
             about=about,
-            error=both @ drive.kinematic_error.ravel(),
-            factors=both,
-            ends=both @ drive.end_stiffness.reshape(both.shape[2], -1),
+            error=sums(drive.kinematic_error[..., None], slice(None))[..., 0],
+            sums=sums,
+            ends=sums(drive.end_stiffness, slice(None)),
         )
 
     def polynomials(self, interval: Index, known: Polynomials | None) -> Polynomials:
         """Polynomials of V_0 and V_1 in one interval of the torsion per position.
 
-        The positions of an interval are one matrix product.
+        The positions of an interval are summed at once.
 
         Args:
             interval: Number of the interval between two knots at each position (n,).
@@ -125,8 +172,7 @@ class IdealMotion:
         order = changed[np.argsort(interval[changed], kind="stable")]
         ends = np.flatnonzero(np.diff(interval[order])) + 1
         for rows in np.split(order, ends):
-            amplitudes = table[:, :, interval[rows[0]]].reshape(-1, table.shape[-1])
-            coefficients[:, rows] = self.factors[:, rows] @ amplitudes
+            coefficients[:, rows] = self.sums(table[:, :, interval[rows[0]]], rows)
         return Polynomials(interval=interval, coefficients=coefficients)
 
     def torque(
@@ -179,8 +225,10 @@ class IdealMotion:
             again = np.flatnonzero(np.isfinite(psi) & ~near)
             if not again.size:
                 break
-            at = IdealMotion.from_map(drive, self.theta[again], psi[again])
-            psi[again], near[again] = at._solve(torque, np.zeros(again.size), _FLAT)
+            for k in range(0, again.size, _CHUNK):
+                few = again[k : k + _CHUNK]
+                at = IdealMotion.from_map(drive, self.theta[few], psi[few])
+                psi[few], near[few] = at._solve(torque, np.zeros(few.size), _FLAT)
         far = ~near
         if far.any():
             psi[far] = output_angle(drive, self.theta[far], torque)

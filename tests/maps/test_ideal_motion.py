@@ -5,17 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from swgjoint.maps.ideal_motion import IdealMotion
-from swgjoint.maps.sheet.turn import error_turn, measure_turns, ripple_turn
+from swgjoint.maps.sheet.turn import error_turn, measure_turns, period_of, ripple_turn
 
 
 def test_polynomials_are_those_of_the_sums_in_all_intervals(synthetic_map):
     """Each position takes its interval from the table of all intervals."""
     theta = np.linspace(0.0, 40.0, 57)
     at = IdealMotion.from_map(synthetic_map, theta)
-    amplitudes = synthetic_map.potential.reshape(at.factors.shape[2], -1)
-    shape = (2, theta.size, *synthetic_map.potential.shape[2:])
-    every = (at.factors @ amplitudes).reshape(shape)
-    intervals = np.random.default_rng(3).integers(0, shape[2], (3, theta.size))
+    table = synthetic_map.potential
+    phases, n_psi = (
+        synthetic_map.phases(theta, at.about),
+        synthetic_map.angle_orders.T[1],
+    )
+    cos, sin = np.cos(phases), np.sin(phases)
+    factors = np.array([[cos, sin], [-n_psi * sin, n_psi * cos]])
+    every = np.einsum("abtk,kb...->at...", factors, table)
+    intervals = np.random.default_rng(3).integers(0, table.shape[2], (3, theta.size))
     # the last third stays in the intervals of the call before
     intervals[1:, 38:] = intervals[0, 38:]
     there = None
@@ -61,3 +66,24 @@ def test_signals_measured_at_once_are_those_measured_one_by_one(synthetic_map):
         assert turns[key].period_turns == turn.period_turns
     done, total = zip(*seen, strict=True)
     assert done[0] == 0 and done[-1] == total[-1] and sorted(done) == list(done)
+
+
+def test_transforms_over_the_period_equal_sums_at_single_angles(synthetic_map):
+    """Angles under load and torques on the ideal motion, to round-off."""
+    period, count = period_of(synthetic_map)
+    whole = IdealMotion.over_period(synthetic_map, float(period), count)
+    some = slice(0, None, max(1, count // 50))
+    at = IdealMotion.from_map(synthetic_map, whole.theta[some])
+    torque = synthetic_map.ratings.rated_torque
+    for load in (-torque, 0.0, torque):
+        np.testing.assert_allclose(
+            whole.output_angle(load)[some] - at.about,
+            at.output_angle(load) - at.about,
+            rtol=0.0,
+            atol=1e-14,
+        )
+    shift = np.full(count, -synthetic_map.mean_torsion(torque))
+    for long, short in zip(
+        whole.torque(shift)[:2], at.torque(shift[some]), strict=False
+    ):
+        np.testing.assert_allclose(long[some], short, rtol=1e-11, atol=1e-9)

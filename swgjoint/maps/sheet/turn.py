@@ -29,7 +29,10 @@ AT_LEAST_PER_WAVE = 4
 AT_LEAST = 64
 """Smallest number of samples per period."""
 CHUNK = 256
-"""Number of positions evaluated at once."""
+"""Number of positions evaluated at once in a period of more than :data:`WHOLE`."""
+WHOLE = 500_000
+"""Largest number of positions of a period that are evaluated at once, by Fourier
+transforms. Their coefficients take 80 bytes each."""
 MAX_SAMPLES = 10_000_000
 """Largest number of samples per period."""
 LINES = 12
@@ -183,14 +186,20 @@ def measure_turns(
     back = {key: -drive.mean_torsion(torque) for key, torque in ripple.items()}
     name = f"{drive.name}: output turn"
     progress(name, 0, theta.size)
-    for k in range(0, theta.size, CHUNK):
-        part = slice(k, k + CHUNK)
-        at = IdealMotion.from_map(drive, theta[part])
+    whole = theta.size <= WHOLE
+    size = theta.size if whole else CHUNK
+    for k in range(0, theta.size, size):
+        part = slice(k, k + size)
+        at = (
+            IdealMotion.over_period(drive, float(period), theta.size)
+            if whole
+            else IdealMotion.from_map(drive, theta[part])
+        )
         for key, torque in error.items():
             signals[key][part] = at.output_angle(torque) - theta[part] / drive.ratio
         for key, shift in back.items():
             signals[key][part] = at.torque(np.full(at.theta.shape, shift))[0]
-        progress(name, min(k + CHUNK, theta.size), theta.size)
+        progress(name, min(k + size, theta.size), theta.size)
     return {
         key: Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
         for key, signal in signals.items()
