@@ -15,6 +15,7 @@ import tomllib
 from pathlib import Path
 
 import swgjoint
+from swgjoint.cli import list as list_command
 from swgjoint.cli.main import COMMANDS, STATUSES, command_parser
 from swgjoint.explore.schema import KINDS, described_keys, file_schema, schema_text
 from swgjoint.files import write_whole
@@ -31,6 +32,15 @@ FOLDERS = {
     "sweep": "sweeps",
     "optimise": "optimisations",
 }
+BUNDLED = {
+    "drives": "swgjoint run bench --drive CSG-25-100",
+    "designs": "swgjoint meshing reference-2d --torque 20",
+    "arms": "swgjoint run ur5e --drive CSG-25-100",
+    "scenes": "swgjoint run ur5e-sweep",
+    "sweeps": "swgjoint sweep wave-generator --out DIR",
+    "optimisations": "swgjoint optimise qca-stress --out DIR",
+}
+"""Lists of the command ``list``, with a command that uses one of their rows."""
 FILES = {
     "design": (
         "Design files",
@@ -72,7 +82,12 @@ def pages() -> dict[Path, str]:
         for kind in KINDS
     }
     found |= {PAGES / f"{kind}.md": key_page(kind) for kind in KINDS}
-    return found | {PAGES / "commands.md": command_page(), PAGES / "api.md": api_page()}
+    return found | {
+        PAGES / "commands.md": command_page(),
+        PAGES / "api.md": api_page(),
+        PAGES / "bundled.md": bundled_page(),
+        PAGES / "notebooks.md": notebook_page(),
+    }
 
 
 def rows_of(kind: str) -> list[dict]:
@@ -293,6 +308,41 @@ def api_page() -> str:
         lines += ["", f"## {name}", "", "```{eval-rst}", f".. auto{kind}:: {where}"]
         lines += ["   :members:"] if kind == "class" else []
         lines += ["```"]
+    return "\n".join(lines) + "\n"
+
+
+def bundled_page() -> str:
+    """Page with the bundled drives, arms and files, as ``list`` prints them."""
+    lines = [WRITTEN, "", "# Bundled drives, arms and files", ""]
+    lines += ["`swgjoint list KIND` prints these tables."]
+    for kind, use in BUNDLED.items():
+        result = list_command.run(argparse.Namespace(kind=kind))
+        table = list_command.report(result).removesuffix(result["note"]).rstrip()
+        table = "\n".join(line.rstrip() for line in table.splitlines())
+        lines += ["", f"## {kind.capitalize()}", "", "```sh", use, "```"]
+        lines += ["", "```text", table, "```", "", _cell(result["note"])]
+    return "\n".join(lines) + "\n"
+
+
+def notebook_page() -> str:
+    """Page with the title and the first sentences of every notebook."""
+    lines = [WRITTEN, "", "# Notebooks", ""]
+    lines += [
+        "The notebooks in `notebooks/` are Python files with cells, which VS Code and"
+        " PyCharm open directly. For JupyterLab, convert one; the extra `notebooks` has"
+        " the tools. The slow tests run all of them.",
+        "",
+        "```sh",
+        "python3 -m pip install '.[notebooks]'",
+        "jupytext --to notebook notebooks/first-drive.py",
+        "```",
+    ]
+    for path in sorted((ROOT / "notebooks").glob("*.py")):
+        cell = path.read_text("utf-8").partition("# %% [markdown]\n# # ")[2]
+        title, *text = cell.partition("\n# %%")[0].splitlines()
+        plain = " ".join(line.removeprefix("#").strip() for line in text).strip()
+        start = re.match(r"(?:[^.?]*[.?] ?){1,2}(?=\s|$)", plain)[0]
+        lines += ["", f"## {title}", "", f"`notebooks/{path.name}`: {start.strip()}"]
     return "\n".join(lines) + "\n"
 
 
