@@ -12,7 +12,9 @@ from messages import names, naming
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.fe.rings.accuracy import output_turn_angles
-from swgjoint.gear.bearing.rolling_friction import BASE_OILS
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.bearing.base_oil import MAKER_GREASES, ROOM
+from swgjoint.gear.bearing.rolling_friction import BASE_OILS, GreasedBearing
 from swgjoint.gear.catalogue_stated import stated_losses
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -62,15 +64,17 @@ def single(task, torque):
 def turning(task):
     """Friction of 60 mN·m per mu, a quarter of the teeth; twice with 28 deg."""
     scale = 2.0 if task.name.endswith(" 28") else 1.0
-    return {
+    free = {
         "input_angles_rad": [0.0, 1.0],
         "elastic_Nm": [0.5e-3, -0.5e-3],
         "teeth_per_mu_Nm": [scale * 0.01, scale * 0.02],
         "race_per_mu_Nm": [scale * 0.03, scale * 0.06],
         "tooth_pairs": [2.0, 4.0],
         "lobe_forces_N": [[0.0, 0.0], [0.0, 0.0]],  # balls that do not press
-        "bending_per_loss_factor_Nm": [0.0, 0.0],
+        "bending_per_loss_factor_Nm": [0.1, 0.1],
     }
+    load = {"teeth_per_mu_Nm": [scale * 0.2, scale * 0.2]}
+    return {**free, "loaded": [free | load]}
 
 
 def instant(task):
@@ -139,9 +143,9 @@ def test_catalogue_values_are_those_of_the_tables():
 
 def test_rows_hold_brackets_and_failures(computed):
     """Every case is there, the failed one with its reason; middles are middles."""
-    found = study.run_catalogue(options())
+    found, study_file = study.run_catalogue(options()), CatalogueFile.load()
     rows = {(row.case, row.quantity): row for row in found.rows}
-    assert len(rows) == 15 * 7 + 2 * 4
+    assert len(rows) == 15 * 7 + 3 * 4
     one = rows["size 25, ratio 100", "K2"]
     assert one.source_value == pytest.approx(5e4)
     assert one.ours == pytest.approx(0.5 * (one.more["low"] + one.more["high"]))
@@ -172,13 +176,37 @@ def test_rows_hold_brackets_and_failures(computed):
     )
     slow = rows["size 25, ratio 100", "no-load running torque"]
     assert slow.source_value == pytest.approx(195.0)
-    # mean over the angles; mu of 0.05 and one flank to 0.1 and the other
-    assert [slow.more["low"], slow.more["high"]] == pytest.approx([3.0, 12.0])
+    # mean over the angles; mu of 0.05, one flank and no drag, to 0.1, the other flank
+    # and the drag in the thickest oil; bending by 0.1 N·m and both loss factors
+    bearing = BallBearing.from_design(variant_design(25, 100, study_file.variants[0]))
+    drag = {
+        oil: 1e3 * GreasedBearing.from_bearing(bearing, oil).drag_torque(RUNNING_SPEED)
+        for oil in (*BASE_OILS, *(g.viscosity(ROOM) for g in MAKER_GREASES.values()))
+    }
+    ends = [3.0 + 100.0 * 2e-5, 12.0 + 100.0 * 1e-2 + drag[BASE_OILS[1]]]
+    assert [slow.more["low"], slow.more["high"]] == pytest.approx(ends)
+    named = sorted(drag[g.viscosity(ROOM)] for g in MAKER_GREASES.values())
+    ends = [3.0 + 100.0 * 2e-5 + named[0], 12.0 + 100.0 * 1e-2 + named[-1]]
+    assert slow.more["maker_greases"] == pytest.approx(ends)
     assert slow.more["conditions"].startswith("2000 rpm, +20 C, grease")
-    assert "teeth 25 %, 3 pairs in contact" in slow.reason and "seals" in slow.reason
+    assert "teeth 25 %" in slow.reason and "3 pairs" in slow.reason
+    assert "bending 0.1 mN·m" in slow.reason and "seals" in slow.reason
     start = rows["size 25, ratio 100", "starting torque"]
-    assert [start.more["low"], start.more["high"]] == pytest.approx([3.5, 15.5])
-    assert "a lower bound in 4 of 4 cases" in "".join(found.summary)
+    ends = [3.5 + 100.0 * 2e-5, 15.5 + 100.0 * 1e-2]
+    assert [start.more["low"], start.more["high"]] == pytest.approx(ends)
+    # 870 mN·m at rated torque; 245 mN·m per mu, twice with 28 deg
+    best = rows["size 25, ratio 100", "efficiency at rated torque"]
+    assert best.source_value == pytest.approx(77.0)
+    ends = [
+        87.0 / (0.87 + 0.049 + 1e-3 + 1e-3 * drag[BASE_OILS[1]]),
+        87.0 / (0.87 + 0.01225 + 2e-6),
+    ]
+    assert [best.more["low"], best.more["high"]] == pytest.approx(ends)
+    lines = "".join(found.summary)
+    assert "running torque: the bracket contains the catalogue value in 4 of 4" in lines
+    assert (
+        "starting torque: the bracket contains the catalogue value in 0 of 4" in lines
+    )
     shares = [r for r in found.more["shares"]["rows"] if r["ratio"] == 100]
     assert shares.pop()["K_without_over_with"] == pytest.approx([1.0] * 3)
     assert np.sum([r["share"] for r in shares], axis=0) == pytest.approx(np.ones(6))
@@ -196,27 +224,21 @@ def test_rows_hold_brackets_and_failures(computed):
     json.dumps(found.more)
 
 
-def test_friction_above_the_catalogue_is_told(monkeypatch):
-    """A case whose friction alone takes more than is stated is named."""
+def test_a_bracket_beside_the_catalogue_is_named(monkeypatch):
+    """The case whose friction takes more than is stated, and by how much."""
 
     def heavy(task):
         one = turning(task)
         if "running 17" not in task.name:
             return one
-        return one | {"race_per_mu_Nm": [0.3, 0.3]}
+        return one | {"race_per_mu_Nm": [30.0, 30.0]}
 
     monkeypatch.setattr(study, "run_task", heavy)
     found = study.run_catalogue(options(only=("losses",)))
-    (line,) = (s for s in found.summary if "running" in s and "lower bound" in s)
-    assert "in 4 of 4 cases" in line
-    monkeypatch.setattr(
-        study,
-        "run_task",
-        lambda task: heavy(task) | {"teeth_per_mu_Nm": [0.3, 0.4]},
-    )
-    found = study.run_catalogue(options(only=("losses",)))
-    (line,) = (s for s in found.summary if "running" in s and "lower bound" in s)
-    assert "in 2 of 4 cases, above the catalogue in size 14, ratio 100, size 17" in line
+    (line,) = (s for s in found.summary if "running torque: the bracket" in s)
+    assert "in 3 of 4 cases" in line
+    # 1.5 N·m of 51 mN·m
+    assert "size 17, ratio 100 2.9e+03 %" in line
 
 
 def test_the_command_writes_table_and_plot(computed, capsys, tmp_path):
@@ -295,17 +317,26 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_friction_of_teeth_race_and_balls_is_below_the_catalogue(monkeypatch, tmp_path):
-    """The smallest size by the real rings: less than what grease and seals add to."""
+def test_losses_of_the_smallest_size(monkeypatch, tmp_path):
+    """Real rings: run in below, flooded around the table; the start far below it."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     file = CatalogueFile.load()
     tasks = {task.name: task for task in study.tasks_of(file, "losses")}
     assert len(tasks) == 8
     task = tasks["running 14 100 20"]
-    slow = running_of(run_task(task), task.design)
+    found = run_task(task)
+    slow, loaded = (running_of(x, task.design) for x in (found, found["loaded"][0]))
     stated = stated_losses(catalogue_row(14, 100))
     for mu in file.coefficients:
         for oil in BASE_OILS:
             running = slow.running_torque(mu, RUNNING_SPEED, oil)
             assert 0.0 < running < stated.no_load_running
-        assert 0.0 < slow.starting_torque(mu) < stated.starting
+        oil = MAKER_GREASES["SK-1A, SK-2"].viscosity(ROOM)
+        losses = [
+            one.running_torque(mu, RUNNING_SPEED, oil, flooded=True)
+            for one in (slow, loaded)
+        ]
+        assert losses[0] == pytest.approx(stated.no_load_running, rel=0.1)
+        # within 5 points
+        assert abs(0.1 / (0.1 + losses[1]) - stated.efficiency) < 0.05
+        assert 0.0 < slow.starting_torque(mu) < 0.1 * stated.starting

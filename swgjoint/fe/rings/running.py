@@ -141,26 +141,39 @@ class RunningFriction:
         """
         return GreasedBearing.from_bearing(self.bearing, viscosity).drag_torque(speed)
 
-    def running_torque(self, mu: float, speed: float, viscosity: float) -> float:
+    def running_torque(
+        self,
+        mu: float,
+        speed: float,
+        viscosity: float,
+        *,
+        flooded: bool = False,
+        loss_factor: float = 0.0,
+    ) -> float:
         """Mean friction torque at the input [N·m].
 
         Args:
             mu: Coefficient of friction [-].
             speed: Speed of the input [rad/s].
             viscosity: Kinematic viscosity of the base oil [m2/s].
+            flooded: Whether the balls drag through the lubricant.
+            loss_factor: Loss factor of the bending rings [-].
         """
-        return float((mu * self.per_mu + self.ball_torque(speed, viscosity)).mean())
+        torque = mu * self.per_mu + self.ball_torque(speed, viscosity)
+        drag = self.drag_torque(speed, viscosity) if flooded else 0.0
+        return float((torque + loss_factor * self.bending).mean()) + drag
 
-    def starting_torque(self, mu: float) -> float:
+    def starting_torque(self, mu: float, *, loss_factor: float = 0.0) -> float:
         """Smallest input torque that keeps the drive turning at all angles [N·m].
 
         It is the torque at the worst angle and includes the frictionless torque.
 
         Args:
             mu: Coefficient of friction [-].
+            loss_factor: Loss factor of the bending rings [-].
         """
-        balls = self.ball_torque(0.0, BASE_OILS[0])
-        return float((self.elastic + mu * self.per_mu + balls).max())
+        torque = self.elastic + mu * self.per_mu + self.ball_torque(0.0, BASE_OILS[0])
+        return float((torque + loss_factor * self.bending).max())
 
     def as_dict(self, mu: float) -> dict[str, Any]:
         """Running and starting torque, their parts and the omitted losses, for JSON.
