@@ -350,5 +350,6 @@ class _Figures:
             if key in wanted:
                 self.reasons[key] = (
                     f"more than {figures[figure]:.3g} N·m (friction of teeth, race and"
-                    f" rolling balls{how}; a lower bound); not modelled: {LEFT_OUT}"
+                    f" rolling balls{how}; a lower bound); not modelled: {LEFT_OUT};"
+                    " a table [losses] in the design gives a value"
                 )
