@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, overload
 
@@ -20,7 +21,8 @@ from swgjoint.joint.fitting import Fitting, check_spec
 from swgjoint.joint.patterns import chosen_hinges
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
-from swgjoint.units import arcmin
+from swgjoint.maps.friction_temperature import at_temperature
+from swgjoint.units import ZERO_CELSIUS, arcmin
 
 DriveSource = DriveMap | Design | str | Path
 """A map, a design, or the name or path of either."""
@@ -41,6 +43,7 @@ class AttachOptions(TypedDict, total=False):
     model: str | None
     kinematic_error_arcmin: float | None
     seed: int
+    temperature_C: float | None
 
 
 @overload
@@ -79,6 +82,7 @@ def attach(
     model: str | None = None,
     kinematic_error_arcmin: float | None = None,
     seed: int = 0,
+    temperature_C: float | None = None,
 ) -> JointDrive | dict[str, JointDrive]:
     """Turn hinges of a model into outputs of strain wave gears.
 
@@ -128,6 +132,8 @@ def attach(
             turn [arcmin], of a catalogue drive or of a map without kinematic error; see
             :mod:`swgjoint.maps.fit.error_spectrum`. None takes the catalogue value.
         seed: Seed of the assumed error; joints differ by their names.
+        temperature_C: Temperature of the lubricant [°C] of drives that state their
+            friction over temperature; None takes the friction of the drive.
 
     Returns:
         The drive of the joint; with ``drives``, all drives by joint name in the order
@@ -159,6 +165,12 @@ def attach(
     fittings = {}
     for name, key in chosen.items():
         drive_map = _map(sources[key], name, known, model, kinematic_error_arcmin, seed)
+        if temperature_C is not None:
+            drive_map = at_temperature(
+                drive_map,
+                _celsius(temperature_C) + ZERO_CELSIUS,
+                where=f"joint {name!r}: temperature_C = {temperature_C:g} °C",
+            )
         fittings[name] = Fitting(
             drive=drive_map,
             rotor_inertia=_rotor(name, drive_map, rotor_inertia),
@@ -205,6 +217,14 @@ def _map(
         f"drive of {joint!r}: {type(source).__name__} {str(source)[:60]!r}; accepted: a"
         " catalogue name, a path, a Design or a DriveMap"
     )
+
+
+def _celsius(value: Any) -> float:
+    """A temperature that is a finite number [°C]."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and isfinite(value)):
+        raise InputError(f"temperature_C = {value!s:.40}; accepted: a number of °C")
+    return float(value)
 
 
 def _rotor(joint: str, drive: DriveMap, rotor_inertia: float | None) -> float:

@@ -11,6 +11,7 @@ from messages import naming
 
 import swgjoint
 from swgjoint.errors import InputError
+from swgjoint.joint.plugin import friction_numbers
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
@@ -154,3 +155,27 @@ def test_joints_of_one_catalogue_drive_err_at_phases_of_their_own(spec):
     assert size > 1.3
     assert not np.allclose(again.drive.kinematic_error, pan.kinematic_error)
     assert not none.drive.kinematic_error.any()
+
+
+def test_friction_at_a_temperature(spec):
+    """The engine's numbers follow the temperature; what has no friction is refused."""
+    cold = swgjoint.attach(
+        spec, joint="elbow_joint", drive="CSG-25-100", temperature_C=0.0
+    )
+    room = swgjoint.attach(spec, joint="wrist_1_joint", drive="CSG-25-100")
+    assert cold.friction.viscous > 2.0 * room.friction.viscous
+    assert cold.friction.coulomb == pytest.approx(room.friction.coulomb)
+    written = [
+        [float(x) for x in plugin.config["friction"].split()] for plugin in spec.plugins
+    ]
+    wanted = [friction_numbers(one.drive).tolist() for one in (cold, room)]
+    assert sorted(written) == sorted(wanted)
+    for drive, value, says in (
+        ("CSG-25-50", 20.0, ("wrist_2_joint", "no friction")),
+        ("CSG-25-100", 200.0, ("200 °C", "-10 to 80 °C")),
+        ("CSG-25-100", float("nan"), ("temperature_C", "number")),
+    ):
+        with pytest.raises(InputError, match=naming(*says)):
+            swgjoint.attach(
+                spec, joint="wrist_2_joint", drive=drive, temperature_C=value
+            )
