@@ -58,9 +58,10 @@ def test_one_event_in_each_interval_is_exact():
 
 
 def test_events_are_found_where_they_are():
-    """One place in each interval that has an event, none in the others."""
-    found = path(TORQUES, EVENTS).events
-    assert found == pytest.approx([place for place, _ in EVENTS], abs=1e-6)
+    """One place and size in each interval that has an event, none in the others."""
+    torque, size = path(TORQUES, EVENTS).jumps
+    assert torque == pytest.approx([place for place, _ in EVENTS], abs=1e-6)
+    assert size == pytest.approx([abs(jump) for _, jump in EVENTS], rel=1e-6)
 
 
 def test_what_one_event_explains_leaves_only_the_chance_in_doubt():

@@ -49,9 +49,6 @@ straight line [-]."""
 SMOOTH = 0.4
 """Typical smooth variation of the compliance between two steps, as a fraction of the
 compliance [-]."""
-STRONG = 0.02
-"""Smallest step of the compliance around which the torques of a table become denser, as
-a fraction of the largest compliance [-]."""
 _GRID = np.linspace(0.0, 1.0, 17)
 """Points of an interval at which candidate curves are compared [-]."""
 _NEAR_END = 0.1
@@ -149,15 +146,22 @@ class LoadPath:
         return np.asarray(self.torque[:-1] + x * self.length)
 
     @property
-    def events(self) -> Array:
-        """Torques at which the compliance of the curve jumps markedly (m,) [N·m]."""
+    def jumps(self) -> tuple[Array, Array]:
+        """Torques at which the compliance of the curve jumps [N·m], and by how much.
+
+        Single jumps on a slope count where they are steeper than the slope. Increasing
+        torques and magnitudes of the jumps [rad/(N·m)], each (m,).
+        """
         one, (known, _, _, both) = self._explained[0], self._predicted
         strong = one.feasible & (np.abs(one.jump[:, 0]) > 0.5 * np.abs(self._jump))
-        jumps = (self.torque[:-1] + one.place[:, 0] * self.length)[strong & ~known]
-        # only steps that matter
-        size = np.abs(both.jump) > STRONG * self.compliance.max()
-        places = self.torque[:-1, None] + both.place * self.length[:, None]
-        return np.sort(np.concatenate([jumps, places[known[:, None] & size]]))
+        there = np.concatenate(
+            [(strong & ~known)[:, None], known[:, None] & (both.jump != 0.0)], axis=1
+        )
+        place = np.concatenate([one.place[:, :1], both.place], axis=1)
+        size = np.abs(np.concatenate([one.jump[:, :1], both.jump], axis=1))[there]
+        torque = (self.torque[:-1, None] + place * self.length[:, None])[there]
+        order = np.argsort(torque)
+        return torque[order], size[order]
 
     @property
     def _jump(self) -> Array:

@@ -70,7 +70,7 @@ SOLID_SOLVES = 220
 """Largest number of equilibria of a 3D map, doubled for both signs of torque."""
 SOLID_UNSEEN = (2, 2)
 """Numbers of validation torques of one sign and of validation angles of a 3D map."""
-TORQUES = 100
+TORQUES = 200
 """Largest number of torques of one sign in the table of a map."""
 TOLERANCED_TORQUES = 24
 """Largest number of torques of one sign in the table of a map with tooth errors, which

@@ -9,39 +9,85 @@ from swgjoint.typing import Array
 
 FEWEST_TORQUES = 40
 """Smallest number of torques of one sign that a table gets, if permitted."""
+KINK = 0.07
+"""Largest error of a map between two torques of its table where the compliance jumps,
+as a fraction of the jump times their distance [-]. It follows from the interpolation of
+a kinked curve by :func:`~swgjoint.maps.fit.torsion_table.interpolate_on_knots` and
+:func:`~swgjoint.maps.quartic.quartic_chain`."""
+TABLE_GOAL = 0.02
+"""Goal for this error at :data:`MOST_JUMPS` of the jumps, as a fraction of the
+peak-to-peak value [-]."""
+MOST_JUMPS = 0.98
+"""Fraction of the jumps of all angles at which the goal is met [-]."""
 
 
 def common_torques(
-    paths: list[LoadPath], own: set[float], least: float, most: int
+    paths: list[LoadPath],
+    own: set[float],
+    least: float,
+    most: int,
+    peaks: tuple[Array, Array],
 ) -> Array:
-    """Torques of a table, denser where the compliance of the load paths jumps.
+    """Torques of a table, denser where jumps of the compliance matter.
+
+    A map is smooth between two torques of its table. At a jump of the compliance it is
+    off by a fraction of the jump times the distance of these torques.
 
     Args:
         paths: Load paths of all angles.
         own: Positive torques that were solved at all angles [N·m].
         least: Lower bound of the added torques [N·m].
         most: Largest number of added torques.
+        peaks: Torques [N·m] and the peak-to-peak values of the output error over the
+            angle at these torques [rad], each (m,).
 
     Returns:
         Solved and added torques, increasing (n,) [N·m].
     """
     top = max(own)
-    pool = np.concatenate([np.concatenate([p.torque, p.events]) for p in paths])
-    pool = np.sort(pool[(pool > least) & (pool <= top)])
-    count = int(
-        np.clip(3 * len(pool) // (2 * len(paths)), min(FEWEST_TORQUES, most), most)
-    )
-    fine = np.linspace(least, top, 4001)
-    rank = np.searchsorted(pool, fine, side="right") / pool.size
+    jumps = [one.jumps for one in paths]
+    torque = np.concatenate([place for place, _ in jumps])
+    size = np.concatenate([size for _, size in jumps])
+    order = np.argsort(torque)
+    order = order[(torque[order] > least) & (torque[order] <= top)]
+    torque, part = torque[order], size[order] / np.interp(torque[order], *peaks)
+    levels, count = np.array(sorted(own)), min(FEWEST_TORQUES, most)
+    while True:
+        spread = _spread_torques(torque, part, least, top, count)
+        # drop torques that almost coincide with a solved one
+        gap = np.abs(spread[:, None] - levels).min(axis=1)
+        near = gap < 0.35 * np.gradient(spread)
+        table = np.sort(np.concatenate([spread[~near], levels]))
+        if count == most or not torque.size:
+            return table
+        after = np.searchsorted(table, torque)
+        apart = table[after] - np.where(after > 0, table[after - 1], least)
+        if np.quantile(KINK * part * apart, MOST_JUMPS) <= TABLE_GOAL:
+            return table
+        count = min(most, count + count // 4 + 1)
+
+
+def _spread_torques(
+    torque: Array, part: Array, least: float, top: float, count: int
+) -> Array:
+    """Torques of a table between two limits, half of them following the jumps.
+
+    Args:
+        torque: Torques of the jumps, increasing (n,) [N·m].
+        part: Weights of the jumps (n,).
+        least: Smaller limit [N·m].
+        top: Larger limit [N·m].
+        count: Number of torques.
+    """
+    fine = np.linspace(least, top, 8001)
     share = (fine - least) / (top - least)
-    # half of the torques follow the jumps; the others are slightly denser near zero
-    measure = 0.5 * rank + 0.25 * share + 0.25 * np.sqrt(share)
-    spread = np.interp((np.arange(count) + 0.5) / count, measure, fine)
-    levels = np.array(sorted(own))
-    # drop torques that almost coincide with a solved one
-    gap = np.abs(spread[:, None] - levels).min(axis=1)
-    near = gap < 0.35 * np.gradient(spread)
-    return np.sort(np.concatenate([spread[~near], levels]))
+    # the other half is slightly denser near zero
+    measure = 0.25 * share + 0.25 * np.sqrt(share)
+    if part.any():
+        sums = np.concatenate([[0.0], np.cumsum(part)]) / part.sum()
+        measure += 0.5 * sums[np.searchsorted(torque, fine, side="right")]
+    middle = (np.arange(count) + 0.5) / count
+    return np.asarray(np.interp(middle * measure[-1], measure, fine))
 
 
 def periodic(values: Array, parts: Array) -> tuple[Array, Array]:

@@ -342,7 +342,9 @@ class ColumnGrid(SolvedColumns[AnyState]):
             paths = [self.path(column, sign) for column in columns]
             own = {abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0}
             least = self.small if self.free else 0.0
-            torque = common_torques([curve for curve, _ in paths], own, least, most)
+            at, heights, _ = self.peaks(count, sign)
+            curves = [curve for curve, _ in paths]
+            torque = common_torques(curves, own, least, most, (at, heights))
             if self.free:
                 torque = np.concatenate([[least], torque])
             values = np.array(
