@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 from solved import hundred_elements
 
+from swgjoint.errors import DesignError
 from swgjoint.fe.rings import losses as ring_losses
 from swgjoint.fe.rings.losses import LossModel, loss_model
 from swgjoint.fe.rings.running import RunningFriction, running_friction
@@ -132,6 +134,14 @@ def test_arrays_survive_the_cache():
     again = RunningFriction.from_json(one.to_json(), BEARING)
     assert np.array_equal(again.lobe_force, one.lobe_force)
     assert again.to_json() == one.to_json()
+
+
+def test_designs_beyond_the_rings_are_named():
+    """No bearing: one line that says what the losses need."""
+    oil = {"base_oil_40C_mm2_s": 37.0, "base_oil_100C_mm2_s": 5.9}
+    design = Design.preset("reference-2d").with_changes({"losses": oil})
+    with pytest.raises(DesignError, match=naming("reference-2d", "losses", "bearing")):
+        loss_model(design)
 
 
 @pytest.mark.slow

@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.errors import DesignError
 from swgjoint.fe.rings.loading import positions
-from swgjoint.fe.rings.model import thin_ring
+from swgjoint.fe.rings.model import check_modelled, thin_ring
 from swgjoint.fe.rings.running import (
     RunningFriction,
     running_friction,
@@ -198,6 +199,14 @@ def loss_model(design: Design, *, progress: Progress = silent) -> LossModel:
     """
     if design.losses is None:
         raise ValueError(f"{design.drive.name} has no [losses]")
+    try:
+        check_modelled(design)
+    except DesignError as error:
+        raise DesignError(
+            f"{design.drive.name}: losses are computed in thin rings, which need a ball"
+            " bearing of the wave generator, an elliptical, cosine or table outline and"
+            " a fixed circular spline"
+        ) from error
 
     def solve() -> dict[str, Any]:
         angles = positions(thin_ring(plain), LOADED_POSITIONS)
