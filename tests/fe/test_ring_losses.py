@@ -19,6 +19,7 @@ from swgjoint.gear.bearing.rolling_friction import GreasedBearing
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.losses import LossConditions
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.friction_bending import cup_bending_energy
 from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,
@@ -128,6 +129,15 @@ def test_starting_torque_is_that_of_the_worst_angle():
     assert MODEL.starting_torque() == pytest.approx(worst)
 
 
+def test_the_cup_bends_with_the_rim():
+    """Its torque per loss factor counts under any load and at rest."""
+    cup = replace(MODEL, cup_bending=0.03)
+    more = cup.friction(200.0, WARM) - MODEL.friction(200.0, WARM)
+    assert more == pytest.approx(2e-3 * 0.03 * np.ones(3))
+    start = cup.starting_torque() - MODEL.starting_torque()
+    assert start == pytest.approx(2e-3 * 0.03)
+
+
 def test_arrays_survive_the_cache():
     """Values to JSON and back."""
     one = MODEL.cases[1]
@@ -159,6 +169,7 @@ def test_losses_of_a_design(monkeypatch):
         free = running_friction(plain)
     assert model.cases[0].race == pytest.approx(free.race, rel=1e-9)
     assert model.mu == 0.05
+    assert model.cup_bending == pytest.approx(4.0 * cup_bending_energy(plain))
     assert model.conditions.seal_torque == pytest.approx(0.003)
     parts = model.parts(RUNNING_SPEED, model.conditions.temperature)
     assert parts["teeth"][0] == 0.0

@@ -7,8 +7,9 @@ The input torque of friction is the sum of what the parts take on their own,
     \text{efficiency} = \frac{|T/i|}{|T/i| + F},
 
 with Coulomb friction of teeth and race, rolling and sliding balls, drag of the balls in
-churning grease, bending steel and seals. Only the viscosity depends on the temperature.
-Means are over the passage of balls and teeth.
+churning grease, bending steel (rim, race and, in closed form, the wall of the cup) and
+seals. Only the viscosity depends on the temperature. Means are over the passage of
+balls and teeth.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from swgjoint.gear.catalogue_stated import StatedLosses
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.losses import LossConditions
 from swgjoint.maps.cache import recall
+from swgjoint.maps.fit.friction_bending import cup_bending_energy
 from swgjoint.maps.fit.friction_fit import FilmFriction
 from swgjoint.maps.sheet.efficiency import (
     LOADS,
@@ -64,6 +66,8 @@ class LossModel:
     """Coefficient of friction of the teeth and of the rim on its race [-]."""
     conditions: LossConditions
     """Lubricant, seals and steel."""
+    cup_bending: float = 0.0
+    """Input torque that bending of the cup takes, per loss factor [N·m]."""
 
     def parts(self, speed: float, temperature: float) -> dict[str, Array]:
         """Mean friction torques at the input by part, each (n,) [N·m].
@@ -81,7 +85,7 @@ class LossModel:
             "balls": np.array(balls),
             "drag": np.full(self.load.size, drag),
             "bending": own.loss_factor
-            * np.array([one.bending.mean() for one in self.cases]),
+            * np.array([one.bending.mean() + self.cup_bending for one in self.cases]),
             "seals": np.full(self.load.size, own.seal_torque),
         }
 
@@ -126,7 +130,7 @@ class LossModel:
         """
         own, free = self.conditions, self.cases[0]
         rest = free.ball_torque(0.0, own.base_oil.viscosity(own.temperature))
-        steel = own.loss_factor * free.bending
+        steel = own.loss_factor * (free.bending + self.cup_bending)
         worst = free.elastic + self.mu * free.per_mu + rest + steel
         return float(worst.max()) + own.seal_torque
 
@@ -228,4 +232,5 @@ def loss_model(design: Design, *, progress: Progress = silent) -> LossModel:
         ratio=design.ratio,
         mu=design.friction.tooth_coefficient,
         conditions=LossConditions.from_section(design.losses),
+        cup_bending=2.0 * design.lobes * cup_bending_energy(design),
     )
