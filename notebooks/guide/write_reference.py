@@ -14,6 +14,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from pydantic import BaseModel
+
 import swgjoint
 from swgjoint.cli import list as list_command
 from swgjoint.cli.main import COMMANDS, STATUSES, command_parser
@@ -24,6 +26,7 @@ from swgjoint.toml_text import toml_text
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = Path(__file__).resolve().parent / "reference"
 WRITTEN = "<!-- Written by notebooks/guide/write_reference.py: change the code. -->"
+MEMBERS = ["   :members:", "   :exclude-members: model_config"]
 LONGEST = 60
 """Largest length of an example [characters]."""
 FOLDERS = {
@@ -305,8 +308,10 @@ def api_page() -> str:
         kind = "function"
         if isinstance(found, type):
             kind = "exception" if issubclass(found, Exception) else "class"
+            if issubclass(found, BaseModel):
+                where += "(**tables)"  # their defaults fill half a screen
         lines += ["", f"## {name}", "", "```{eval-rst}", f".. auto{kind}:: {where}"]
-        lines += ["   :members:"] if kind == "class" else []
+        lines += MEMBERS if kind == "class" else []
         lines += ["```"]
     return "\n".join(lines) + "\n"
 
