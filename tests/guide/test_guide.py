@@ -254,7 +254,7 @@ def test_site_builds_without_a_warning(tmp_path):
         pytest.skip(f"{', '.join(missing)} not installed: pip install '.[docs]'")
     command = ["-W", "--keep-going", "-q", "-b", "html", "-d", tmp_path / "trees"]
     done = subprocess.run(
-        [sys.executable, "-m", "sphinx", *command, GUIDE, tmp_path / "html"],
+        [sys.executable, "-P", "-m", "sphinx", *command, GUIDE, tmp_path / "html"],
         capture_output=True,
         text=True,
     )
