@@ -15,10 +15,9 @@ as a fraction of the jump times their distance [-]. It follows from the interpol
 a kinked curve by :func:`~swgjoint.maps.fit.torsion_table.interpolate_on_knots` and
 :func:`~swgjoint.maps.quartic.quartic_chain`."""
 TABLE_GOAL = 0.02
-"""Goal for this error at :data:`MOST_JUMPS` of the jumps, as a fraction of the
-peak-to-peak value [-]."""
-MOST_JUMPS = 0.98
-"""Fraction of the jumps of all angles at which the goal is met [-]."""
+"""Goal for this error, as a fraction of the peak-to-peak value [-]."""
+MISSED_JUMPS = 0.5
+"""Largest number of jumps per angle at which the goal may be missed [-]."""
 
 
 def common_torques(
@@ -62,7 +61,8 @@ def common_torques(
             return table
         after = np.searchsorted(table, torque)
         apart = table[after] - np.where(after > 0, table[after - 1], least)
-        if np.quantile(KINK * part * apart, MOST_JUMPS) <= TABLE_GOAL:
+        missed = np.count_nonzero(KINK * part * apart > TABLE_GOAL)
+        if missed <= MISSED_JUMPS * len(paths):
             return table
         count = min(most, count + count // 4 + 1)
 
