@@ -328,9 +328,15 @@ class Potential:
 
     @property
     def torque_range(self) -> tuple[float, float]:
-        """Mean torque at the outermost knots [N·m]; beyond it the map continues."""
+        """Range of the sampled torques [N·m]; beyond it the map continues.
+
+        It ends at the mean torque at the outermost knots. Those of a drive with tooth
+        errors cover the torsion of its softest positions and lie further out; the range
+        then ends at the largest sampled torques in :attr:`info`.
+        """
         ends = self.coefficients(self.torsion_knots[[0, -1]], 1)[:, 0, 0]
-        return float(ends[0]), float(ends[1])
+        low, high = self.info.get("sampled_torque_Nm", (-np.inf, np.inf))
+        return max(float(ends[0]), float(low)), min(float(ends[1]), float(high))
 
     def mean_torsion(self, torque: float) -> float:
         """Torsion of the mean curve [rad] at an output torque [N·m].

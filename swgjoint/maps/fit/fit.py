@@ -72,7 +72,15 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         )
         fitted = _map_of(samples, knots, combined)
         record = _tolerance_record(fitted, samples, combined.record, keep)
-    info = {**samples.info, **record, **_ranges(fitted, samples)}
+    sampled = [float(v) for v in samples.torque[[0, -1]]]
+    fitted = replace(
+        fitted, info={**samples.info, **record, "sampled_torque_Nm": sampled}
+    )
+    info = {
+        **fitted.info,
+        "stiffness_range_Nm_rad": stiffness_range(fitted),
+        "torque_range_Nm": [float(v) for v in fitted.torque_range],
+    }
     unseen = validation(fitted, samples)
     if unseen is not None:
         info["validation"] = unseen
@@ -158,15 +166,6 @@ def _tolerance_record(
         "harmonics": _describe(drive, strength, np.ones(len(strength), dtype=bool)),
         "tolerances": tolerances,
         "perfect_teeth": {key: perfect[key] for key in ("residual", "energy_check")},
-    }
-
-
-def _ranges(drive: DriveMap, samples: MapSamples) -> dict[str, list[float]]:
-    """Ranges of stiffness and torque of a fitted map, for its record."""
-    return {
-        "stiffness_range_Nm_rad": stiffness_range(drive),
-        "torque_range_Nm": [float(v) for v in drive.torque_range],
-        "sampled_torque_Nm": [float(v) for v in samples.torque[[0, -1]]],
     }
 
 

@@ -69,9 +69,30 @@ def common_knots(
     elif samples.free:
         coarse[at - 2 : at + 3] = True
     coarse[[0, -1]] = True
-    if tolerances is not None and tolerances.waves is not None:
-        coarse[:] = True  # few harmonics
+    if tolerances is not None:
+        below, above = float(flawed[0].min()), float(flawed[-1].max())
+        low = -_further(-knots[coarse][::-1], -below)[::-1]
+        high = _further(knots[coarse], above)
+        knots = np.concatenate([low, knots, high])
+        coarse = np.pad(coarse, (low.size, high.size), constant_values=True)
+        if tolerances.waves is not None:
+            coarse[:] = True  # few harmonics
     return np.asarray(knots), coarse
+
+
+def _further(knots: Array, last: float) -> Array:
+    """Knots beyond the last one that cover the torsion of soft positions (n,) [rad].
+
+    Tooth errors make the torsion at the largest torque differ so much between positions
+    that the mean one is too small for many of them.
+
+    Args:
+        knots: Knots at which errors are evaluated, increasing [rad].
+        last: Largest torsion of any position [rad].
+    """
+    step = 2.0 * (knots[-1] - knots[-2])
+    count = max(0, int(np.ceil((last - knots[-1]) / step)))
+    return np.linspace(knots[-1], last, count + 1)[1:]
 
 
 def _end_at_largest_torque(
