@@ -9,9 +9,15 @@ import pytest
 
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
 from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.fit import tolerance_modes
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.knots import _end_at_largest_torque
-from swgjoint.maps.fit.tolerance_modes import orders_of, register_by_torque
+from swgjoint.maps.fit.tolerance_modes import (
+    orders_of,
+    register_by_torque,
+    relative_amplitudes,
+    weakest,
+)
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
@@ -197,8 +203,9 @@ def test_perfect_teeth_add_nothing():
         assert mine == pytest.approx(other, rel=1e-9)
 
 
-def test_threshold_drops_harmonics_and_the_record_says_how_much():
+def test_threshold_drops_harmonics_and_the_record_says_how_much(monkeypatch):
     """Fewer harmonics, their share of the rms in the record."""
+    monkeypatch.setattr(tolerance_modes, "LEFT_OUT", 0.2)
     samples = known("circular_spline_fixed")
     full, sparse = fit_map(samples, keep=0.0), fit_map(samples, keep=0.5)
     record = sparse.info["tolerances"]
@@ -212,6 +219,39 @@ def test_threshold_drops_harmonics_and_the_record_says_how_much():
     middle = next(r for r in record["transmission_error"] if r["torque_Nm"] == 0.0)
     zero = samples.tolerances.table[0, 3]
     assert middle["peak_to_peak_rad"] == pytest.approx(np.ptp(zero))
+
+
+@pytest.mark.parametrize("most", [0.01, 0.05, 0.2])
+def test_harmonics_left_out_stay_within_their_limit_at_every_torque(most):
+    """Their rms is at most the limit, and the next weakest one would exceed it."""
+    parts = np.random.default_rng(4).exponential(0.02, (300, 5))
+    kept = np.zeros(300, dtype=bool)
+    kept[7] = True
+    out = weakest(parts, kept, most)
+    assert not out[7] and out.any() and not out.all()
+    assert np.sqrt(0.5 * (parts[out] ** 2).sum(axis=0)).max() <= most
+    rest = np.flatnonzero(~out & ~kept)
+    out[rest[parts[rest].max(axis=1).argmin()]] = True
+    assert np.sqrt(0.5 * (parts[out] ** 2).sum(axis=0)).max() > most
+
+
+def test_amplitudes_under_load_are_those_of_the_known_potential():
+    """Ripple and error of a single wave of e0 under constant stiffness."""
+    samples = known("circular_spline_fixed", part=0.0)
+    tolerances = samples.tolerances
+    pitch = 2.0 * np.pi / CIRCULAR_SPLINE
+    theta = pitch * np.arange(4 * CYCLE) / 4
+    table = np.tile(tolerances.perfect, (1, 1, CYCLE))
+    table[0] += 3e-5 * np.cos(theta)  # 15 waves in the cycle
+    flawed = replace(tolerances, table=table)
+    parts, height = relative_amplitudes(flawed, CIRCULAR_SPLINE)
+    loaded = np.flatnonzero(tolerances.torque)
+    # dominated by one wave, whose amplitude is half of the peak to peak
+    wanted = np.abs(tolerances.torque[loaded]) * 3e-5
+    ripple = height[0, loaded] * parts[15, loaded]
+    assert ripple == pytest.approx(wanted, rel=1e-6)
+    error = height[1] * parts[15, tolerances.torque.size :]
+    assert error == pytest.approx(np.full(7, 3e-5), rel=1e-6)
 
 
 def test_errors_of_one_member_have_orders_of_its_angle_alone():

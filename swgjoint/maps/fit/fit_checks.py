@@ -14,6 +14,8 @@ PER_CYCLE = 24
 """Angles in a cycle of the fastest harmonic at which the stiffness is sampled."""
 MOST_ANGLES = 4000
 """Largest number of these angles."""
+MOST_PHASES = 3_000_000
+"""Largest number of angles times harmonics."""
 ROUND_OFF = 1e-9
 """Cycles per input turn, divided by those of the fastest harmonic, below which a
 harmonic counts as constant [-]."""
@@ -96,8 +98,9 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     """Smallest and largest sampled stiffness inside the knots [N·m/rad].
 
     Input and output turn in the ideal ratio over one cycle of the slowest harmonic,
-    :data:`PER_CYCLE` steps in each of the fastest, or :data:`MOST_ANGLES` steps if
-    that is fewer. An equilibrium where the stiffness is not positive would be unstable.
+    :data:`PER_CYCLE` steps in each of the fastest, or fewer with :data:`MOST_ANGLES`
+    and :data:`MOST_PHASES`. An equilibrium where the stiffness is not positive would be
+    unstable.
     """
     knots = drive.torsion_knots
     x = np.linspace(knots[0], knots[-1], 12 * knots.size)
@@ -105,8 +108,9 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     fastest = max(1.0, float(cycles.max()))
     slowest = cycles[cycles > ROUND_OFF * fastest].min(initial=fastest)
     steps = ceil(PER_CYCLE * fastest / slowest)
-    theta = np.linspace(0.0, 2.0 * np.pi / slowest, min(steps, MOST_ANGLES) + 1)
-    # one matrix product: maps with tooth errors have hundreds of harmonics
+    most = min(MOST_ANGLES, MOST_PHASES // len(drive.orders))
+    theta = np.linspace(0.0, 2.0 * np.pi / slowest, min(steps, most) + 1)
+    # one matrix product: maps with tooth errors have thousands of harmonics
     phases, bend = drive.phases(theta, theta / drive.ratio), drive.coefficients(x, 2)
     stiffness = bend[..., 0] @ np.cos(phases).T + bend[..., 1] @ np.sin(phases).T
     return [float(stiffness.min()), float(stiffness.max())]

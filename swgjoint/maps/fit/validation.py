@@ -10,16 +10,12 @@ from typing import Any
 import numpy as np
 
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit.tolerance_modes import pitches_per_turn, relative_amplitudes
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS, UNITS
 from swgjoint.typing import Array
 
-POSITIONS = 500
-"""Number of positions in the cycle of a drive with tooth errors at which its map is
-evaluated."""
-GOLDEN = 0.618034
-"""Golden section, the step between positions as a fraction of the cycle [-]."""
 EXTREME = 2.5
 """Assumed ratio of the largest of many differences to their root mean square [-].
 
@@ -36,7 +32,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     Differences of input torque and output error are relative to their peak to peak in
     the finite elements at the same torque, over the samples and the unused (unseen)
     equilibria together. With tooth errors the unseen equilibria are a few full solves
-    of the toleranced drive, and the values of the map over the whole cycle replace the
+    of the toleranced drive, and the superposed values over the whole cycle replace the
     samples.
 
     ``largest`` is the largest difference observed at a few angles of each torque.
@@ -78,7 +74,9 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
                 _over(samples, key, torque) for key in ("output_error", "input_torque")
             ]
         else:
-            others = _over_cycle(drive, samples, torque)
+            others = [np.array([0.0, here]) for here in _over_cycle(samples, torque)]
+            # only the differences count
+            error, moment = error - error.min(), moment - moment.min()
         error, moment = (
             np.concatenate(pair) for pair in zip((error, moment), others, strict=True)
         )
@@ -141,18 +139,19 @@ def _over(samples: MapSamples, key: str, torque: float) -> Array:
     return np.array([np.interp(torque, samples.torque, row) for row in table.T])
 
 
-def _over_cycle(drive: Potential, samples: MapSamples, torque: float) -> list[Array]:
-    """Output error [rad] and input torque [N·m] of the map over the tooth cycle."""
-    assert samples.tolerances is not None
-    step = samples.input_angle[1] - samples.input_angle[0]
-    cycle = step * samples.input_angle.size * samples.tolerances.pitches
-    # steps of the golden section spread the positions evenly over pitches and phases
-    theta = cycle * (GOLDEN * np.arange(POSITIONS) % 1.0)
-    none = np.zeros(POSITIONS)
-    there = FullSolves(
-        input_angle=theta, torque=none + torque, output_error=none, input_torque=none
-    )
-    return [_predicted(drive, there), _input_torque(drive, there)]
+def _over_cycle(samples: MapSamples, torque: float) -> list[float]:
+    """Peak to peak of output error [rad] and input torque [N·m] over the tooth cycle.
+
+    Between the torques of the superposition it is interpolated.
+    """
+    tolerances = samples.tolerances
+    assert tolerances is not None
+    _, height = relative_amplitudes(tolerances, pitches_per_turn(samples))
+    known = np.isfinite(height)
+    return [
+        float(np.interp(torque, tolerances.torque[at], row[at]))
+        for row, at in zip(height[::-1], known[::-1], strict=True)
+    ]
 
 
 def _stiffness(
