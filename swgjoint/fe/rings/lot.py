@@ -17,10 +17,9 @@ from swgjoint.fe.rings.influence import with_shifting_teeth
 from swgjoint.fe.rings.loading import SMALL
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.passage import ball_passage
-from swgjoint.fe.rings.tolerances import RingErrors
+from swgjoint.fe.rings.tolerances import RingErrors, superpose
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
 from swgjoint.fe.tolerances.lot import POSITIONS, stratified_numbers
-from swgjoint.fe.tolerances.sampling import respond_over_torque
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import with_perfect_teeth
@@ -41,7 +40,7 @@ class TurnOfDrive:
     """Torques of both signs and zero, increasing (n,) [N·m]."""
     output_error: Array
     """psi - theta/i, including the springs in series (n, P) [rad]; at zero torque the
-    middle of the clearance."""
+    middle of the clearance, NaN where superposition finds no equilibrium."""
 
     @property
     def kinematic_error(self) -> Array:
@@ -88,9 +87,9 @@ def sample_turn(
     phases = rings.phases.tolist()
     table = np.mean(
         [
-            respond_over_torque(
+            superpose(
                 rings.linearise(model, phase, levels, errors), errors, levels, small
-            )[0][0]
+            )[0]
             for phase in phases
         ],
         axis=0,

@@ -166,7 +166,7 @@ class RingErrors:
             if stored is not None:
                 return stored
         rest = self.linearise(model, phase, levels, errors)
-        table, _ = respond_over_torque(rest, errors, levels, self.small)
+        table = superpose(rest, errors, levels, self.small)
         if not np.isfinite(table).all():
             lost = int(np.isnan(table).any(axis=(0, 1)).sum())
             raise ComputationError(
@@ -261,6 +261,24 @@ class RingErrors:
                 f" {theta:.4g} rad: {state.outcome.value}"
             )
         return state
+
+
+def superpose(
+    rest: Rest, errors: tuple[Array, ...], levels: Array, small: float
+) -> Array:
+    """Output angle, energy and compliance with errors (3, n_torques, n_sets).
+
+    All three are NaN if the compliance is not positive: the tangent under load with the
+    contacts that carry load is then not stable, so its solution is no equilibrium.
+
+    Args:
+        rest: Rings linearised under torques of both signs.
+        errors: Sets of errors, see :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+        levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
+        small: Torque that takes up the clearance [N·m].
+    """
+    table, _ = respond_over_torque(rest, errors, levels, small)
+    return np.where(table[2] > 0.0, table, np.nan)
 
 
 def _main_harmonics(table: Array, shares: int) -> tuple[Array, Index]:

@@ -182,3 +182,20 @@ def test_an_interrupted_map_with_errors_resumes_bit_for_bit(monkeypatch, tmp_pat
     for key in ("output_error", "input_torque"):
         pair = (getattr(s.tolerances.solved, key) for s in (whole, again))
         assert np.array_equal(*pair)
+
+
+def test_unstable_superpositions_are_no_equilibria(monkeypatch):
+    """Sets of errors with a negative compliance have no result, the others keep it.
+
+    Size 25 with 21.7 um of clearance had K1 = -294 N·m/rad for one drive of a lot.
+    """
+    table = np.arange(1.0, 25.0).reshape(3, 2, 4)
+    table[2, 1, 2] = -0.009
+    monkeypatch.setattr(
+        ring_tolerances, "respond_over_torque", lambda *_: (table.copy(), 0)
+    )
+    found = ring_tolerances.superpose(None, (), np.array([1.0]), 0.1)
+    assert np.isnan(found[:, 1, 2]).all()
+    kept = np.ones((2, 4), dtype=bool)
+    kept[1, 2] = False
+    assert np.array_equal(found[:, kept], table[:, kept])
