@@ -104,10 +104,11 @@ def test_map_of_the_bundled_drive_meets_full_solves():
         here = solved.torque == torque
         heights = map(np.ptp, of_map(everywhere, np.full(1000, torque)))
         wrong = (apart[here], (moment - solved.input_torque)[here])
-        for height, difference in zip(heights, wrong, strict=True):
+        # at 31 N·m the output error has corners between two levels; the harmonics that
+        # the map leaves out are 1.5 % of the input torque
+        for height, difference, rms in zip(heights, wrong, (0.03, 0.026), strict=True):
             assert np.abs(difference).max() < 0.1 * height
-            # the harmonics that a map leaves out are 30 % (rms) of the input torque
-            assert np.sqrt(np.mean(difference**2)) < 0.045 * height
+            assert np.sqrt(np.mean(difference**2)) < rms * height
 
 
 def test_map_survives_its_file(drive, tmp_path):
