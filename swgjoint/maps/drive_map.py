@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -108,6 +108,45 @@ class DriveMap(Potential):
 
         return map_from_catalogue(
             name, cls, kinematic_error_arcmin=kinematic_error_arcmin, seed=seed
+        )
+
+    @classmethod
+    def from_numbers(
+        cls,
+        *,
+        stiffness: float | Sequence[float],
+        rated_torque: float,
+        **options: Any,
+    ) -> Self:
+        """The map of a drive of which a few figures are known.
+
+        ``spec_sheet`` of the map finds the stated figures by the standard procedures.
+        A lost motion beyond that of the stiffness becomes a clearance, and a hysteresis
+        loss beyond the clearance becomes friction.
+
+        Args:
+            stiffness: Torsional stiffness, or K1, K2 and K3 [N·m/rad].
+            rated_torque: Rated torque [N·m].
+            **options: ``ratio`` (default 100); ``lost_motion_arcmin``;
+                ``hysteresis_loss_arcmin``; ``kinematic_error``, amplitude [arcmin] by
+                order per input turn, zero to peak; ``T1``, ``T2``, ``repeated_peak``
+                and ``momentary_peak`` [N·m] (default 0.2, 0.6, 2 and 4 times the rated
+                torque); ``name``.
+
+        Raises:
+            InputError: If a figure is out of range or contradicts another one.
+
+        >>> from swgjoint import DriveMap
+        >>> drive = DriveMap.from_numbers(
+        ...     stiffness=3e4, rated_torque=50.0, lost_motion_arcmin=1.0
+        ... )
+        >>> round(drive.spec_sheet(["lost_motion_arcmin"])["lost_motion_arcmin"], 2)
+        1.0
+        """
+        from swgjoint.maps.from_numbers import map_from_numbers
+
+        return map_from_numbers(
+            cls, stiffness=stiffness, rated_torque=rated_torque, **options
         )
 
     @classmethod

@@ -262,6 +262,7 @@ def _no_record(drive: Potential) -> str:
         "linear": "a constant stiffness",
         "catalogue": "figures of a catalogue",
         "measurement": "a measurement",
+        "numbers": "stated figures",
     }
     if drive.level in sources:
         return f"the map comes from {sources[drive.level]}"
