@@ -152,6 +152,7 @@ def test_coarse_maps_meet_unseen_solves(name):
 
 @pytest.mark.fe
 @pytest.mark.slow
+@pytest.mark.timeout(2400)  # conforming flanks: 2656 equilibria in 600 s
 @pytest.mark.parametrize("name", DESIGNS)
 def test_bundled_maps_meet_unseen_solves(name):
     """All bundled 2D designs meet the goal."""
