@@ -197,13 +197,10 @@ def _with_loop(
             torque = max(0.0, torque + 0.5 * K[0] * missing)
             off.append(missing / loss)
         if np.abs(off).max() < CLOSE:
-            stated = {"lost_motion_arcmin": lost, "hysteresis_loss_arcmin": loss}
-            words = ", ".join(
-                f"{key} = {value / arcmin:g}"
-                for key, value in stated.items()
-                if value is not None
-            )
-            return replace(drive, info={**drive.info, "hysteresis": f"stated: {words}"})
+            if loss is None:
+                return drive
+            label = f"stated: {loss / arcmin:g} arcmin"
+            return replace(drive, info={**drive.info, "hysteresis": label})
     raise InputError(
         f"stated figures: found no drive with stiffness {K[0]:g}, {K[1]:g} and {K[2]:g}"
         f" N·m/rad, lost motion {(lost or 0.0) / arcmin:g} and hysteresis loss"
