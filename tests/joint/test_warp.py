@@ -18,6 +18,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import TwinMotion, scheme_force
 from swgjoint.joint.step_damping import damp_as_asked
+from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 
@@ -337,22 +338,93 @@ def test_what_is_not_held_is_refused(synthetic_map):
         InputError, match=naming("MuJoCo Warp", "passive callback", "none")
     ):
         warp.install(both.m, both.d, both.plain, both.drives)
-    with pytest.raises(
-        InputError,
-        match=naming(
-            "joint 'j'", "MuJoCo Warp", "variable=False", "Variation.apply_to"
-        ),
-    ):
-        Both(PAIR, synthetic_map, variable=True)
+
+
+def test_every_world_has_its_own_specimen(drive):
+    """Worlds with deviations move as worlds with the maps that the deviations give.
+
+    Both in double precision from the same single-precision state: the rounding of sums
+    in another order is all that may differ. The plugin's specimen stands beside them.
+    """
+    rng = np.random.default_rng(8)
+    rows = [
+        Variation(stiffness=s, kinematic_error=e, theta=a, psi=b, losses=f)
+        for s, e, a, b, f in rng.uniform(-0.4, 0.4, (3, 5))
+    ]
+    both = Both(PAIR, drive, worlds=3, variable=True, damping_ratio=0.0)
+    both.call.specimens.assign([[row.numbers] for row in rows])
+    tendon = both.model.tendon(both.drives[0].tendon).id
+    both.model.tendon_user[tendon][:5] = rows[0].numbers
+    order = np.argsort(both.pair(both.drives[0]))
+    start = np.zeros(2), np.array([20.0, 0.0])[order], np.array([0.0, 24.0])[order]
+    both.put(*start)
+    alone = [Both(PAIR, row.apply_to(drive), damping_ratio=0.0) for row in rows]
+    for one in alone:
+        one.put(*start)
+    for _ in range(60):
+        mujoco.mj_step(both.model, both.data)
+        mjw.step(both.m, both.d)
+        for one in alone:
+            mjw.step(one.m, one.d)
+    ends = both.d.qpos.numpy()
+    want = np.concatenate([one.d.qpos.numpy() for one in alone])
+    assert np.ptp(ends, axis=0).min() > 3e-5  # the worlds differ
+    np.testing.assert_allclose(ends, want, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(ends[0], both.data.qpos, rtol=0, atol=1e-6)
+
+
+def test_deviations_in_the_model_hold_in_every_world(synthetic_map):
+    """A specimen written into the compiled model is that of all worlds at first."""
+    spec = mujoco.MjSpec.from_string(PAIR)
+    one = attach(
+        spec, joint="j", drive=synthetic_map, rotor_inertia=4e-5, variable=True
+    )
+    plain = warp.without_plugin(spec)
+    plain.tendon_user[plain.tendon(one.tendon).id][:5] = (0.1, -0.2, 0.3, 0.4, -0.5)
+    with wp.ScopedDevice("cpu"):
+        m, d = mjw.put_model(plain), mjw.make_data(plain, nworld=2)
+    call = warp.install(m, d, plain, [one])
+    np.testing.assert_array_equal(
+        call.specimens.numpy(), [[(0.1, -0.2, 0.3, 0.4, -0.5)]] * 2
+    )
+
+
+def test_torsion_and_torque_of_a_step_are_on_the_device(drive):
+    """Torsion is that of the map, torque accelerates the link together with the load.
+
+    The link's acceleration is a difference of single-precision speeds: 0.4 kg·m² times
+    their resolution of 1e-8 rad/s over a step of 1 ms are 5e-6 N·m, and 2e-5 rad·K.
+    """
+    both = Both(PAIR, drive, worlds=2)
+    pair = both.pair(both.drives[0])
+    order, load = np.argsort(pair), 24.0
+    both.put(np.zeros(2), np.array([20.0, 0.1])[order], np.array([0.0, load])[order])
+    speeds, torque = [], []
+    for _ in range(40):
+        positions = both.d.qpos.numpy()[0][pair].astype(float)
+        speeds.append(both.d.qvel.numpy()[0][pair[1]])
+        mjw.step(both.m, both.d)
+        torque.append(both.call.torque.numpy()[0, 0])
+    assert both.call.torsion.numpy()[0, 0] == pytest.approx(
+        drive.torsion(*positions), rel=1e-6, abs=1e-9
+    )
+    rates = np.diff(np.array(speeds, float)) / 1e-3
+    assert torque[0] == 0.0
+    np.testing.assert_allclose(torque[1:], 0.4 * rates - load, rtol=0, atol=1e-3)
+    assert np.ptp(torque) > 5.0
+    mjw.reset_data(both.m, both.d)
+    mjw.forward(both.m, both.d)
+    assert not both.call.torque.numpy().any()
 
 
 def test_the_example_of_the_module_runs():
-    """Four lines from a spec to a step, as its docstring shows them."""
+    """From a spec to a step and to specimens, as its docstring shows them."""
     lines = (warp.__doc__ or "").splitlines()
     code = textwrap.dedent("\n".join(line for line in lines if line.startswith("    ")))
     names = {"spec": mujoco.MjSpec.from_string(PAIR), "drive_map": DriveMap.linear(2e4)}
     names |= {"swgjoint": swgjoint, "mjw": mjw}
     names |= {name: getattr(warp, name) for name in ("without_plugin", "install")}
+    names["variations"] = [Variation(stiffness=0.1), Variation()]
     with wp.ScopedDevice("cpu"):
         exec(code.replace("4096", "2"), names)
     assert names["d"].time.numpy() == pytest.approx(2 * [1e-3])

@@ -8,13 +8,16 @@ step, for many worlds at once, see :mod:`swgjoint.joint.reference`::
     drive = swgjoint.attach(spec, joint="j", drive=drive_map, rotor_inertia=4e-5)
     model = without_plugin(spec)
     m, d = mjw.put_model(model), mjw.make_data(model, nworld=4096)
-    install(m, d, model, [drive])
+    call = install(m, d, model, [drive])
     mjw.step(m, d)  # also inside a captured graph
 
 The callback implements the complete law: potential with all harmonics, kinematic error,
 hysteresis, friction and damping. All integrators except ``discrete`` are rejected.
-Drives that were attached as ``variable`` are rejected because all worlds have the same
-map.
+``install`` returns the callback, :class:`WarpDrives`. Its device arrays are the torsion
+and torque of every drive in every world, and the deviations of each drive from its map,
+so that every world may have its own specimens::
+
+    call.specimens.assign([[specimen.numbers] for specimen in variations])
 
 The law is evaluated in double precision, but the engine's state has single precision:
 the relative rounding error of a position is 6e-8, which causes torque noise of about
@@ -34,6 +37,7 @@ import numpy as np
 from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.joint import plugin
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.variation import SIZE
 from swgjoint.maps.drive_map import DriveMap
 
 try:
@@ -60,7 +64,18 @@ def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 class WarpDrives:
-    """Callback that adds drives to a Warp model for a fixed number of worlds."""
+    """Callback that adds drives to a Warp model for a fixed number of worlds.
+
+    Attributes:
+        specimens: Deviations of every drive in every world from its map, in the order
+            of :class:`~swgjoint.joint.variation.Variation`; may be written at any time.
+            Shape (worlds, drives), of 5 values each.
+        torsion: Torsion of every drive at the positions of the last evaluation [rad],
+            hence at the beginning of the last step, as for MuJoCo's sensors.
+            Shape (worlds, drives).
+        torque: Torque of every drive on its link, mean of the step that ended there
+            [N·m]. Shape (worlds, drives).
+    """
 
     def __init__(
         self,
@@ -93,6 +108,13 @@ class WarpDrives:
                 array = wp.array(np.concatenate(part), dtype=kind)
                 setattr(self.maps, key, array)
             self.drives = wp.array(rows, dtype=WarpDrive)
+            own = [_deviations(model, drive) for drive in drives]
+            self.specimens = wp.array(
+                np.broadcast_to(np.reshape(own, (-1, SIZE)), (worlds, len(own), SIZE)),
+                dtype=vec5,
+            )
+            self.torsion = wp.zeros((worlds, len(rows)), dtype=float)
+            self.torque = wp.zeros((worlds, len(rows)), dtype=float)
             elements = sum(len(part) for part in parts["element"])
             self.rest = wp.zeros((worlds, max(2 * elements, 1)), dtype=real)
             unknown = WarpStep()
@@ -129,6 +151,7 @@ class WarpDrives:
                 real(float(damped)),
                 self.drives,
                 self.maps,
+                self.specimens,
                 self.weight,
                 d.time,
                 d.nefc,
@@ -138,7 +161,15 @@ class WarpDrives:
                 d.qvel,
                 d.ten_velocity,
             ],
-            outputs=[self.steps, self.rest, d.ten_J, d.ten_length, d.qfrc_passive],
+            outputs=[
+                self.steps,
+                self.rest,
+                d.ten_J,
+                d.ten_length,
+                d.qfrc_passive,
+                self.torsion,
+                self.torque,
+            ],
         )
 
 
@@ -156,7 +187,7 @@ def install(m: Any, d: Any, model: mujoco.MjModel, drives: Sequence[JointDrive])
 
     Raises:
         InputError: If the integrator is not ``discrete``, the model already has a
-            passive callback, a drive is not in the model, or a drive is ``variable``.
+            passive callback, or a drive is not in the model.
     """
     integrator = mujoco.mjtIntegrator(int(m.opt.integrator))
     if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
@@ -186,12 +217,6 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
             f"joint {drive.joint!r}: its drive is not in the model: {error}; accepted:"
             " the model of without_plugin(spec)"
         ) from error
-    if drive.variable or model.tendon_user[tendon].any():
-        raise InputError(
-            f"joint {drive.joint!r}: its drive may deviate from its map through user"
-            " data of the model, which MuJoCo Warp does not read; accepted:"
-            " variable=False, with the map of Variation.apply_to for another specimen"
-        )
     one = WarpDrive()
     one.tendon = tendon
     one.q_rotor, one.q_link = int(rotor.qposadr[0]), int(link.qposadr[0])
@@ -209,6 +234,12 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
         one.b_theta, one.b_psi, one.bristle, one.creep, one.coulomb = numbers[:5]
         one.stiction, one.stribeck, one.viscous, one.load = numbers[5:]
     return one
+
+
+def _deviations(model: mujoco.MjModel, drive: JointDrive) -> np.ndarray:
+    """Deviations of a drive from its map in the model, or zeros. Shape (5,)."""
+    user = model.tendon_user[model.tendon(drive.tendon).id]
+    return user[:SIZE] if len(user) >= SIZE else np.zeros(SIZE)
 
 
 def _arrays(drive: DriveMap) -> dict[str, np.ndarray]:

@@ -49,6 +49,7 @@ def slip(
     drive: WarpDrive,
     maps: Maps,
     j: int,
+    losses: real,
     elastic: real,
     rest: real,
     limit: real,
@@ -60,11 +61,12 @@ def slip(
         drive: Drive of the element.
         maps: Maps of all drives.
         j: Index of the element.
+        losses: Factor of the torques of all elements [-].
         elastic: Mean elastic torque of the step [N·m].
         rest: Torsion at which the element is relaxed [rad].
         limit: Yield torsion in the last step [rad]; zero if there was none.
     """
-    stiffness = maps.element[j, 0]
+    stiffness = losses * maps.element[j, 0]
     reach = reach_at(drive, maps, j, elastic)
     begin = s.begin - rest
     if limit > ZERO:

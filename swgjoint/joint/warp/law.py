@@ -8,6 +8,7 @@ one thread per drive and world.
 import warp as wp
 
 from swgjoint.joint import plugin
+from swgjoint.joint.warp.friction import Rub, rub_over, scale_losses, stretch_after
 from swgjoint.joint.warp.hysteresis import relax, slip
 from swgjoint.joint.warp.potential import (
     HALF,
@@ -18,26 +19,16 @@ from swgjoint.joint.warp.potential import (
     WarpDrive,
     real,
     secant_over,
+    torsion_at,
+    vec5,
 )
 
 _SPRING, _, _CUBIC = plugin.TENDON_STIFFNESS
 SPRING, CUBIC = wp.constant(real(_SPRING)), wp.constant(real(_CUBIC))
 FRICTION_CUBIC = wp.constant(real(plugin.FRICTION_STIFFNESS[2]))
 NU1 = wp.constant(real(plugin.NUMERICAL_DAMPING))
+LEAST_LOSSES = wp.constant(real(1e-6))  # keeps the bristle's stiffness above zero
 PASSES = wp.constant(plugin.PASSES)
-
-
-@wp.struct
-class Rub:
-    """Friction of one step, as :class:`~swgjoint.joint.friction_step.FrictionStep`."""
-
-    stretch: real
-    reach: real
-    offset: real
-    rate: real
-    force: real
-    metric: real
-    predicted: real
 
 
 @wp.struct
@@ -72,78 +63,6 @@ class WarpStep:
     """Angle beta at which the bristle is relaxed [rad]."""
     known: int
     """Whether ``relaxed`` is known."""
-
-
-@wp.func
-def rub_over(
-    drive: WarpDrive,
-    stretch: real,
-    yield_torque: real,
-    speed: real,
-    free: real,
-    response: real,
-    h: real,
-):
-    """Friction torque for the predicted step of a rotor-link pair, as a :class:`Rub`.
-
-    Args:
-        drive: Drive with the parameters of friction.
-        stretch: Bristle stretch before the step [rad].
-        yield_torque: Yield torque in this step [N·m].
-        speed: Relative speed at the beginning of the step [rad/s].
-        free: Change of that speed without friction [rad/s].
-        response: Reduction of that speed per friction torque [rad/s per N·m].
-        h: Step h [s].
-    """
-    out = Rub()
-    sigma = drive.bristle
-    out.reach = yield_torque / sigma
-    z = wp.clamp(stretch, -out.reach, out.reach)
-    out.stretch = z
-    d = h * (speed + HALF * free)
-    k = HALF * h * response
-    m = ONE + HALF * response * drive.viscous
-    out.offset = sigma * z
-    out.rate = HALF * sigma + drive.creep / h
-    dx = (d - k * out.offset) / (m + k * out.rate)
-    if wp.abs(z + dx) > out.reach:
-        # sticks over the distance a, then slips; mean torque times dx is the exact work
-        sign = wp.where(dx > ZERO, ONE, -ONE)
-        a = out.reach - sign * z
-        creep = drive.creep * a / h
-        b = sign * d - k * (yield_torque + creep)
-        c = k * sigma * a * a
-        root = wp.sqrt(b * b + real(2.0) * m * c)
-        way = wp.where(b > ZERO, HALF * (b + root) / m, c / (root - b))
-        mean = sign * (yield_torque - HALF * sigma * a * a / way + creep)
-        dx = sign * way
-        # linear in the true dx, and cannot return more energy than is stored
-        out.rate = HALF * sigma
-        out.offset = mean - out.rate * dx
-        if wp.abs(out.offset) > sigma * wp.abs(z):
-            out.offset = ZERO
-            out.rate = mean / dx
-    slope = out.rate + drive.viscous / h
-    out.force = out.offset + slope * h * speed
-    out.metric = HALF * slope
-    out.predicted = out.offset + slope * dx
-    return out
-
-
-@wp.func
-def stretch_after(drive: WarpDrive, rub: Rub, dx: real):
-    """Bristle stretch after the actual rotation of the step [rad].
-
-    Args:
-        drive: Drive with the parameters of friction.
-        rub: Linearised friction of the step.
-        dx: Actual relative rotation in the step [rad].
-    """
-    end = wp.clamp(rub.stretch + dx, -rub.reach, rub.reach)
-    work = (rub.offset + rub.rate * dx) * dx
-    stored = rub.stretch * rub.stretch + real(2.0) * work / drive.bristle
-    most = wp.sqrt(wp.max(ZERO, stored))
-    return wp.clamp(end, -most, most)
 
 
 @wp.kernel
@@ -222,11 +141,12 @@ def law(
     damped: real,
     drives: wp.array(dtype=WarpDrive),
     maps: Maps,
+    specimens: wp.array2d(dtype=vec5),
     weight: wp.array2d(dtype=float),
     time: wp.array(dtype=float),
     rows: wp.array(dtype=int),
     equalities: wp.array(dtype=int),
-    losses: wp.array(dtype=int),
+    friction_rows: wp.array(dtype=int),
     qpos: wp.array2d(dtype=float),
     qvel: wp.array2d(dtype=float),
     ten_velocity: wp.array2d(dtype=float),
@@ -235,6 +155,8 @@ def law(
     ten_J: wp.array2d(dtype=float),
     ten_length: wp.array2d(dtype=float),
     qfrc_passive: wp.array2d(dtype=float),
+    torsion: wp.array2d(dtype=float),
+    torque: wp.array2d(dtype=float),
 ):
     """Force, direction and stiffness of one drive in one world, as in ``drive.cc``.
 
@@ -243,11 +165,13 @@ def law(
         damped: 1 if the engine's dampers act, otherwise 0.
         drives: Drives of the model.
         maps: Maps of all drives.
+        specimens: Deviations from the maps, see
+            :class:`~swgjoint.joint.variation.Variation`. Shape (worlds, drives).
         weight: Result of :func:`respond` [1/(kg·m²)]. Shape (worlds, nv).
         time: Time of each world [s].
         rows: Number of constraint rows of each world.
         equalities: Number of these rows that are equalities.
-        losses: Number of these rows that are friction losses.
+        friction_rows: Number of these rows that are friction losses.
         qpos: Positions. Shape (worlds, nq).
         qvel: Velocities. Shape (worlds, nv).
         ten_velocity: Tendon velocities. Shape (worlds, ntendon).
@@ -256,9 +180,14 @@ def law(
         ten_J: Tendon Jacobians; gets the direction.
         ten_length: Tendon lengths; get the stiffness.
         qfrc_passive: Passive forces; get the force. Shape (worlds, nv).
+        torsion: Result, torsion at these positions [rad]. Shape (worlds, drives).
+        torque: Result, mean torque on the link in the step that ended here, zero after
+            a reset [N·m]. Shape (worlds, drives).
     """
     world, index = wp.tid()
-    drive = drives[index]
+    by = specimens[world, index]
+    losses = wp.max(ONE + by[4], LEAST_LOSSES)
+    drive = scale_losses(drives[index], losses)
     h = real(timestep[world % timestep.shape[0]])
     vm, vl = real(qvel[world, drive.v_rotor]), real(qvel[world, drive.v_link])
 
@@ -280,14 +209,21 @@ def law(
             last.known = 1
         last.a_rotor = rm / h + last.w_rotor * on_rotor
         last.a_link = rl / h + last.w_link * on_link
+        torque[world, index] = float(-on_link)
         relax(drive, maps, world, last.torsion, last.elastic, rest)
     if time[world] < last.time:
         last.a_rotor = ZERO
         last.a_link = ZERO
         last.known = 0
+        torque[world, index] = 0.0
         for j in range(drive.element, drive.element + drive.elements):
             rest[world, j] = ZERO
             rest[world, maps.element.shape[0] + j] = ZERO
+
+    angle = real(qpos[world, drive.q_rotor])
+    torsion[world, index] = float(
+        torsion_at(drive, maps, by, angle, real(qpos[world, drive.q_link]))
+    )
 
     # remove the torque of the tendon's native spring, which the engine has applied
     length = real(ten_length[world, drive.tendon])
@@ -305,8 +241,9 @@ def law(
     # the scheme is a midpoint rule in positions half a step back
     theta = real(qpos[world, drive.q_rotor]) - HALF * h * vm
     psi = real(qpos[world, drive.q_link]) - HALF * h * vl
+    begin = torsion_at(drive, maps, by, theta, psi)
     c = damped * drive.damping
-    if rows[world] > equalities[world] + losses[world]:
+    if rows[world] > equalities[world] + friction_rows[world]:
         # a contact or a limit acts
         c = wp.max(c, drive.contact_damping)
     dm, dl = real(0.0), real(0.0)
@@ -318,12 +255,19 @@ def law(
     turned = wp.where(last.known == 1, last.rotation - last.relaxed, ZERO)
     for _ in range(PASSES):
         s = secant_over(
-            drive, maps, theta, psi, h * (vm + HALF * dm), h * (vl + HALF * dl)
+            drive,
+            maps,
+            by,
+            begin,
+            theta,
+            psi,
+            h * (vm + HALF * dm),
+            h * (vl + HALF * dl),
         )
         last.elastic = s.torque
         for j in range(drive.element, drive.element + drive.elements):
             limit = rest[world, maps.element.shape[0] + j]
-            s = slip(s, drive, maps, j, last.elastic, rest[world, j], limit)
+            s = slip(s, drive, maps, j, losses, last.elastic, rest[world, j], limit)
         k = wp.max(ZERO, HALF * (s.k0 + s.k1))
         w = s.g_theta * s.g_theta * wm + s.g_psi * s.g_psi * wl
         ka = h * h * k * w

@@ -209,26 +209,30 @@ def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
 
 
 @wp.func
-def torsion_at(drive: WarpDrive, maps: Maps, theta: real, psi: real):
-    """Torsion theta/i + e0 - psi [rad].
+def torsion_at(drive: WarpDrive, maps: Maps, by: vec5, theta: real, psi: real):
+    """Torsion theta/i + (1 + r) e0(theta + a, psi + b) - psi [rad].
 
     Args:
         drive: The drive.
         maps: Maps of all drives.
+        by: Deviations of the specimen, see :mod:`swgjoint.joint.variation`.
         theta: Rotor angle [rad].
         psi: Link angle [rad].
     """
-    x = theta / drive.ratio - psi
+    at_theta, at_psi = theta + by[2], psi + by[3]
+    error = real(0.0)
     for k in range(drive.harmonic, drive.harmonic + drive.harmonics):
-        phase = maps.harmonic[k, 0] * theta + maps.harmonic[k, 1] * psi
-        x += maps.harmonic[k, 2] * wp.cos(phase) + maps.harmonic[k, 3] * wp.sin(phase)
-    return x
+        phase = maps.harmonic[k, 0] * at_theta + maps.harmonic[k, 1] * at_psi
+        error += maps.harmonic[k, 2] * wp.cos(phase)
+        error += maps.harmonic[k, 3] * wp.sin(phase)
+    return theta / drive.ratio + (ONE + by[1]) * error - psi
 
 
 @wp.func
 def weigh(
     drive: WarpDrive,
     maps: Maps,
+    by: vec5,
     segment: int,
     theta: real,
     psi: real,
@@ -240,6 +244,7 @@ def weigh(
     Args:
         drive: The drive.
         maps: Maps of all drives.
+        by: Deviations of the specimen, of which the potential's is not applied here.
         segment: Segment whose coefficients are used.
         theta: Rotor angle at the beginning of the step [rad].
         psi: Link angle at the beginning of the step [rad].
@@ -249,11 +254,12 @@ def weigh(
     out = Sums()
     out.g_theta = ONE / drive.ratio
     out.g_psi = -ONE
+    at_theta, at_psi = theta + by[2], psi + by[3]
     for k in range(drive.harmonics):
         n_theta = maps.harmonic[drive.harmonic + k, 0]
         n_psi = maps.harmonic[drive.harmonic + k, 1]
         eta = HALF * (n_theta * dtheta + n_psi * dpsi)
-        phase = n_theta * theta + n_psi * psi + eta  # middle of the step
+        phase = n_theta * at_theta + n_psi * at_psi + eta  # middle of the step
         sinc = ONE - eta * eta / real(6.0)
         if wp.abs(eta) > real(1e-4):
             sinc = wp.sin(eta) / eta
@@ -264,9 +270,13 @@ def weigh(
         secant = sinc * (c * b - s * a)
         out.by_theta += n_theta * secant
         out.by_psi += n_psi * secant
-        error = sinc * (
-            c * maps.harmonic[drive.harmonic + k, 3]
-            - s * maps.harmonic[drive.harmonic + k, 2]
+        error = (
+            (ONE + by[1])
+            * sinc
+            * (
+                c * maps.harmonic[drive.harmonic + k, 3]
+                - s * maps.harmonic[drive.harmonic + k, 2]
+            )
         )
         out.g_theta += n_theta * error
         out.g_psi += n_psi * error
@@ -275,57 +285,69 @@ def weigh(
 
 @wp.func
 def secant_over(
-    drive: WarpDrive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
+    drive: WarpDrive,
+    maps: Maps,
+    by: vec5,
+    begin: real,
+    theta: real,
+    psi: real,
+    dtheta: real,
+    dpsi: real,
 ):
     """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``.
 
     Args:
         drive: The drive.
         maps: Maps of all drives.
-        theta: Rotor angle at the beginning of the step [rad].
-        psi: Link angle at the beginning of the step [rad].
+        by: Deviations of the specimen, see :mod:`swgjoint.joint.variation`.
+        begin: Torsion at the beginning of the step [rad].
+        theta: Rotor angle there [rad].
+        psi: Link angle there [rad].
         dtheta: Change of the rotor angle [rad].
         dpsi: Change of the link angle [rad].
     """
     out = Secant()
-    out.begin = torsion_at(drive, maps, theta, psi)
+    out.begin = begin
     j0 = segment_at(drive, maps, out.begin)
     d0 = out.begin - maps.segment[drive.segment + j0, 2]
-    sums = weigh(drive, maps, j0, theta, psi, dtheta, dpsi)
+    sums = weigh(drive, maps, by, j0, theta, psi, dtheta, dpsi)
     out.g_theta = sums.g_theta
     out.g_psi = sums.g_psi
     out.change = sums.g_theta * dtheta + sums.g_psi * dpsi
     x1 = out.begin + out.change
     j1 = segment_at(drive, maps, x1)
     d1 = x1 - maps.segment[drive.segment + j1, 2]
-    last = weigh(drive, maps, j1, theta, psi, dtheta, dpsi)
+    last = sums
     if j0 == j1:
         out.torque = divided_difference(sums.mean, d0, d1)
         out.slope = divided_slope(sums.mean, d0, d1)
     else:
         # sum the work segment by segment, to avoid differences of large energies
+        last = weigh(drive, maps, by, j1, theta, psi, dtheta, dpsi)
         work = real(0.0)
-        begin = real(out.begin)
+        at = real(begin)
         j = int(j0)
         for _ in range(wp.abs(j1 - j0) + 1):
-            piece = weigh(drive, maps, j, theta, psi, dtheta, dpsi)
+            piece = weigh(drive, maps, by, j, theta, psi, dtheta, dpsi)
             base = maps.segment[drive.segment + j, 2]
             to = x1
             if j < j1:
                 to = maps.segment[drive.segment + j, 1]
             if j > j1:
                 to = maps.segment[drive.segment + j, 0]
-            work += divided_difference(piece.mean, begin - base, to - base) * (
-                to - begin
-            )
-            begin = to
+            work += divided_difference(piece.mean, at - base, to - base) * (to - at)
+            at = to
             j += wp.where(j1 > j0, 1, -1)
         out.torque = work / out.change
         out.slope = (slope(last.mean, d1) - out.torque) / out.change
     out.k0 = curvature(sums.mean, d0)
     out.k1 = curvature(last.mean, d1)
     low, high = HALF * wp.min(out.k0, out.k1), HALF * wp.max(out.k0, out.k1)
-    out.slope = wp.clamp(out.slope, low, high)
-    out.e_theta = HALF * (value(sums.by_theta, d0) + value(last.by_theta, d1))
-    out.e_psi = HALF * (value(sums.by_psi, d0) + value(last.by_psi, d1))
+    size = ONE + by[0]
+    out.torque *= size
+    out.slope = size * wp.clamp(out.slope, low, high)
+    out.k0 *= size
+    out.k1 *= size
+    out.e_theta = HALF * size * (value(sums.by_theta, d0) + value(last.by_theta, d1))
+    out.e_psi = HALF * size * (value(sums.by_psi, d0) + value(last.by_psi, d1))
     return out
