@@ -6,7 +6,15 @@ class Limits:
     ) -> None: ...
 
 class Flank:
-    def __init__(self, pieces: Array, edges: Array, side: float) -> None: ...
+    def __init__(
+        self,
+        pieces: Array,
+        edges: Array,
+        intervals: Index,
+        stations: Array,
+        coefficients: Array,
+        side: float,
+    ) -> None: ...
 
 class Search:
     def __init__(

@@ -13,8 +13,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 Profile::Profile(const double* table, std::size_t pieces, const double* edges,
-                 std::size_t n_edges, double side)
+                 std::size_t n_edges, const Curves& curves, double side)
     : side_(side) {
+  std::size_t nodes = 0, polynomials = 0;
   stations_.push_back(0.0);
   for (std::size_t k = 0; k < pieces; ++k) {
     const double* row = table + kColumns * k;
@@ -27,7 +28,15 @@ Profile::Profile(const double* table, std::size_t pieces, const double* edges,
     piece.sign = row[8];
     piece.first = row[9];
     piece.last = row[10];
-    if (piece.radius == 0.0) {
+    piece.curve = -1;
+    if (curves.intervals[k] > 0) {
+      const auto intervals = static_cast<std::size_t>(curves.intervals[k]);
+      piece.curve = static_cast<int>(curves_.size());
+      curves_.emplace_back(curves.stations + nodes,
+                           curves.coefficients + 12 * polynomials, intervals, side);
+      nodes += intervals + 1;
+      polynomials += intervals;
+    } else if (piece.radius == 0.0) {
       piece.direction = {(piece.end.x - piece.start.x) / piece.length,
                          (piece.end.y - piece.start.y) / piece.length};
       piece.normal = {side * -piece.direction.y, side * piece.direction.x};
@@ -53,6 +62,7 @@ At Profile::evaluate(double s) const {
   const std::size_t k = interval_of(stations_.data(), stations_.size(), s);
   const Piece& piece = pieces_[k];
   const double along = s - stations_[k];
+  if (piece.curve >= 0) return curves_[piece.curve].evaluate(along);
   if (piece.radius == 0.0) {
     return {{piece.start.x + along * piece.direction.x,
              piece.start.y + along * piece.direction.y},
@@ -67,8 +77,11 @@ At Profile::evaluate(double s) const {
           piece.curvature};
 }
 
-double Profile::project(const Piece& piece, Vec point, Vec* normal,
+double Profile::project(const Piece& piece, Vec point, Vec* normal, double* curvature,
                         bool* inside) const {
+  if (piece.curve >= 0)
+    return curves_[piece.curve].project(point, normal, curvature, inside);
+  *curvature = piece.curvature;
   if (piece.radius == 0.0) {
     const Vec rel = point - piece.start;
     const double along = dot(rel, piece.direction);
@@ -94,12 +107,13 @@ double Profile::signed_distance(Vec point, Vec* normal, double* curvature) const
   *curvature = 0.0;
   for (const Piece& piece : pieces_) {
     Vec here;
+    double bend;
     bool inside;
-    const double distance = project(piece, point, &here, &inside);
+    const double distance = project(piece, point, &here, &bend, &inside);
     if (inside && std::abs(distance) < std::abs(best)) {
       best = distance;
       *normal = here;
-      *curvature = piece.curvature;
+      *curvature = bend;
     }
   }
   for (const Edge& edge : edges_) {
@@ -114,12 +128,6 @@ double Profile::signed_distance(Vec point, Vec* normal, double* curvature) const
     }
   }
   return best;
-}
-
-std::size_t interval_of(const double* breaks, std::size_t n, double s) {
-  const auto k = std::upper_bound(breaks, breaks + n, s) - breaks - 1;
-  return static_cast<std::size_t>(
-      std::clamp<std::ptrdiff_t>(k, 0, static_cast<std::ptrdiff_t>(n) - 2));
 }
 
 double interpolate(const double* at, const double* value, std::size_t n, double x) {

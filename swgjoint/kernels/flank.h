@@ -1,4 +1,5 @@
-// Tooth profiles of circular arcs and straight lines, and interpolation in tables.
+// Tooth profiles of circular arcs, straight lines and smooth curves, and interpolation in
+// tables.
 //
 // The formulas are those of swgjoint/gear/teeth/profile.py and segments.py, which are
 // the reference for these functions. Lengths are in metres.
@@ -6,35 +7,21 @@
 #ifndef SWGJOINT_KERNELS_FLANK_H_
 #define SWGJOINT_KERNELS_FLANK_H_
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "smooth_curve.h"
+#include "vec.h"
+
 namespace swgjoint {
 
-struct Vec {
-  double x, y;
-};
-
-inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y}; }
-inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y}; }
-inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y; }
-// of lengths of a gear, far from overflow
-inline double size(Vec a) { return std::sqrt(dot(a, a)); }
-
-// Point, outward unit normal and signed curvature of a flank at one arc length.
-struct At {
-  Vec point, normal;
-  double curvature;
-};
-
-// One arc or straight line: a row of ToothProfile.pieces.
+// One arc, straight line or smooth curve: a row of ToothProfile.pieces.
 struct Piece {
   Vec start, end;
   double length;
   Vec centre;
-  double radius;  // zero for a straight line
+  double radius;  // zero except for an arc
   double sign;    // +1 convex, -1 concave
   double first, last;  // polar angles of start and end about the centre [rad]
 
@@ -45,6 +32,15 @@ struct Piece {
   Vec middle;
   double half_cos, half_sin, curvature;
   bool wide;  // whether half the angle exceeds a right angle
+  int curve;  // index of the smooth curve; -1 for an arc or a straight line
+};
+
+// Smooth curves of a profile, one after the other: the number of intervals of every piece
+// (zero for an arc or a straight line), arc lengths of the nodes, and coefficients.
+struct Curves {
+  const std::int64_t* intervals;
+  const double* stations;
+  const double* coefficients;
 };
 
 // Corner between two pieces, with the directions of the profile before and after it.
@@ -57,7 +53,7 @@ class Profile {
   // table: rows of ToothProfile.pieces (pieces, 11); edges: rows of ToothProfile.edges
   // (n_edges, 6); side: +1 for external, -1 for internal teeth
   Profile(const double* table, std::size_t pieces, const double* edges,
-          std::size_t n_edges, double side);
+          std::size_t n_edges, const Curves& curves, double side);
 
   At evaluate(double s) const;
 
@@ -68,17 +64,15 @@ class Profile {
   double side() const { return side_; }
 
  private:
-  double project(const Piece& piece, Vec point, Vec* normal, bool* inside) const;
+  double project(const Piece& piece, Vec point, Vec* normal, double* curvature,
+                 bool* inside) const;
 
   std::vector<Piece> pieces_;
+  std::vector<SmoothCurve> curves_;
   std::vector<double> stations_;
   std::vector<Edge> edges_;
   double side_;
 };
-
-// Index of the interval, between n increasing breaks, that contains s. The first and
-// the last interval also contain the values beyond the breaks.
-std::size_t interval_of(const double* breaks, std::size_t n, double s);
 
 // Piecewise linear interpolation at x between n values at increasing points; constant
 // beyond the ends.

@@ -3,53 +3,17 @@
 // checked here, because a wrong one would read or write beyond the end of an array.
 
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "complementarity.h"
 #include "ellipse.h"
-#include "flank.h"
+#include "flank_arrays.h"
 #include "ring_factor.h"
 #include "tangents.h"
 #include "tooth_search.h"
 
-namespace nb = nanobind;
-
 namespace {
-
-template <int N>
-using In = nb::ndarray<const double, nb::ndim<N>, nb::c_contig, nb::device::cpu>;
-template <int N>
-using Out = nb::ndarray<double, nb::ndim<N>, nb::c_contig, nb::device::cpu>;
-using Index = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using IndexOut = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using MaskOut = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Mask = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using MasksOut = nb::ndarray<bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
-void require(bool fits, const char* what) {
-  if (!fits) throw std::invalid_argument(what);
-}
-
-// A tooth profile.
-struct Flank {
-  swgjoint::Profile profile;
-  Flank(In<2> table, In<2> edges, double side)
-      : profile(checked(table, 11, "pieces: (n, 11)"), table.shape(0),
-                checked(edges, 6, "edges: (n, 6)"), edges.shape(0), side) {
-    require(table.shape(0) > 0, "pieces: none");
-  }
-
- private:
-  // before the profile reads the rows
-  static const double* checked(const In<2>& rows, std::size_t columns,
-                               const char* what) {
-    require(rows.shape(1) == columns, what);
-    return rows.data();
-  }
-};
 
 // The search at one state. It holds references to the arrays that it reads.
 class Search {
@@ -377,8 +341,9 @@ NB_MODULE(compiled, m) {
           nb::kw_only(), nb::arg("corner"), nb::arg("beyond"), nb::arg("refined"),
           nb::arg("refinements"));
   nb::class_<Flank>(m, "Flank")
-      .def(nb::init<In<2>, In<2>, double>(), nb::arg("pieces"), nb::arg("edges"),
-           nb::arg("side"));
+      .def(nb::init<In<2>, In<2>, Index, In<1>, In<3>, double>(), nb::arg("pieces"),
+           nb::arg("edges"), nb::arg("intervals"), nb::arg("stations"),
+           nb::arg("coefficients"), nb::arg("side"));
   nb::class_<Search>(m, "Search")
       .def(nb::init<const Flank&, In<1>, In<3>, double, double, const Flank&, In<1>,
                     In<1>, In<1>, In<4>, std::int64_t, std::int64_t, In<1>, In<1>,

@@ -23,6 +23,8 @@ CASES = {
     "rigid circular spline": ("reference-2d", {"elastic_circular_spline": False}),
     "asymmetric": ("reference-2d-asymmetric", {}),
     "fixed flexspline": ("reference-2d-flexspline-fixed", {}),
+    "involute": ("reference-2d-involute", {}),
+    "conjugate": ("dca-80-to-1", {}),
 }
 
 
@@ -122,15 +124,6 @@ def test_minima_are_refined_as_in_numpy(contact, monkeypatch):
     assert (corner.sum() > 100) == (search.circular_spline.flank_dofs > 0)
 
 
-def test_other_curves_are_left_to_numpy():
-    """A profile with an involute has no table of arcs and lines."""
-    design = Design.load("reference-2d-involute").with_changes({"mesh.refinement": 0.5})
-    model = sector_model(design, half=True)
-    search = linearise(model, model.initial_guess(), None).search
-    assert search.element.profile.pieces is None
-    assert search._compiled is None
-
-
 def test_arrays_that_do_not_fit_are_refused(contact):
     """Nothing is read or written beyond an array, whatever the caller passes."""
     search = contact[0]._compiled.search
@@ -162,6 +155,20 @@ def test_arrays_that_do_not_fit_are_refused(contact):
             see(**wrong)
     with pytest.raises(ValueError):
         search.refine(np.zeros(3), np.zeros((3, 2, 2)), index, index, 1e-5)
-    for pieces, edges in (((2, 3), (0, 6)), ((2, 11), (1, 5)), ((0, 11), (0, 6))):
+    arrays = np.zeros((2, 11)), np.zeros((0, 6))
+    curves = np.array([0, 2]), np.arange(3.0), np.zeros((2, 6, 2))
+    kernels().Flank(*arrays, *curves, 1.0)
+    for k, wrong in (
+        (0, np.zeros((2, 3))),
+        (0, np.zeros((0, 11))),
+        (1, np.zeros((1, 5))),
+        (2, np.array([0, 3])),
+        (2, np.array([3, -1])),
+        (2, np.array([2])),
+        (3, np.arange(2.0)),
+        (4, np.zeros((2, 5, 2))),
+    ):
+        given = [*arrays, *curves]
+        given[k] = wrong
         with pytest.raises(ValueError):
-            kernels().Flank(np.zeros(pieces), np.zeros(edges), 1.0)
+            kernels().Flank(*given, 1.0)

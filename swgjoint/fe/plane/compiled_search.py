@@ -92,13 +92,12 @@ class CompiledSearch:
                 ``swgjoint.kernels.compiled.Limits``.
 
         Returns:
-            The search; None if there are no compiled loops, or if a profile contains
-            pieces other than circular arcs and straight lines.
+            The search; None if there are no compiled loops.
         """
         native = kernels()
-        profile, facing = element.profile, circular_spline.profile
-        if native is None or profile.pieces is None or facing.pieces is None:
+        if native is None:
             return None
+        profile, facing = element.profile, circular_spline.profile
         spline = element.spline
         # rigid flanks need no arc lengths by radius: any two points will do
         stations, radii = np.arange(2.0), np.arange(2.0)
@@ -107,11 +106,11 @@ class CompiledSearch:
             stations, radii = circular_spline.stations_by_radius
             breaks, coefficients = displaced.breaks, displaced.coefficients
         search: Search = native.Search(
-            native.Flank(profile.pieces, profile.edges, profile.side),
+            native.Flank(profile.pieces, profile.edges, *profile.curves, profile.side),
             np.ascontiguousarray(spline.x),
             np.ascontiguousarray(spline.c),
             *element.flank_range,
-            native.Flank(facing.pieces, facing.edges, facing.side),
+            native.Flank(facing.pieces, facing.edges, *facing.curves, facing.side),
             np.ascontiguousarray(radii),
             np.ascontiguousarray(stations),
             np.ascontiguousarray(breaks),

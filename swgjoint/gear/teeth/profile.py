@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.gear.teeth.segments import Piece, Segment
-from swgjoint.typing import Array
+from swgjoint.gear.teeth.smooth_curve import SmoothCurve
+from swgjoint.typing import Array, Index
 
 TANGENCY_RAD = 1e-10
 """Largest corner angle at a tangent junction of two segments [rad]."""
@@ -163,21 +164,42 @@ class ToothProfile:
         return np.array(columns).T
 
     @cached_property
-    def pieces(self) -> Array | None:
-        """Arcs and lines from tip to root; None if there is a piece of another kind.
+    def pieces(self) -> Array:
+        """Arcs, lines and smooth curves from tip to root.
 
-        Columns: start x, y, end x, y, length, centre x, y, radius (zero for a line),
-        sign (-1 for a concave arc), angle of the start and of the end from the centre
-        (n_segments, 11) [m, rad].
+        Columns: start x, y, end x, y, length, centre x, y, radius (zero except for an
+        arc), sign (-1 for a concave arc), angle of the start and of the end from the
+        centre (n_segments, 11) [m, rad]. The last six are zero for a smooth curve.
         """
         rows = []
         for part in self.segments:
-            if not isinstance(part, Segment):
-                return None
-            ends = [*part.start, *part.end, part.length, *part.centre, part.radius]
-            sign = 1.0 if part.convex else -1.0
-            rows.append([*ends, sign, part.angle_start, part.angle_end])
+            row = [*part.start, *part.end, part.length, part.radius]
+            of_arc = [0.0] * 5
+            if isinstance(part, Segment):
+                sign = 1.0 if part.convex else -1.0
+                of_arc = [*part.centre, sign, part.angle_start, part.angle_end]
+            rows.append([*row[:5], *of_arc[:2], row[5], *of_arc[2:]])
         return np.array(rows)
+
+    @cached_property
+    def curves(self) -> tuple[Index, Array, Array]:
+        """Smooth curves among the pieces, one after the other.
+
+        Returns:
+            Number of intervals of every piece, zero for an arc or a line (n_segments,);
+            arc lengths of the nodes of the curves [m]; and their coefficients
+            (n_intervals, 6, 2) [m], see :class:`.smooth_curve.SmoothCurve`.
+        """
+        smooth = [part for part in self.segments if isinstance(part, SmoothCurve)]
+        intervals = [
+            len(part.coefficients) if isinstance(part, SmoothCurve) else 0
+            for part in self.segments
+        ]
+        return (
+            np.array(intervals, dtype=np.int64),
+            np.concatenate([np.zeros(0), *(part.stations for part in smooth)]),
+            np.concatenate([np.zeros((0, 6, 2)), *(p.coefficients for p in smooth)]),
+        )
 
     @cached_property
     def edges(self) -> Array:
