@@ -21,6 +21,7 @@ _PUBLIC = {
     "SwgError": "swgjoint.errors",
     "attach": "swgjoint.drives.attach",
     "build_map": "swgjoint.drives.build_map",
+    "export_mjcf": "swgjoint.sim.plain_mjcf",
     "load_drive": "swgjoint.drives.references",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.view.run",
@@ -47,6 +48,7 @@ if _typing.TYPE_CHECKING:
     from swgjoint.joint.drive import JointDrive as JointDrive
     from swgjoint.joint.plugin import load_plugin as load_plugin
     from swgjoint.maps.drive_map import DriveMap as DriveMap
+    from swgjoint.sim.plain_mjcf import export_mjcf as export_mjcf
     from swgjoint.sim.scene.scene import Scene as Scene
     from swgjoint.view.run import SceneRun as SceneRun
     from swgjoint.view.run import run_scene as run_scene

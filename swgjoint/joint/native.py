@@ -180,10 +180,11 @@ def constant_elements(drive: DriveMap) -> tuple[Jenkin, ...]:
 def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
     """The law of this level between motor and link, expressed as a map.
 
-    The map contains the elastic part, the hysteresis and, if the drive has friction,
-    its constant and viscous parts. Native friction acts against the housing, but in a
-    map friction acts against the flexspline. If the flexspline turns, its speed, 1/i of
-    the input speed, is the difference between the two sliding speeds.
+    The map contains the elastic part, the hysteresis of :func:`constant_elements` and,
+    if the drive has friction, its constant and viscous parts. Native friction acts
+    against the housing, but in a map friction acts against the flexspline. If the
+    flexspline turns, its speed, 1/i of the input speed, is the difference between the
+    two sliding speeds.
 
     Args:
         drive: Map of the drive.
@@ -215,6 +216,7 @@ def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
     return replace(
         drive,
         friction=friction,
+        hysteresis=constant_elements(drive),
         torsion_knots=knots,
         orders=np.zeros((1, 2), dtype=np.int64),
         potential=potential,

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.models_path import is_file
-from swgjoint.sim.arm.class_names import check_class_names
 from swgjoint.sim.arm.compiling import skeleton
 from swgjoint.sim.arm.holding import FREE, NOT_CHOSEN, choose_held, hold
 from swgjoint.sim.arm.number_checks import check_numbers
+from swgjoint.sim.arm.opening import open_model
 from swgjoint.sim.arm.reading import ArmReading
 
-MESHES = (".stl", ".obj", ".msh")
-"""Mesh formats that the engine reads."""
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _OF_ACTUATORS = (
     *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
@@ -86,26 +80,9 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
 
 def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
     """The arm in a file, see :func:`read_arm`."""
-    spec = _spec_of(path)
+    spec = open_model(path)
     if reading.balance_inertia:
         _balance_inertia(spec)
-    spec.compiler.fusestatic = False  # links without a joint remain separate bodies
-    if path.suffix.lower() == ".urdf":
-        spec.compiler.discardvisual = False  # keep shapes that do not collide
-        _find_meshes(spec, path)
-        for geom in spec.geoms:
-            geom.contype = geom.conaffinity = 0
-    for kind, elements in (
-        ("body", spec.bodies),
-        ("joint", spec.joints),
-        ("key", spec.keys),
-    ):
-        named = {element.name for element in elements}
-        for k, element in enumerate(elements):
-            if not element.name:
-                names = (f"{kind}_{j}" for j in count(k))
-                element.name = next(name for name in names if name not in named)
-                named.add(element.name)
     _check_references(spec, path)
     limits = _effort(spec)
     for name, limit in limits.items():
@@ -197,27 +174,6 @@ def _forget_actuators(spec: mujoco.MjSpec) -> None:
     own, plain = spec.default.actuator, fresh.default.actuator
     for key in _OF_ACTUATORS:
         setattr(own, key, getattr(plain, key))
-
-
-def _spec_of(path: Path) -> mujoco.MjSpec:
-    """Read a file with the engine; its suffix may be in upper case."""
-    suffix = path.suffix.lower()
-    if suffix == ".xacro":
-        raise InputError(
-            f"{path}: a URDF template; accepted: the output of 'xacro {path.name}' in a"
-            " file with the suffix .urdf"
-        )
-    check_class_names(path)
-    try:
-        if suffix == path.suffix or suffix not in (".urdf", ".xml"):
-            return mujoco.MjSpec.from_file(str(path))
-        # the engine selects its reader by the suffix, in lower case only
-        spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
-        spec.modelfiledir = str(path.parent)
-        return spec
-    except (ValueError, OSError) as exc:
-        line = " ".join(str(exc).split())
-        raise InputError(f"{path}: cannot be read as MJCF or URDF: {line}") from None
 
 
 def _balance_inertia(spec: mujoco.MjSpec) -> None:
@@ -315,64 +271,3 @@ def _solve_well(spec: mujoco.MjSpec) -> None:
         setattr(option, name, max(getattr(option, name), getattr(usual, name)))
     for name in ("tolerance", "ls_tolerance"):
         setattr(option, name, min(getattr(option, name), getattr(usual, name)))
-
-
-def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
-    """Resolve mesh paths such as ``package://``, and drop shapes without a mesh.
-
-    A warning reports the shapes whose mesh is missing or cannot be read.
-    """
-    unknown: list[str] = []
-    missing: list[str] = []
-    for mesh in list(spec.meshes):
-        file = _mesh_file(mesh.file, path.parent, spec.meshdir)
-        if file is not None and file.suffix.lower() in MESHES:
-            mesh.file = str(file)
-            continue
-        (missing if file is None else unknown).append(mesh.file)
-        for geom in [g for g in spec.geoms if g.meshname == mesh.name]:
-            spec.delete(geom)
-        spec.delete(mesh)
-    reasons = []
-    if unknown:
-        kinds = Counter(Path(file).suffix for file in unknown)
-        counts = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
-        reasons.append(
-            f"{counts} that the engine cannot read (accepted: {', '.join(MESHES)}), the"
-            f" first is {unknown[0]}"
-        )
-    if missing:
-        reasons.append(f"{len(missing)} not found, the first is {missing[0]}")
-    if reasons:
-        warnings.warn(
-            f"{path}: shapes without a usable mesh are left out: {'; '.join(reasons)}",
-            stacklevel=3,
-        )
-
-
-def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
-    """Path of a URDF mesh; None if it is not found."""
-    for file in _places(reference, folder, meshdir):
-        if is_file(file):
-            return file.resolve()
-    return None
-
-
-def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
-    """Paths at which a mesh may be found, in order of decreasing likelihood."""
-    scheme, colon, rest = reference.partition("://")
-    if not colon:
-        return [folder / meshdir / reference, folder / reference]
-    if scheme != "package":
-        return [Path(rest)]
-    # look for the package among the parent folders of the file and their subfolders
-    package, _, inside = rest.partition("/")
-    above = folder.resolve()
-    parents = (above, *above.parents)
-    places = [
-        place / inside
-        for parent in parents
-        for place in ((parent,) if parent.name == package else (parent / package,))
-    ]
-    # a renamed copy of the package still has the same folders inside
-    return [*places, *(parent / inside for parent in parents[:4])]

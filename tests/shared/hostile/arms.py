@@ -85,6 +85,7 @@ COMMANDS = (
     ["run", "{}", "--drive", DRIVE, "--motion", "step", "--json"],
     ["compare", DRIVE, "--scene", "{}", "--json"],
     ["run", "{}", "--json"],
+    ["export", "mjcf", "{}", "-o", "out.xml", "--drive", DRIVE, "--json"],
 )
 
 

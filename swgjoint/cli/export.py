@@ -1,0 +1,183 @@
+"""``swgjoint export``: write a drive or an arm with drives for other simulators."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from swgjoint.cli.shared.text import table
+from swgjoint.errors import InputError
+
+FORMATS = ("mjcf",)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments: format, arm, drives, output file."""
+    parser.add_argument(
+        "format",
+        choices=FORMATS,
+        help="mjcf: the arm with its drives at level native, for any MuJoCo 4, without"
+        " the plugin",
+    )
+    parser.add_argument(
+        "source",
+        metavar="ARM",
+        help="MJCF or URDF file of an arm, or bundled name",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="file to write (.xml)"
+    )
+    parser.add_argument(
+        "--drive",
+        metavar="[JOINT=]NAME",
+        action="append",
+        default=[],
+        dest="drives",
+        help="design, map or catalogue drive for all hinges, or for the joint or"
+        " pattern JOINT, as in 'wrist_*=CSG-17-100'; the first option that matches a"
+        " joint applies; repeatable; default: the drives that swgjoint run selects",
+    )
+    parser.add_argument(
+        "--model",
+        choices=("ring", "2d", "3d"),
+        help="fidelity of designs: ring (thin ring, fastest), 2d or 3d (finite"
+        " elements); default: 3d for a design with a cup, else 2d",
+    )
+    parser.add_argument(
+        "--rotor-inertia",
+        type=float,
+        metavar="KGM2",
+        help="inertia of rotor and wave generator about their axis [kg·m²]; required"
+        " for drives that are not in the catalogue; default: twice the inertia of the"
+        " wave generator",
+    )
+    parser.add_argument(
+        "--step",
+        type=float,
+        metavar="S",
+        help="time step in the file [s]; default: that of the arm",
+    )
+    parser.add_argument(
+        "--motors",
+        action="store_true",
+        help="add a motor JOINT_motor, whose input is the torque on the rotor [N·m], to"
+        " every joint with a drive but without an actuator",
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Write the file.
+
+    Returns:
+        ``format``, ``arm``, ``step_s``, ``drives_by_rule``, ``joints`` (by name:
+        ``drive``, ``ratio``, ``rotor_inertia_kgm2`` and the differences from level
+        full: ``up_to_Nm``, ``torsion_arcmin``, ``left_out_error_pp_arcmin``,
+        ``left_out_ripple_pp_Nm``, ``link_angle_arcmin``, ``resonance`` with frequency
+        and damping ratio at ``native`` and ``full``, ``notes``), ``files``.
+    """
+    from swgjoint.sim.plain_mjcf import export_mjcf
+
+    drives: dict[str, Any] = drives_of(args.drives)
+    by_rule = not drives
+    if by_rule:
+        from swgjoint.files import check_output_file
+        from swgjoint.sim.arm.scene import arm_scene
+
+        check_output_file(args.output, ".xml")
+        choice = arm_scene(args.source).drive_choice
+        drives = {name: one.drive for name, one in choice.items()}
+    result = export_mjcf(
+        args.source,
+        args.output,
+        drives,
+        rotor_inertia=args.rotor_inertia,
+        model=args.model,
+        step=args.step,
+        motors=args.motors,
+    )
+    return {
+        "format": args.format,
+        "arm": args.source,
+        "step_s": result.step,
+        "drives_by_rule": by_rule,
+        "joints": {
+            name: result.errors[name].as_json(drive)
+            for name, drive in result.drives.items()
+        },
+        "files": [str(path) for path in (result.path, *result.assets)],
+    }
+
+
+def drives_of(options: list[str]) -> dict[str, str]:
+    """Drive by joint name or pattern from the options ``--drive``.
+
+    Args:
+        options: Values of the option, each ``NAME`` or ``JOINT=NAME``. The name of an
+            existing file is a ``NAME``, even if it contains ``=``.
+
+    Raises:
+        InputError: If a value is incomplete, or a joint has two drives.
+    """
+    drives: dict[str, str] = {}
+    for text in options:
+        joint, equals, name = text.partition("=")
+        if not equals or Path(text).is_file():
+            joint, name = "*", text
+        if not (joint and name):
+            raise InputError(f"--drive {text!r}; accepted: NAME or JOINT=NAME")
+        if joint in drives:
+            what = "all joints" if joint == "*" else f"joint {joint!r}"
+            raise InputError(f"--drive {text!r}: {what} already has {drives[joint]!r}")
+        drives[joint] = name
+    # the drive of all other joints comes last, wherever its option stands
+    if "*" in drives:
+        drives["*"] = drives.pop("*")
+    return drives
+
+
+def report(result: dict[str, Any]) -> str:
+    """Format the drives, their differences from level full, and the files."""
+    rows = [
+        ("", "", "arcmin", "arcmin", "arcmin", "Hz", "Hz", "", ""),
+        *(
+            (
+                name,
+                joint["drive"],
+                joint["torsion_arcmin"],
+                joint["left_out_error_pp_arcmin"],
+                joint["link_angle_arcmin"],
+                *(
+                    None if mode is None else mode[key]
+                    for key in ("frequency_Hz", "damping_ratio")
+                    for mode in joint["resonance"].values()
+                ),
+            )
+            for name, joint in result["joints"].items()
+        ),
+    ]
+    header = (
+        *("joint", "drive", "torsion", "left out pp", "link angle"),
+        *("resonance", "full", "damping ratio", "full"),
+    )
+    notes: dict[str, list[str]] = {}
+    for name, joint in result["joints"].items():
+        for note in joint["notes"]:
+            notes.setdefault(note, []).append(name)
+    count = len(result["joints"])
+    by_rule = (
+        "drives selected as by swgjoint run; to select others: --drive [JOINT=]NAME"
+    )
+    lines = [
+        *([by_rule] if result["drives_by_rule"] else []),
+        "level native without a plugin; differences from level full at equal motor"
+        " angle and torque, and resonance at the time step of"
+        f" {1e3 * result['step_s']:g} ms:",
+        table(rows, header=header),
+        *(
+            note + ("" if len(names) == count else f" ({', '.join(names)})")
+            for note, names in notes.items()
+        ),
+        *(f"wrote {path}" for path in result["files"]),
+    ]
+    return "\n".join(lines)
