@@ -18,10 +18,7 @@ constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
     "friction",        "contact_damping", "yield_curve"};
-constexpr int kAccelerations = 2;  // number of states before those of the hysteresis
-constexpr int kBristle = 2;  // states: rotation where it is relaxed, 1 once it is known
-constexpr int kDeviations = 5;           // number of user values of a tendon
-constexpr mjtNum kLeastLosses = 1e-6;    // keeps the bristle stiffness above zero
+constexpr int kDeviations = 5;  // number of user values of a tendon
 // Largest cubic coefficient of the friction tendon, which is identified by so small a
 // value. The length of this tendon is a rotation of many turns, not a torsion; its
 // spring force must nevertheless be negligible. Models are written with 1e-19, because
@@ -44,27 +41,17 @@ std::unique_ptr<Drive> Refuse(const mjModel* m, int instance, const std::string&
   return nullptr;
 }
 
-// Reads an attribute of one number in low..high; returns false if it is invalid.
-bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum high,
-            mjtNum* out) {
-  std::vector<double> list;
-  if (!ParseNumbers(mj_getPluginConfig(m, instance, key), &list)) return false;
-  if (list.size() != 1 || list[0] < low || list[0] > high) return false;
-  *out = list[0];
-  return true;
-}
-
 // Number of states of an instance in plugin_state.
 int CountStates(const mjModel* m, int instance) {
   Hysteresis hysteresis;
   // Create rejects an invalid attribute
   if (hysteresis.Parse(mj_getPluginConfig(m, instance, "hysteresis"),
                        mj_getPluginConfig(m, instance, "yield_curve"))) {
-    return kAccelerations;
+    return Law::kAccelerations;
   }
   const char* friction = mj_getPluginConfig(m, instance, "friction");
-  return kAccelerations + static_cast<int>(hysteresis.states()) +
-         (friction && *friction ? kBristle : 0);
+  return Law::kAccelerations + static_cast<int>(hysteresis.states()) +
+         (friction && *friction ? Law::kBristle : 0);
 }
 
 // Sets the length of a tendon such that its cubic spring has the tangent stiffness p.
@@ -142,31 +129,8 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   const auto text = [&](const char* key) {
     return mj_getPluginConfig(m, instance, key);
   };
-  std::string error;
-  if (!drive->map_.Parse({text("ratio"), text("orders"), text("knots"),
-                          text("potential"), text("end_stiffness"),
-                          text("kinematic_error")},
-                         &error)) {
-    return Refuse(m, instance, error);
-  }
-  if (!Scalar(m, instance, "damping", 0, mjMAXVAL, &drive->damping_)) {
-    return Refuse(m, instance, "attribute 'damping' is not one number >= 0");
-  }
-  if (!Scalar(m, instance, "numerical_damping", 0, 1, &drive->numerical_damping_)) {
-    return Refuse(m, instance, "attribute 'numerical_damping' is not in 0..1");
-  }
-  const char* contact = text("contact_damping");
-  if (contact && *contact &&
-      !Scalar(m, instance, "contact_damping", 0, mjMAXVAL, &drive->contact_damping_)) {
-    return Refuse(m, instance, "attribute 'contact_damping' is not one number >= 0");
-  }
-  mjtNum passes;
-  if (!Scalar(m, instance, "passes", 1, 20, &passes) || passes != std::rint(passes)) {
-    return Refuse(m, instance, "attribute 'passes' is not an integer in 1..20");
-  }
-  drive->passes_ = static_cast<int>(passes);
-  const char* fault = drive->hysteresis_.Parse(text("hysteresis"), text("yield_curve"));
-  if (fault) return Refuse(m, instance, fault);
+  const std::string fault = drive->Read(text);
+  if (!fault.empty()) return Refuse(m, instance, fault);
 
   // When a model is attached, names get a prefix but config strings do not. The tendon
   // is therefore found by the name of the instance, which it shares.
@@ -250,19 +214,6 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
   return friction_.has_value();
 }
 
-// Rotation (or speed) of the wave generator relative to the flexspline, from positions
-// (or velocities) of rotor and link.
-mjtNum Drive::Rotation(const Pair& q) const { return Dot(friction_->b(), q); }
-
-mjtNum* Drive::Bristle(mjtNum* state) const {
-  return state + kAccelerations + hysteresis_.size();
-}
-
-mjtNum* Drive::Limit(mjtNum* state) const {
-  if (!hysteresis_.varies()) return nullptr;
-  return Bristle(state) + (friction_ ? kBristle : 0);
-}
-
 void Drive::AddTorque(mjData* d, const Pair& torque) const {
   d->qfrc_passive[v_rotor_] += torque[0];
   d->qfrc_passive[v_link_] += torque[1];
@@ -274,9 +225,7 @@ void Drive::AddTorque(mjData* d, const Pair& torque) const {
 void Drive::Vary(const mjModel* m) {
   if (m->nuser_tendon < kDeviations) return;
   const mjtNum* by = m->tendon_user + tendon_ * m->nuser_tendon;
-  map_.Vary(1 + by[0], 1 + by[1], by[2], by[3]);
-  losses_ = std::max(1 + by[4], kLeastLosses);  // keeps NaN, which Diverges detects
-  if (friction_) friction_->Scale(losses_);
+  Deviate(by);
 }
 
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
@@ -356,17 +305,8 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   DriveValue value;
-  map_.Gradient(q[0], q[1], &value);
-  mjtNum* all = d->plugin_state + m->plugin_stateadr[instance];
-  hysteresis_.Place(map_.torsion(), all + kAccelerations, nullptr);
-  hysteresis_.Slip(0, losses_, &value);
-  mjtNum rubs = 0;
-  if (friction_) {
-    const mjtNum* state = Bristle(all);
-    const mjtNum speed = Rotation(v);
-    const mjtNum x = state[1] != 0 ? Rotation(q) - state[0] : 0;
-    rubs = friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
-  }
+  mjtNum rubs;
+  Evaluate(q, v, d->plugin_state + m->plugin_stateadr[instance], &value, &rubs);
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
   const mjtNum force = value.torque + damping * Dot(value.g, v);
   if (Diverges(d, {force, value.g[0], value.g[1], value.e[0], value.e[1], rubs})) {
@@ -397,53 +337,15 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
   const Pair weight = Responses(m, d);
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  const Pair other = {state[0], state[1]};
   const mjtNum damping = Damping(m, d);
 
   // the scheme is a midpoint rule for the positions of half a step earlier
   const Pair x = Pair{d->qpos[q_rotor_], d->qpos[q_link_]} - v * (0.5 * h);
-  map_.Begin(x[0], x[1]);
-  hysteresis_.Place(map_.torsion(), state + kAccelerations, Limit(state));
-  DriveValue& g = step_.value;
-  FrictionStep& rub = step_.friction;
-  Pair dv = {0, 0};
-  mjtNum force = 0, p = 0, speed = 0, turned = 0;
-  if (friction_) {
-    const mjtNum* rest = Bristle(state);
-    speed = Rotation(v);
-    step_.rotation = Rotation(x);
-    turned = rest[1] != 0 ? step_.rotation - rest[0] : 0;
-  }
-  for (int pass = 0; pass < passes_; ++pass) {
-    const Pair dx = v * h + dv * (0.5 * h);
-    map_.Secant(dx[0], dx[1], &g);
-    if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, dx), losses_, &g);
-    const mjtNum k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
-    const mjtNum w = Dot(g.g * g.g, weight);
-    const mjtNum ka = h * h * w * k;
-    const mjtNum nu = numerical_damping_ * ka * ka / (16 + ka * ka);
-    const mjtNum rate = Dot(g.g, v);
-    // the last factor of every product is the one that takes longest to compute
-    force = (g.torque + damping * rate - 0.5 * h * Dot(g.g, dv) * g.slope) +
-            h * rate * k * nu;
-    p = (0.5 * damping / h + 0.5 * g.slope) + 0.75 * k * nu;
-    if (pass + 1 == passes_ && !friction_) break;
-    const Pair free = other - weight * g.e;
-    const mjtNum change =
-        (h * Dot(g.g, free) - h * w * force) / (1 + h * h * w * p);
-    const Pair before = dv;
-    dv = free * h - weight * g.g * h * (force + h * p * change);
-    if (friction_) {
-      rub.reach = friction_->Reach(speed + 0.5 * Rotation(before), g.torque);
-      rub.stretch = std::clamp(turned, -rub.reach, rub.reach);
-      // response of rotor and link to friction, (M + h^2 p g g')^-1 b
-      const Pair b = friction_->b();
-      const mjtNum along = h * h * p * Dot(weight * b, g.g) / (1 + h * h * w * p);
-      const Pair answer = weight * (b - g.g * along) * h;
-      dv -= answer *
-            friction_->Solve(h, speed, Rotation(dv), Rotation(answer), &rub);
-    }
-  }
+  Predict(h, x, v, weight, damping, state, &step_);
+  const DriveValue& g = step_.value;
+  const FrictionStep& rub = step_.friction;
+  const mjtNum force = step_.force;
+  mjtNum p = step_.metric;
 
   if (Diverges(d, {force, p, g.g[0], g.g[1], g.e[0], g.e[1], rub.force, rub.metric})) {
     return;
@@ -456,74 +358,24 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   AddTorque(d, (g.g * (force - shift) + g.e) * -1);
   if (friction_) {
     // the same for friction along b, through the second term of the metric
-    rub.metric = SetTangent(m, d, friction_tendon_, rub.metric);
+    step_.friction.metric = SetTangent(m, d, friction_tendon_, rub.metric);
     const mjtNum rubs = rub.force - h * rub.metric * d->ten_velocity[friction_tendon_];
     AddTorque(d, friction_->b() * -rubs);
   }
 
   step_.scheme = true;
-  step_.v = v;
-  step_.weight = weight;
-  step_.force = force;
   step_.metric = p;
-  step_.torsion = map_.torsion();
 }
 
 void Drive::Advance(const mjModel* m, mjData* d, int instance) {
   Vary(m);  // a copied mjData may complete a step that it has not begun
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  AdvanceState(m, d, state);
+  const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
+  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
+  Finish(m->opt.timestep, q, v, &step_, state);
   std::replace_if(
       state, state + m->plugin_statenum[instance],
       [](mjtNum x) { return !std::isfinite(x); }, 0.0);
-}
-
-void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
-  state[0] = state[1] = 0;
-  // The torsion at the end of a step determines where each element is relaxed. In the
-  // scheme, the end of a step is the start of the next step and is evaluated there.
-  // With other integrators, intermediate stages are ignored.
-  mjtNum *rest = state + kAccelerations, *bristle = Bristle(state);
-  if (hysteresis_.size() && (step_.scheme || step_.gradient)) {
-    mjtNum* limit = Limit(state);
-    if (step_.gradient && limit) {
-      DriveValue value;
-      map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
-      hysteresis_.Load(value.torque);
-      step_.torsion = map_.torsion();
-    } else if (step_.gradient) {
-      map_.Begin(d->qpos[q_rotor_], d->qpos[q_link_]);
-      step_.torsion = map_.torsion();
-    }
-    hysteresis_.Relax(step_.torsion, step_.scheme ? limit : nullptr, rest);
-    if (limit) hysteresis_.Store(limit);
-  }
-  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
-  if (friction_ && step_.gradient) {
-    const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
-    const mjtNum x = Rotation(q);
-    DriveValue value;
-    map_.Gradient(q[0], q[1], &value);
-    hysteresis_.Place(map_.torsion(), rest, nullptr);
-    hysteresis_.Slip(0, losses_, &value);
-    const mjtNum reach = friction_->Reach(Rotation(v), value.torque);
-    bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
-    bristle[1] = 1;
-  }
-  if (!step_.scheme) return;
-  const mjtNum h = m->opt.timestep;
-  const DriveValue& g = step_.value;
-  const Pair dv = v - step_.v;
-  Pair torque = g.g * (step_.force + h * step_.metric * Dot(g.g, dv)) + g.e;
-  if (friction_) {
-    const FrictionStep& rub = step_.friction;
-    const mjtNum change = Rotation(dv);
-    torque += friction_->b() * (rub.force + h * rub.metric * change);
-    const mjtNum dx = h * (Rotation(step_.v) + 0.5 * change);
-    bristle[0] = step_.rotation + dx - friction_->After(rub, dx);
-    bristle[1] = 1;
-  }
-  Store(state, dv * (1 / h) + step_.weight * torque);
 }
 
 void Drive::RegisterPlugin() {

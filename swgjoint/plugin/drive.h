@@ -6,17 +6,13 @@
 
 #include <initializer_list>
 #include <memory>
-#include <optional>
 #include <vector>
 
-#include "drive_map.h"
-#include "friction.h"
-#include "hysteresis.h"
-#include "lanes.h"
+#include "law.h"
 
 namespace swgjoint {
 
-class Drive {
+class Drive : private Law {
  public:
   // Reads the attributes of an instance. If one of them is invalid, calls mju_warning
   // and returns null.
@@ -45,16 +41,6 @@ class Drive {
   static void RegisterPlugin();
 
  private:
-  // Results of Compute that Advance needs, within one step.
-  struct Step {
-    bool scheme = false, gradient = false;
-    Pair v = {}, weight = {};                                 // speeds, Responses
-    mjtNum force = 0, metric = 0;                             // along g, and p
-    mjtNum torsion = 0, rotation = 0;                         // at the start of step
-    DriveValue value;
-    FrictionStep friction;
-  };
-
   // Bounds of the region in which the integration was tested, if the model states them;
   // 0 means no bound.
   struct Region {
@@ -69,26 +55,15 @@ class Drive {
   mjtNum Damping(const mjModel* m, const mjData* d) const;
   Pair Response(const mjModel* m, const mjData* d, int dof, int other);
   Pair Responses(const mjModel* m, const mjData* d);
-  void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
   bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
-  // States of the friction bristle, and yield torsions in the last step or null.
-  mjtNum* Bristle(mjtNum* state) const;
-  mjtNum* Limit(mjtNum* state) const;
   bool FindFriction(const mjModel* m, const char* text, int rotor, int link);
-  mjtNum Rotation(const Pair& q) const;
   void AddTorque(mjData* d, const Pair& torque) const;
   void Vary(const mjModel* m);
 
-  DriveMap map_;
-  mjtNum damping_ = 0, contact_damping_ = 0, numerical_damping_ = 0;
-  int passes_ = 0;  // evaluations of the map per step
   int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, indices in ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
-  Hysteresis hysteresis_;
   bool siblings_ = false;       // whether rotor and link have the same ancestors
   std::vector<mjtNum> column_;  // workspace of Response: two columns of L^-T
-  mjtNum losses_ = 1;  // scale of hysteresis and friction
-  std::optional<Friction> friction_;
   int friction_tendon_ = -1;  // tendon of the friction term of the metric
   Region region_;
   Step step_;
