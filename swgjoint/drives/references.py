@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swgjoint.drives.sections import JointSection, LinearDrive
+from swgjoint.drives.sections import JointSection, LinearDrive, NumbersDrive
 from swgjoint.errors import InputError
 from swgjoint.gear.design.family import family_member
 from swgjoint.maps.drive_map import DriveMap
@@ -89,13 +89,19 @@ def _without_options(
     wanted, seed = section.kinematic_error_arcmin, section.seed or 0
     where = f"joints.{joint}: " if joint else ""
     if model is not None and (reference is None or not _may_be_built(reference)):
-        drive_name = "linear" if reference is None else f"drive {reference!r}"
+        stated = "linear" if section.linear else "numbers"
+        drive_name = stated if reference is None else f"drive {reference!r}"
         raise InputError(
             f"{where}model {model!r} with {drive_name}, which is not a design;"
             " accepted: a design, or no model"
         )
     if section.linear is not None:
         drive = linear_map(section.linear)
+    elif section.numbers is not None:
+        key = f"numbers {section.numbers.model_dump_json()}"
+        if key not in known:
+            known[key] = numbers_map(section.numbers, where=where)
+        drive = known[key]
     elif reference is None:
         raise ValueError("a joint without a drive has no map")
     elif reference not in known and names_catalogue(reference):
@@ -147,6 +153,38 @@ def linear_map(section: LinearDrive) -> DriveMap:
         teeth_circular_spline=section.teeth_circular_spline,
         rated_torque=section.rated_torque_Nm,
     )
+
+
+def numbers_map(section: NumbersDrive, *, where: str = "") -> DriveMap:
+    """A map from the ``numbers`` table of a scene.
+
+    Args:
+        section: The table.
+        where: Text that messages put before the key.
+
+    Raises:
+        InputError: If a figure contradicts another one.
+    """
+    K1, K2, K3 = section.K1_Nm_rad, section.K2_Nm_rad, section.K3_Nm_rad
+    try:
+        return DriveMap.from_numbers(
+            stiffness=(K1, K2 or K1, K3 or K2 or K1),
+            rated_torque=section.rated_torque_Nm,
+            ratio=section.ratio,
+            lost_motion_arcmin=section.lost_motion_arcmin,
+            hysteresis_loss_arcmin=section.hysteresis_loss_arcmin,
+            kinematic_error={
+                int(order): amplitude
+                for order, amplitude in section.kinematic_error_arcmin.items()
+            },
+            T1=section.T1_Nm,
+            T2=section.T2_Nm,
+            repeated_peak=section.repeated_peak_Nm,
+            momentary_peak=section.momentary_peak_Nm,
+            name=section.name,
+        )
+    except InputError as error:
+        raise InputError(f"{where}numbers: {error}") from None
 
 
 def load_drive(

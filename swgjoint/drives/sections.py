@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from swgjoint.faults import Fault, Section
+from swgjoint.faults import Fault, Section, shorten
 from swgjoint.maps.fit.error_spectrum import LARGEST
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
 
+DRIVE_KEYS = ("drive", "linear", "numbers")
+"""Keys that state the drive of a joint, of which a joint has one."""
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -67,6 +70,51 @@ class LinearDrive(Section):
     """Rated torque at the output [N·m]."""
 
 
+class NumbersDrive(Section):
+    """A drive of which a few figures are known, as on a data sheet."""
+
+    K1_Nm_rad: Positive
+    """Torsional stiffness at low torque [N·m/rad]."""
+    K2_Nm_rad: Positive | None = None
+    """Torsional stiffness between T1 and T2 [N·m/rad]; by default K1."""
+    K3_Nm_rad: Positive | None = None
+    """Torsional stiffness beyond T2 [N·m/rad]; by default K2."""
+    rated_torque_Nm: Positive
+    """Rated torque at the output [N·m]."""
+    ratio: Annotated[int, Field(ge=30, le=320)] = 100
+    """Magnitude of the ratio, with the circular spline fixed."""
+    lost_motion_arcmin: Positive | None = None
+    """Lost motion at 4 % of the rated torque [arcmin]; by default that of K1. More than
+    that becomes a clearance."""
+    hysteresis_loss_arcmin: Positive | None = None
+    """Width of the torque loop at zero torque [arcmin]; by default that of the
+    clearance. More than that becomes friction of the torsion."""
+    kinematic_error_arcmin: dict[str, Positive] = Field(default_factory=dict)
+    """Amplitude, zero to peak, of the kinematic error [arcmin] by its order per input
+    turn; by default none."""
+    T1_Nm: Positive | None = None
+    """Torque up to which K1 applies [N·m]; by default 0.2 of the rated torque."""
+    T2_Nm: Positive | None = None
+    """Torque up to which K2 applies [N·m]; by default 0.6 of the rated torque."""
+    repeated_peak_Nm: Positive | None = None
+    """Repeated peak torque [N·m]; by default twice the rated torque."""
+    momentary_peak_Nm: Positive | None = None
+    """Momentary peak torque [N·m]; by default four times the rated torque."""
+    name: str = "numbers"
+    """Name of the drive in tables and reports."""
+
+    @model_validator(mode="after")
+    def _whole_orders(self) -> Self:
+        faults = [
+            (f"kinematic_error_arcmin.{shorten(key)}", "accepted: an order, 1 to 1000")
+            for key in self.kinematic_error_arcmin
+            if not re.fullmatch("[1-9][0-9]{0,2}|1000", key)
+        ]
+        if faults:
+            raise Fault(*faults)
+        return self
+
+
 class JointSection(Section):
     """Drive of one joint; absent keys take their values from ``[defaults]``."""
 
@@ -74,6 +122,8 @@ class JointSection(Section):
     """Design (path or bundled name), ``.swg`` file or catalogue name."""
     linear: LinearDrive | None = None
     """Drive of constant stiffness, instead of ``drive``."""
+    numbers: NumbersDrive | None = None
+    """Drive of stated figures, instead of ``drive``."""
     model: Literal["ring", "2d", "3d"] | None = None
     """Fidelity of a design; by default 3d for a design with a cup, else 2d."""
     kinematic_error_arcmin: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
@@ -117,15 +167,27 @@ class JointSection(Section):
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:
-        if self.drive is not None and self.linear is not None:
-            raise Fault(("drive", "given together with linear; accepted: one of them"))
+        stated = [key for key in DRIVE_KEYS if getattr(self, key) is not None]
+        if len(stated) > 1:
+            more = " and ".join(stated[1:])
+            raise Fault((stated[0], f"given together with {more}; accepted: one"))
         return self
+
+    @property
+    def has_drive(self) -> bool:
+        """Whether one of :data:`DRIVE_KEYS` states the drive."""
+        return any(getattr(self, key) is not None for key in DRIVE_KEYS)
+
+    def with_drive(self, drive: str) -> JointSection:
+        """A copy with this drive instead of its own; a design at default fidelity."""
+        none = dict.fromkeys((*DRIVE_KEYS, "model"))
+        return self.model_copy(update={**none, "drive": drive})
 
     def fill_from(self, base: JointSection) -> JointSection:
         """Complete these settings with those of ``base``, which have lower priority."""
         present = self.model_dump(exclude_none=True)
         values = {key: getattr(self, key) for key in present}
         rest = base.model_dump(exclude_none=True)
-        if "drive" in present or "linear" in present:
-            rest = {k: v for k, v in rest.items() if k not in ("drive", "linear")}
+        if self.has_drive:
+            rest = {k: v for k, v in rest.items() if k not in DRIVE_KEYS}
         return JointSection(**{key: getattr(base, key) for key in rest} | values)

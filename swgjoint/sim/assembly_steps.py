@@ -156,10 +156,10 @@ def complete_sections(
     sections = tuple(scene.joint_settings(name) for name in joints)
     lines = []
     for name, section in zip(joints, sections, strict=True):
-        if section.drive is None and section.linear is None:
+        if not section.has_drive:
             lines.append(
-                f"{scene.where}: joints.{name}.drive: missing; accepted: drive or"
-                " linear, here or in [defaults]"
+                f"{scene.where}: joints.{name}.drive: missing; accepted: drive,"
+                " linear or numbers, here or in [defaults]"
             )
         if section.rotor_inertia_kgm2 is None:
             lines.append(

@@ -108,11 +108,15 @@ def _arm(name: str, _: str) -> dict[str, Any]:
 
 def _scene(name: str, _: str) -> dict[str, Any]:
     """Row of one scene."""
+    from swgjoint.drives.sections import DRIVE_KEYS
     from swgjoint.sim.scene.scene import Scene
 
     scene = Scene.load_file(models_path() / "scenes" / f"{name}.toml")
     sections = (scene.defaults, *scene.joints.values())
-    drives = [s.drive or ("linear" if s.linear else None) for s in sections]
+    drives = [
+        s.drive or next((key for key in DRIVE_KEYS if getattr(s, key)), None)
+        for s in sections
+    ]
     return {
         "name": name,
         "arm": scene.arm,

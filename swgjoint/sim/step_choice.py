@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swgjoint.drives.references import find_drive
+from swgjoint.drives.references import find_drive, numbers_map
 from swgjoint.gear.design.design import Design
 from swgjoint.joint.drive import input_orders
 from swgjoint.maps.drive_map import DriveMap
@@ -38,9 +38,14 @@ def resolving_step(scene: Scene, arm: RigidArm) -> float:
     needed = STEPS[0]
     for name, top in zip(arm.joints, speed, strict=True):
         section = scene.joint_settings(name)
-        if section.drive is None or section.level not in (None, "kinematic", "full"):
+        if section.level not in (None, "kinematic", "full"):
             continue
-        source = find_drive(section.drive)
+        if section.numbers is not None:
+            source: DriveMap | Design = numbers_map(section.numbers)
+        elif section.drive is not None:
+            source = find_drive(section.drive)
+        else:
+            continue
         rate = needed_order(source) * abs(source.ratio) * float(top)
         if rate > 0.0:
             needed = min(needed, PHASE_STEP / rate)

@@ -84,7 +84,7 @@ def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
     for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
         name = f"simulated drive of {joint}"
         section = scene.joint_settings(joint)
-        sections[joint] = section.model_copy(update={"drive": name, "linear": None})
+        sections[joint] = section.with_drive(name)
         drives[name] = transmission.attached.drive
     return scene.model_copy(update={"joints": sections}), drives
 

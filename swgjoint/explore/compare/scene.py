@@ -120,10 +120,7 @@ def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scen
     """
 
     def changed(section: JointSection) -> JointSection:
-        if not joints and section.drive is None and section.linear is None:
-            return section
-        changes = {"drive": reference, "linear": None, "model": None}
-        return section.model_copy(update=changes)
+        return section.with_drive(reference) if joints or section.has_drive else section
 
     return _changed(scene, changed, joints)
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from swgjoint.drives.sections import JointSection, Level
+from swgjoint.drives.sections import DRIVE_KEYS, JointSection, Level
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, shorten, validate
 from swgjoint.models_path import find, is_file
@@ -266,7 +266,8 @@ class Scene(Section):
 
     def with_drive(self, drive: str) -> Self:
         """A copy in which every joint has this drive, a design at default fidelity."""
-        return self._with_all(drive=drive, linear=None, model=None)
+        none = dict.fromkeys((*DRIVE_KEYS, "model"))
+        return self._with_all(**{**none, "drive": drive})
 
     def with_model(self, model: str) -> Self:
         """A copy whose drives, which must all be designs, get maps of this fidelity."""
@@ -359,8 +360,10 @@ def _switch_motion(table: Any, kind: Any) -> None:
 
 
 def _make_room(table: dict[str, Any], key: str) -> None:
-    """Drop ``linear`` if ``drive`` is set and vice versa; they exclude each other."""
-    table.pop({"drive": "linear", "linear": "drive"}.get(key, ""), None)
+    """Drop the drive of a joint if another key states it; they exclude each other."""
+    for other in DRIVE_KEYS if key in DRIVE_KEYS else ():
+        if other != key:
+            table.pop(other, None)
 
 
 def parse_override(text: str) -> tuple[str, Any]:
