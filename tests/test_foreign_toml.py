@@ -8,7 +8,7 @@ import pytest
 
 from swgjoint.errors import InputError
 from swgjoint.faults import shorten
-from swgjoint.sim.scene.scene import parse_override
+from swgjoint.sim.scene.overrides import parse_override
 from swgjoint.toml_file import MAX_DEPTH, parse_toml, parse_value
 
 DEEP = 5000

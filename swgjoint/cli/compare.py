@@ -141,7 +141,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _limits(args: argparse.Namespace) -> dict[str, float] | None:
     """Limits of the file, replaced by those of the options; None without any limit."""
     from swgjoint.explore.compare.compare import checked_limits, read_spec
-    from swgjoint.sim.scene.scene import parse_override
+    from swgjoint.sim.scene.overrides import parse_override
 
     if not args.spec and not args.limit:
         return None

@@ -145,7 +145,7 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
     teeth = _teeth(args.teeth) if args.teeth else None
     from swgjoint.gear.design.design import Design
     from swgjoint.gear.design.scaling import scaled_design
-    from swgjoint.sim.scene.scene import parse_override
+    from swgjoint.sim.scene.overrides import parse_override
 
     scaled = scaled_design(
         Design.load(args.designs[0]),

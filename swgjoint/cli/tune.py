@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.explore.tune.result import TuneSettings
     from swgjoint.explore.tune.tune import tune
-    from swgjoint.sim.scene.scene import parse_override
+    from swgjoint.sim.scene.overrides import parse_override
     from swgjoint.view.plots.tune import claims, write_files
 
     settings = TuneSettings(

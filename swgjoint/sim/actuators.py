@@ -14,7 +14,6 @@ from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.sim.scene.feature_sections import (
     Disturbance,
     JointPulse,
-    JointSine,
     ToolForce,
 )
 from swgjoint.typing import Array
@@ -211,12 +210,14 @@ def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
     length = disturbance.duration_s
     end = np.inf if length is None else disturbance.start_s + length
     acts = ((time >= disturbance.start_s) & (time < end)).astype(float)
+    if isinstance(disturbance, ToolForce):
+        return acts
+    assert disturbance.torque_Nm is not None  # of an assembly, see scaled_disturbances
+    acts = acts * disturbance.torque_Nm
     if isinstance(disturbance, JointPulse):
-        return acts * disturbance.torque_Nm
-    if isinstance(disturbance, JointSine):
-        phase = 2.0 * np.pi * disturbance.frequency_Hz * (time - disturbance.start_s)
-        return np.asarray(acts * disturbance.torque_Nm * np.sin(phase))
-    return acts
+        return acts
+    phase = 2.0 * np.pi * disturbance.frequency_Hz * (time - disturbance.start_s)
+    return np.asarray(acts * np.sin(phase))
 
 
 def limit_torque(command: Array, speed: Array, limits: MotorLimits | None) -> Array:

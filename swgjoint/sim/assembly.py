@@ -29,6 +29,7 @@ from swgjoint.sim.assembly_steps import (
     load_torque,
     motor_loops,
     prescribed_errors,
+    scaled_disturbances,
     site_of_force,
 )
 from swgjoint.sim.control import feedforward
@@ -227,7 +228,7 @@ def assemble(
         loops=loops,
         link_inertia=link_inertia,
         load=load,
-        disturbances=tuple(scene.disturbance),
+        disturbances=scaled_disturbances(scene, transmissions),
         link_torque=link_torque,
         feedforward=motor_torque,
         prescribed=prescribed,

@@ -15,7 +15,7 @@ from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.control import control_gains, integral_gain
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.sim.motion.trajectory import Trajectory
-from swgjoint.sim.scene.feature_sections import ToolForce
+from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.typing import Array
 
@@ -185,3 +185,19 @@ def load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
     if load.torque_Nm is not None:
         return load.torque_Nm
     return (load.rated_fraction or 0.0) * drive.ratings.rated_torque
+
+
+def scaled_disturbances(
+    scene: Scene, transmissions: Sequence[Transmission]
+) -> tuple[Disturbance, ...]:
+    """Disturbances of a scene, those relative to a rated torque in N·m.
+
+    Args:
+        scene: The scene.
+        transmissions: Compiled drives, one per joint.
+    """
+    rated = {t.joint: t.drive.ratings.rated_torque for t in transmissions}
+    return tuple(
+        one if isinstance(one, ToolForce) else one.scale_to(rated[one.joint])
+        for one in scene.disturbance
+    )

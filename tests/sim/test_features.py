@@ -313,7 +313,7 @@ def test_a_sine_shakes_at_its_frequency(bench):
             {
                 "kind": "joint_sine",
                 "joint": "joint",
-                "torque_Nm": 5.0,
+                "rated_fraction": 0.05,
                 "frequency_Hz": 1.0,
             }
         ],
@@ -328,6 +328,14 @@ def test_a_sine_shakes_at_its_frequency(bench):
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
+        ({"disturbance": [{"kind": "joint_pulse", "joint": "joint", "start_s": 0.0,
+                           "duration_s": 1.0}]},
+         ("disturbance[0].torque_Nm", "either", "rated_fraction")),
+        ({"trajectory": {"kind": "speed_steps", "joint": "joint",
+                         "speeds_deg_s": []}}, ("trajectory.speeds_deg_s", "1 item")),
+        ({"trajectory": {"kind": "speed_steps", "joint": "joint", "ramp_s": 4.0,
+                         "speeds_deg_s": [1.0]}},
+         ("simulation.duration_s", "8.4 s", "ramps")),
         ({"defaults.motor.stall_torque_Nm": 1.0},
          ("defaults.motor.stall_torque_Nm", "no_load_speed_rpm")),
         ({"defaults.motor.current_limit_A": 1.0},

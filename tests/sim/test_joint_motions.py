@@ -10,6 +10,7 @@ from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.motion.joint_motions import (
     chirp,
     read_points,
+    speed_steps,
     spline_motion,
     trapezoid,
 )
@@ -132,6 +133,27 @@ def test_a_file_is_passed_through_at_its_points():
     between = np.clip(path.time - 0.3, 0.0, 2.0)
     truth = START + np.sin(0.5 * np.pi * between)[:, None] ** 4 * (END - START)
     np.testing.assert_allclose(path.position, truth, atol=3e-5)
+
+
+def test_speed_steps_rest_ramp_and_hold_each_speed():
+    """Equal shares of the run at both speeds; the derivatives agree."""
+    time = np.linspace(0.0, 6.0, 6001)
+    speeds = np.array([1.0, -0.5])
+    path = speed_steps(time, start=START, joint=1, speeds=speeds, hold=0.25, ramp=0.5)
+    v, plateau = path.velocity[:, 1], (6.0 - 0.5 - 1.5) / 2
+    for k, speed in enumerate(speeds):
+        begin = 0.25 + 0.5 + k * (plateau + 0.5)
+        inside = (time > begin + 1e-6) & (time < begin + plateau - 1e-6)
+        np.testing.assert_allclose(v[inside], speed, atol=1e-12)
+    assert not path.velocity[:, ::2].any() and not v[[0, 250, -250, -1]].any()
+    np.testing.assert_allclose(np.gradient(path.position[:, 1], time), v, atol=1e-5)
+    slope = np.gradient(v, time)
+    # h²/6 times the largest third derivative of the speed, 60 * 1.5 / 0.5³ rad/s⁴
+    np.testing.assert_allclose(slope, path.acceleration[:, 1], atol=1.3e-4)
+    way = float(speeds.sum()) * (plateau + 0.5)  # one ramp counts half at either end
+    assert path.position[-1, 1] - START[1] == pytest.approx(way)
+    assert path.steady_velocity.tolist() == [0.0, -0.5, 0.0]
+    np.testing.assert_allclose(v[path.steady], -0.5, atol=1e-9)
 
 
 def scene_of(motion: str) -> Scene:

@@ -5,7 +5,8 @@ from messages import names, naming
 
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
-from swgjoint.sim.scene.scene import Scene, parse_override
+from swgjoint.sim.scene.overrides import parse_override
+from swgjoint.sim.scene.scene import Scene
 
 GOOD = """
 name = "good"

@@ -44,9 +44,9 @@ def add_arm_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--motion",
         metavar="KIND",
-        help="sweep (default), step, trapezoid, constant_speed, chirp, line, circle,"
-        " iso9283 or csv, with default values suitable for an arm; change them with"
-        " --set trajectory.KEY=VALUE",
+        help="sweep (default), step, trapezoid, constant_speed, speed_steps,"
+        " chirp, line, circle, iso9283 or csv, with default values suitable for an arm;"
+        " change them with --set trajectory.KEY=VALUE",
     )
     group.add_argument(
         "--balance-inertia",

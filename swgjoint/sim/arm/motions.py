@@ -53,6 +53,10 @@ def tables_of(
         return [base | SWEEP_TIMING | {"end_deg": degrees(end)}], DURATION
     if kind == "constant_speed":
         return [base | {"speed_deg_s": degrees(way / DURATION)}], DURATION
+    if kind == "speed_steps":
+        j = int(np.flatnonzero(way)[0])
+        speed = float(2.0 * way[j] / DURATION / deg)
+        return [base | {"joint": arm.joints[j], "speeds_deg_s": [speed, -speed]}], 4.0
     if kind == "step":
         return [base | {"step_deg": degrees(np.sign(way) * STEP * deg)}], 2.0
     if kind == "trapezoid":

@@ -27,7 +27,8 @@ from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.reading import ArmReading, patterns_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.motion.commanded import trajectory_of
-from swgjoint.sim.scene.scene import Scene, parse_override
+from swgjoint.sim.scene.overrides import parse_override
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.step_choice import resolving_step
 from swgjoint.typing import Array
 from swgjoint.units import deg

@@ -20,6 +20,7 @@ from swgjoint.sim.scene.trajectory_sections import (
     FromFile,
     Iso9283,
     LineSection,
+    SpeedSteps,
     StepSection,
     SweepSection,
     Trapezoid,
@@ -93,6 +94,15 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
             **grid,
         )
     time, where = time_grid(**grid), f"{scene.where}: trajectory"
+    if isinstance(section, SpeedSteps):
+        return joint_motions.speed_steps(
+            time,
+            start=start,
+            joint=joints.index(section.joint),
+            speeds=np.array(section.speeds_deg_s) * deg,
+            hold=section.hold_s,
+            ramp=section.ramp_s,
+        )
     if isinstance(section, StepSection):
         jump = _angles(section.step_deg, joints)
         return joint_motions.step(

@@ -106,6 +106,41 @@ def trapezoid(
     )
 
 
+def speed_steps(
+    time: Array, *, start: Array, joint: int, speeds: Array, hold: float, ramp: float
+) -> Trajectory:
+    """One joint turns at several speeds of equal duration, with ramps between them.
+
+    Args:
+        time: Time grid [s]. Shape (n,).
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        joint: Index of the joint.
+        speeds: Joint speeds in their order [rad/s]. Shape (m,).
+        hold: Rest before and after the motion [s].
+        ramp: Duration of every change of speed [s].
+    """
+    count = len(speeds)
+    plateau = (time[-1] - 2.0 * hold - (count + 1) * ramp) / count
+    position = np.tile(start, (time.size, 1))
+    velocity, acceleration = np.zeros_like(position), np.zeros_like(position)
+    for k, change in enumerate(np.diff(speeds, prepend=0.0, append=0.0)):
+        since = time - hold - k * (ramp + plateau)
+        path, share, slope = smooth_ramp(np.clip(since / ramp, 0.0, 1.0))
+        position[:, joint] += change * (ramp * path + np.maximum(since - ramp, 0.0))
+        velocity[:, joint] += change * share
+        acceleration[:, joint] += change * slope / ramp
+    last = time[-1] - hold - ramp
+    return Trajectory(
+        time=time,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        steady=window(time, last - plateau, last),
+        steady_velocity=np.where(np.arange(start.size) == joint, speeds[-1], 0.0),
+        arrival=last + ramp,
+    )
+
+
 def chirp(
     time: Array,
     *,

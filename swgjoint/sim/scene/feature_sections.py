@@ -94,28 +94,49 @@ class Payload(Section):
         return self
 
 
-class JointPulse(Section):
+class JointTorque(Section):
+    """Torque on the link of a joint, in N·m or relative to the drive."""
+
+    joint: str
+    """Name of the joint."""
+    torque_Nm: Torque | None = None
+    """Torque on the link, positive along the joint axis; amplitude of a sine, whose
+    phase is zero at ``start_s``."""
+    rated_fraction: Annotated[float, Field(ge=-5, le=5)] | None = None
+    """The same torque as a fraction of the drive's rated torque."""
+
+    @model_validator(mode="after")
+    def _one_value(self) -> Self:
+        if (self.torque_Nm is None) == (self.rated_fraction is None):
+            raise Fault(("torque_Nm", "expected either torque_Nm or rated_fraction"))
+        return self
+
+    def scale_to(self, rated_torque: float) -> Self:
+        """A copy that states the torque in N·m.
+
+        Args:
+            rated_torque: Rated torque of the drive [N·m].
+        """
+        if self.rated_fraction is None:
+            return self
+        torque = self.rated_fraction * rated_torque
+        return self.model_copy(update={"torque_Nm": torque, "rated_fraction": None})
+
+
+class JointPulse(JointTorque):
     """A rectangular disturbance-torque pulse on a joint."""
 
     kind: Literal["joint_pulse"] = "joint_pulse"
-    joint: str
-    """Name of the joint."""
-    torque_Nm: Torque
-    """Torque on the link, positive along the joint axis."""
     start_s: Seconds
     """Start time of the pulse."""
     duration_s: Positive
     """Duration of the pulse."""
 
 
-class JointSine(Section):
+class JointSine(JointTorque):
     """A sinusoidal disturbance torque on a joint."""
 
     kind: Literal["joint_sine"] = "joint_sine"
-    joint: str
-    """Name of the joint."""
-    torque_Nm: Torque
-    """Amplitude of the torque on the link; the phase is zero at ``start_s``."""
     frequency_Hz: Annotated[float, Field(gt=0, le=1_000)]
     """Frequency of the torque."""
     start_s: Seconds = 0.0

@@ -10,7 +10,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from swgjoint.drives.sections import DRIVE_KEYS, JointSection, Level
 from swgjoint.errors import InputError
-from swgjoint.faults import Fault, Section, shorten, validate
+from swgjoint.faults import Fault, Section, validate
 from swgjoint.models_path import find, is_file
 from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.scene.feature_sections import (
@@ -20,6 +20,7 @@ from swgjoint.sim.scene.feature_sections import (
     misfits,
     too_fast,
 )
+from swgjoint.sim.scene.overrides import merge
 from swgjoint.sim.scene.sections import (
     ControllerSection,
     LoadSection,
@@ -28,12 +29,8 @@ from swgjoint.sim.scene.sections import (
     Several,
     Simulation,
 )
-from swgjoint.sim.scene.trajectory_sections import (
-    MOTIONS,
-    ChirpSection,
-    TrajectorySection,
-)
-from swgjoint.toml_file import MAX_DEPTH, parse_toml, parse_value, read_toml
+from swgjoint.sim.scene.trajectory_sections import ChirpSection, TrajectorySection
+from swgjoint.toml_file import parse_toml, read_toml
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
@@ -227,7 +224,7 @@ class Scene(Section):
         Raises:
             InputError: If the tables have faults; one line per fault.
         """
-        merged = _merged(data, overrides, where)
+        merged = merge(data, overrides, where)
         lines: list[str] = []
         # tables by joint are checked one by one, so that messages name their keys
         for table, model in (("joints", JointSection), ("load", LoadSection)):
@@ -313,73 +310,6 @@ def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[s
     except InputError as exc:
         return [line.replace("\0: ", f"{path}.", 1) for line in str(exc).split("\n")]
     return []
-
-
-def _merged(
-    data: Mapping[str, Any],
-    overrides: Mapping[str, Any] | Iterable[str] | None,
-    where: str,
-) -> dict[str, Any]:
-    """Deep copy of the tables with the overrides applied."""
-
-    def copied(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {key: copied(item) for key, item in value.items()}
-        return value
-
-    merged: dict[str, Any] = copied(data)
-    pairs = (
-        list(overrides.items())
-        if isinstance(overrides, Mapping)
-        else [parse_override(text) for text in overrides or ()]
-    )
-    # apply a new kind of motion first, because it drops the keys of the old kind
-    for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
-        if key == "trajectory.kind":
-            _switch_motion(merged.get("trajectory"), value)
-        *tables, last = key.split(".")
-        table = merged
-        for name in tables:
-            _make_room(table, name)
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                raise InputError(f"{where}: {key}: {name} is not a table")
-        _make_room(table, last)
-        table[last] = value
-    return merged
-
-
-def _switch_motion(table: Any, kind: Any) -> None:
-    """Drop the keys of a motion that a new kind of motion does not have."""
-    if not isinstance(table, dict) or table.get("kind") == kind:
-        return
-    model = MOTIONS.get(kind) if isinstance(kind, str) else None
-    if model is not None:
-        for key in set(table) - set(model.model_fields):
-            del table[key]
-
-
-def _make_room(table: dict[str, Any], key: str) -> None:
-    """Drop the drive of a joint if another key states it; they exclude each other."""
-    for other in DRIVE_KEYS if key in DRIVE_KEYS else ():
-        if other != key:
-            table.pop(other, None)
-
-
-def parse_override(text: str) -> tuple[str, Any]:
-    """Split ``key=value`` of the command line into a dotted key and a TOML value."""
-    key, equals, value = text.partition("=")
-    key = key.strip()
-    if not equals or not all(key.split(".")):
-        raise InputError(
-            f"{shorten(text)!r}: accepted: key=value, for example"
-            " simulation.step_s=0.0005"
-        )
-    if key.count(".") >= MAX_DEPTH:
-        raise InputError(
-            f"key {shorten(key)}: accepted: a dotted key of at most {MAX_DEPTH} parts"
-        )
-    return key, parse_value(value, where=key)  # a bare word is a name or a path
 
 
 def _anchor_paths(data: dict[str, Any], folder: Path) -> None:

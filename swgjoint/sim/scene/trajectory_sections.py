@@ -80,6 +80,31 @@ class ConstantSpeed(MotionSection):
         }
 
 
+class SpeedSteps(MotionSection):
+    """One joint turns at several constant speeds, one after the other."""
+
+    kind: Literal["speed_steps"] = "speed_steps"
+    joint: str
+    """Name of the joint; all other joints rest."""
+    speeds_deg_s: Annotated[tuple[Degrees, ...], Field(strict=False, min_length=1)]
+    """Joint speeds in their order; each has the same share of the run. The metrics use
+    the last one."""
+    hold_s: Seconds = 0.2
+    """Rest before and after the motion."""
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
+    """Duration of every change of speed."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Total time of rests and ramps [s]."""
+        return 2.0 * self.hold_s + (len(self.speeds_deg_s) + 1) * self.ramp_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Names of joints that each key contains."""
+        return {"start_deg": set(self.start_deg), "joint": {self.joint}}
+
+
 class StepSection(MotionSection):
     """The commanded joint angles jump once, and the run records the step response."""
 
@@ -287,6 +312,7 @@ class Iso9283(ToolMotion):
 TrajectorySection = Annotated[
     SweepSection
     | ConstantSpeed
+    | SpeedSteps
     | StepSection
     | Trapezoid
     | ChirpSection
@@ -301,6 +327,7 @@ MOTIONS: dict[str, type[MotionSection]] = {
     for model in (
         SweepSection,
         ConstantSpeed,
+        SpeedSteps,
         StepSection,
         Trapezoid,
         ChirpSection,
