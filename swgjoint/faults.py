@@ -47,6 +47,7 @@ _UNITS = {
     "kg": "kg",
     "rpm": "rpm",
     "Hz": "Hz",
+    "h": "h",
     "s": "s",
     "percent": "%",
     "mNm": "mN·m",

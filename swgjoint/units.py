@@ -21,6 +21,7 @@ deg = pi / 180.0
 arcmin = pi / 10800.0
 arcsec = pi / 648000.0
 rpm = pi / 30.0
+hour = 3600.0
 hertz = 2.0 * pi
 ZERO_CELSIUS = 273.15
 """Temperature of 0 °C [K]; add it to degrees Celsius."""

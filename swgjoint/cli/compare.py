@@ -87,7 +87,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         InputError: If ``--sort`` names an unknown quantity.
     """
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.explore.compare.compare import SLOW, SORTABLE, compare
+    from swgjoint.explore.compare.compare import SLOW, compare
+    from swgjoint.explore.compare.limits import SORTABLE, require_cycle
     from swgjoint.explore.compare.scene import joints_named, resolve_step, scene_or_arm
     from swgjoint.models_path import near_names
     from swgjoint.sim.arm.scene import is_arm
@@ -102,6 +103,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         )
     spec = _limits(args)
     scene = scene_or_arm(args.scene, args.overrides)
+    require_cycle(scene, {args.sort, *(spec or {})} - {None})
     joints = joints_named(scene, args.joints)
     stepped = any(text.startswith("simulation.step_s") for text in args.overrides)
     if is_arm(args.scene) and not stepped:
@@ -140,7 +142,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _limits(args: argparse.Namespace) -> dict[str, float] | None:
     """Limits of the file, replaced by those of the options; None without any limit."""
-    from swgjoint.explore.compare.compare import checked_limits, read_spec
+    from swgjoint.explore.compare.limits import checked_limits, read_spec
     from swgjoint.sim.scene.overrides import parse_override
 
     if not args.spec and not args.limit:

@@ -17,6 +17,7 @@ from swgjoint.errors import SwgError
 EXTRAS = {
     "control": ("pinocchio", "casadi"),
     "envs": ("gymnasium",),
+    "life": ("rainflow",),
     "report": ("pyvista",),
     "notebooks": ("jupytext", "ipykernel"),
     "cluster": ("dask", "distributed", "dask_jobqueue"),

@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.explore.bearing_lot import FIGURES as RING_FIGURES
     from swgjoint.explore.bearing_lot import run_bearing_lot
-    from swgjoint.explore.compare.compare import read_spec
+    from swgjoint.explore.compare.limits import read_spec
     from swgjoint.explore.lot import FIGURES, LOWER, run_lot
     from swgjoint.gear.design.design import Design
     from swgjoint.view.plots.lot import lot_picture

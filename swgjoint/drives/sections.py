@@ -115,6 +115,59 @@ class NumbersDrive(Section):
         return self
 
 
+class LifeSection(Section):
+    """Rated life of the wave-generator bearing, and S-N curve of the flexspline."""
+
+    L50_h: Positive | None = None
+    """Life that half of the bearings exceed at rated torque and rated speed [h]; by
+    default that of the catalogue, for drives with a catalogue name."""
+    L10_h: Positive | None = None
+    """Life that nine out of ten bearings exceed [h]; by default L50 / 5."""
+    rated_speed_rpm: Positive | None = None
+    """Input speed to which rated torque and life refer [rpm]; by default 2000 rpm."""
+    endurance_limit_MPa: Positive | None = None
+    """Amplitude of reversed stress that the steel endures without limit [MPa]."""
+    ultimate_strength_MPa: Positive | None = None
+    """Ultimate tensile strength, for the Goodman line [MPa]."""
+    sn_exponent: Annotated[float, Field(gt=0, le=100)] | None = None
+    """Exponent of the S-N curve above the endurance limit [-]."""
+    sn_knee_cycles: Annotated[float, Field(ge=1, le=1e12)] | None = None
+    """Number of cycles at which the S-N curve reaches the endurance limit [-]."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        faults = []
+        if self.L50_h is None:
+            faults += [
+                (key, "also needs L50_h")
+                for key in ("L10_h", "rated_speed_rpm")
+                if getattr(self, key) is not None
+            ]
+        elif self.L10_h is not None and self.L10_h > self.L50_h:
+            faults.append(("L10_h", f"{self.L10_h:g} h; accepted: at most L50_h"))
+        curve = (
+            "endurance_limit_MPa",
+            "ultimate_strength_MPa",
+            "sn_exponent",
+            "sn_knee_cycles",
+        )
+        absent = [key for key in curve if getattr(self, key) is None]
+        if 0 < len(absent) < len(curve):
+            faults.append((absent[0], f"missing; expected {', '.join(curve)} together"))
+        limit, ultimate = self.endurance_limit_MPa, self.ultimate_strength_MPa
+        if limit is not None and ultimate is not None and limit >= ultimate:
+            faults.append(
+                (
+                    "endurance_limit_MPa",
+                    f"{limit:g} MPa; accepted: below"
+                    f" ultimate_strength_MPa, {ultimate:g} MPa",
+                )
+            )
+        if faults:
+            raise Fault(*faults)
+        return self
+
+
 class JointSection(Section):
     """Drive of one joint; absent keys take their values from ``[defaults]``."""
 
@@ -164,6 +217,8 @@ class JointSection(Section):
     ``lumped``, an inertia that rotates only relative to that link."""
     motor: MotorLimits | None = None
     """Limits of the motor; by default it delivers any commanded torque."""
+    life: LifeSection | None = None
+    """Rated life and fatigue strength, for the life over the duty cycle."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

@@ -13,6 +13,7 @@ import numpy as np
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.figures.metrics import run_metrics
+from swgjoint.sim.life.loads import TaskLoads
 from swgjoint.typing import Array
 
 
@@ -70,6 +71,8 @@ class Run:
     """Wall time of all steps [s]."""
     recording: Path | None = None
     """File of the recording for the viewer; None if none was written."""
+    cycle: tuple[TaskLoads, ...] = ()
+    """Loads by task of the duty cycle; empty if the scene has none."""
 
     @property
     def steps_per_second(self) -> float:

@@ -10,9 +10,13 @@ from typing import Any
 from swgjoint.files import attempt_output
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.controller import Controller, KnownArm
+from swgjoint.sim.life.cycle import prepare_cycle, run_cycle
 from swgjoint.sim.run import Run
+from swgjoint.sim.sampled_loop import GivenLoop
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.task import task_of
 from swgjoint.sim.simulation import prepare_scene, simulate
 
 
@@ -50,6 +54,10 @@ def run_scene(
     If the step of the scene is outside the stability region of a joint, every step is
     divided into ``run.assembly.sub_steps`` equal sub-steps. The run records only the
     states at the steps of the scene.
+
+    If the scene has a duty cycle, each of its tasks is simulated after the scene itself
+    and contributes to the life of the drives; the recording contains only the motion of
+    the scene.
 
     Args:
         scene: A scene, the path of a scene file, or the name of a bundled scene.
@@ -92,8 +100,26 @@ def run_scene(
         progress=progress,
     )
     name = name or assembly.scene.name
+    tasks = prepare_cycle(
+        assembly.scene,
+        drives=drives,
+        controlled_by=assembly.controlled_by,
+        progress=progress,
+    )
+
+    def task_run(task: Assembly, label: str) -> Run:
+        own: GivenLoop | None = None
+        if controller is not None:
+            own = GivenLoop(task, controller, task_of(task, known_drives, known_arm))
+        return simulate(task, name=label, loop=own, progress=progress)
+
+    def with_cycle(run: Run) -> Run:
+        return replace(run, cycle=run_cycle(run, tasks, task_run))
+
     if recording is None:
-        return _for_user(simulate(assembly, name=name, loop=loop, progress=progress))
+        return _for_user(
+            with_cycle(simulate(assembly, name=name, loop=loop, progress=progress))
+        )
     from swgjoint.view.recording.recording import Recorder
 
     run: Run | None = None
@@ -108,7 +134,7 @@ def run_scene(
             recorder.finish(run)
         run = replace(run, recording=Path(recording))
     assert run is not None
-    return _for_user(run)
+    return _for_user(with_cycle(run))
 
 
 def _for_user(run: Run) -> SceneRun:

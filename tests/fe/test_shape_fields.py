@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from solved import PITCH, coarse
@@ -10,6 +12,10 @@ from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.fields import flexspline_field
 from swgjoint.fe.plane.shape_fields import plane_surface
+from swgjoint.fe.solid.drive3d import solid_sector_model
+from swgjoint.fe.solid.shape_fields import solid_surface
+from swgjoint.maps.root_stress import root_points, root_stress
+from swgjoint.units import mm
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +94,42 @@ def test_positions_and_torques_between_are_near(design, shown, follow):
     # 1 % of the deflection, and a stress that travels over the roots
     assert apart < 1e-5
     assert missed < 0.15 * largest
+
+
+def test_root_stress_is_the_principal_stress(design, shown, follow):
+    """With its sign, at the root of every tooth of the whole drive."""
+    torque = float(shown.torque[-2])
+    state = follow.to_torque(follow.engage(follow.deflect()), torque)
+    points = root_points(shown)
+    nodes = plane_surface(follow.model).nodes[points]
+    tensile, compressive, _ = flexspline_field(follow.model, state).maxima
+    principal = np.where(tensile > compressive, tensile, -compressive)[:, nodes]
+    stress = root_stress(shown)
+    teeth = design.drive.teeth_flexspline
+    place = 2.0 * np.pi / teeth * np.arange(teeth) + state.rotation
+    loads = np.full(teeth, torque)
+    largest = np.abs(principal).max()
+    free = 0.0
+    for k in range(len(points)):
+        own = stress.evaluate_at(place, loads, k)
+        clear = np.abs(principal[:, k]) > 0.2 * largest
+        assert np.array_equal(np.sign(own[clear]), np.sign(principal[clear, k]))
+        free = max(free, float(np.abs(own - principal[:, k]).max()))
+    # a load on a flank adds a second principal stress at the top of the fillet
+    assert free < 0.1 * largest
+
+
+def test_root_points_of_a_cup():
+    """At both edges of the face width, from the root land up to a quarter tooth."""
+    design = coarse("reference-3d")
+    surface = solid_surface(solid_sector_model(design, half=True))
+
+    points = surface.points[root_points(SimpleNamespace(points=surface.points))]
+    land = design.flexspline_inner_radius + design.flexspline.rim_mm * mm
+    height = np.hypot(*surface.points[:, :2].T).max() - land
+    radius = np.hypot(*points[:, :2].T)
+    assert radius.min() == pytest.approx(land, rel=1e-6)
+    assert land + 0.05 * height < radius.max() <= land + 0.25 * height
+    # both edges of the face width, none of the rows of the cup
+    assert np.ptp(points[:, 2]) == pytest.approx(design.drive.face_width_mm * mm)
+    assert len(set(points[:, 2].round(9))) == 2

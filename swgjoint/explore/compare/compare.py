@@ -8,34 +8,28 @@ these joints. The figures of a run are those of the worst of these joints.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from swgjoint.drives.fidelity import default_model
 from swgjoint.drives.references import find_drive, given_drives, load_drive
-from swgjoint.errors import ComputationError, InputError
+from swgjoint.errors import ComputationError
+from swgjoint.explore.compare.limits import require_cycle
 from swgjoint.explore.compare.scene import drives_of, source_of, with_drive, with_level
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.validity_marks import joints_judged
-from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
-from swgjoint.sim.figures.keys import LOWER, RIPPLE, UPPER
+from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.toml_file import read_toml
 from swgjoint.view.run import run_scene
 
 STRESS_POSITIONS = 6
 """Positions over one pitch of the fixed member, after which the mesh cycle repeats."""
-SORTABLE = (*UPPER, *LOWER)
-"""Figures that can be limited, and by which rows can be sorted."""
 SLOW = "fatigue_safety_factor"
 """Figure that is computed only if a spec or the sorting needs it, because its 3D model
 takes minutes."""
@@ -98,6 +92,12 @@ class Compared:
     """Peak torque divided by the repeated peak torque [-]."""
     cubed_mean_torque_of_rating: float
     """Cubic mean torque divided by the rated torque [-]."""
+    L10_h: float | None
+    """Smallest life over the duty cycle that nine out of ten wave-generator bearings
+    exceed [h]; None without a duty cycle or without the rated life of a joint."""
+    goodman_safety: float | None
+    """Smallest Goodman safety factor of the flexspline over the duty cycle [-]; None
+    without a duty cycle, or if it is not known for a joint."""
     real_time_factor: float
     """Simulated time divided by the wall time of the steps [-]."""
     joint: str
@@ -122,58 +122,6 @@ class Compared:
         }
 
 
-def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str, float]:
-    """Read the limits of a ``[spec]`` table.
-
-    Args:
-        path: TOML file.
-        accepted: Figures that may be limited.
-
-    Raises:
-        InputError: If the file cannot be read, has no limits, or a limit is invalid.
-    """
-    table = read_toml(Path(path), what="spec").get("spec")
-    if not isinstance(table, Mapping) or not table:
-        raise InputError(f"{path}: no limits; accepted: a table [spec] with limits")
-    return checked_limits(table, accepted, where=f"{path}: spec.")
-
-
-def checked_limits(
-    limits: Mapping[str, Any], accepted: Sequence[str] = SORTABLE, *, where: str = ""
-) -> dict[str, float]:
-    """Check limits by figure: all of them must be positive numbers.
-
-    Args:
-        limits: Values by figure.
-        accepted: Figures that may be limited.
-        where: Text that messages put before the name of a figure.
-
-    Returns:
-        The limits as floats.
-
-    Raises:
-        InputError: With one line for every unknown figure and invalid value.
-    """
-    faults = []
-    for key, value in limits.items():
-        if key not in accepted:
-            near = near_names(key, accepted)
-            hint = f"did you mean {' or '.join(near)}? " if near else ""
-            faults.append(
-                f"{where}{key} = {value!r}: unknown key; {hint}accepted: a positive"
-                f" number for {', '.join(accepted)}"
-            )
-        elif (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not 0.0 < value < np.inf
-        ):
-            faults.append(f"{where}{key} = {value!r}; accepted: a positive number")
-    if faults:
-        raise InputError("\n".join(faults))
-    return {key: float(value) for key, value in limits.items()}
-
-
 def compare(
     arguments: Sequence[str],
     scene: Scene,
@@ -191,7 +139,7 @@ def compare(
         scene: The scene.
         model: Fidelity of all designs, including those of the scene; None for the
             default of each design. It does not apply to maps and catalogue drives.
-        spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
+        spec: Limits by figure; see :mod:`swgjoint.sim.figures.keys`.
         fatigue: Whether to assess the fatigue of designs with a cup.
         joints: Joints that get the drive or the level, and whose figures count; every
             driven joint if empty.
@@ -201,8 +149,10 @@ def compare(
         One entry per argument.
 
     Raises:
-        InputError: If an argument is neither a drive nor a level.
+        InputError: If an argument is neither a drive nor a level, or if the spec limits
+            a life but the scene has no duty cycle.
     """
+    require_cycle(scene, spec or ())
     sources = {name: source_of(name) for name in arguments}
     kept: dict[str, DriveMap] = {}  # drives that the scene keeps
 
@@ -330,6 +280,10 @@ def row_of(
         cubed_mean_torque_of_rating=max(
             float(of["cubed_mean_Nm"] / of["rated_Nm"]) for of in ratings
         ),
+        L10_h=smallest_of_cycle(joints.values(), "bearing", "L10_h"),
+        goodman_safety=smallest_of_cycle(
+            joints.values(), "flexspline", "goodman_safety"
+        ),
         real_time_factor=float(run.time[-1] / run.wall),
         joint=worst,
         strongest_order_left_out=tuple(
@@ -340,6 +294,24 @@ def row_of(
         wall_s=0.0,
         run=run,
     )
+
+
+def smallest_of_cycle(
+    joints: Iterable[Mapping[str, Any]], part: str, key: str
+) -> float | None:
+    """Smallest figure of several joints over the duty cycle; None if one is unknown.
+
+    Joints whose life is unlimited do not count.
+
+    Args:
+        joints: Figures of the joints.
+        part: Part of the life, ``bearing`` or ``flexspline``.
+        key: Key of the figure.
+    """
+    lives = [joint["life"][part] for joint in joints if "life" in joint]
+    values = [life[key] for life in lives if life.get(key) is not None]
+    unknown = any(life["missing"] and not life["unlimited"] for life in lives)
+    return None if unknown else min(values, default=None)
 
 
 def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:

@@ -17,8 +17,16 @@ UPPER = (
     "wall_s",
 )
 """Figures that a specification bounds from above."""
-LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
+LOWER = (
+    "K1_Nm_rad",
+    "fatigue_safety_factor",
+    "L10_h",
+    "goodman_safety",
+    "real_time_factor",
+)
 """Figures that a specification bounds from below."""
+OF_CYCLE = ("L10_h", "goodman_safety")
+"""Figures of the duty cycle, which a scene without ``[[cycle]]`` does not have."""
 RIPPLE = (
     "ripple_rms_percent",
     "ripple_pp_percent",

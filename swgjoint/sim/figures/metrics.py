@@ -28,6 +28,7 @@ from swgjoint.sim.figures.ripple_validity import (
 )
 from swgjoint.sim.figures.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.figures.verdict import PHASE_STEP, judge_run
+from swgjoint.sim.life.figures import cycle_figures, life_figures
 from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg, mm
 
@@ -52,6 +53,7 @@ def run_metrics(run: Run) -> dict[str, Any]:
     energy = run_energy(run)
     return {
         **judge_run(run, joints, energy),
+        **({"cycle": cycle_figures(run)} if run.cycle else {}),
         "joints": joints,
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
@@ -123,6 +125,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "motor": use_of_motor(run, j),
         "energy": joint_energy(run, j),
         "settling": joint_settling(run, j),
+        **({"life": life_figures(run, j)} if run.cycle else {}),
         **({} if untold is None else {"missing": {"orders": untold}}),
     }
 

@@ -9,6 +9,7 @@ A run is ``NOT VALID`` if its model does not apply:
 - At the torques of the run, the ripple of a map differs too much from finite-element
   results that were not used in the fit of the map.
 - The energy balance does not close.
+- The run of a task of the duty cycle is not valid.
 
 A drive that exceeds its ratings is a fault of the design, not of the figures, and
 causes a warning only.
@@ -125,6 +126,7 @@ def judge_run(
         reasons += joint_reasons(name, joint)
     rated = sum(joint["ratings"]["rated_Nm"] for joint in joints.values())
     reasons += energy_reasons(energy, rated)
+    reasons += [reason for task in run.cycle for reason in task.reasons]
     return {
         "verdict": NOT_VALID if reasons else VALID,
         "reasons": reasons,

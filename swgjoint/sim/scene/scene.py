@@ -11,8 +11,10 @@ from pydantic import Field, PrivateAttr, model_validator
 from swgjoint.drives.sections import DRIVE_KEYS, JointSection, Level
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, validate
-from swgjoint.models_path import find, is_file
+from swgjoint.models_path import find
 from swgjoint.sim.arm.reading import ArmReading
+from swgjoint.sim.scene.anchoring import anchor_paths
+from swgjoint.sim.scene.cycle_section import Cycle
 from swgjoint.sim.scene.feature_sections import (
     Disturbance,
     Payload,
@@ -76,6 +78,9 @@ class Scene(Section):
     """Body that the arm carries at its tool."""
     disturbance: list[Disturbance] = Field(default_factory=list)
     """Torques and forces that the controller does not know in advance."""
+    cycle: Cycle = Field(default_factory=list)
+    """Duty cycle for the life of the drives, one table per task; without it, a run
+    reports no life. A table without keys is the motion of the scene itself."""
     simulation: Simulation
     """Duration and time stepping."""
     recording: Recording = Recording()
@@ -190,7 +195,7 @@ class Scene(Section):
         """
         path = find(reference, "scenes", ".toml", what="scene")
         data = read_toml(path, what="scene")
-        _anchor_paths(data, path.parent)
+        anchor_paths(data, path.parent)
         return cls.from_data(data, where=str(path), overrides=overrides)
 
     @classmethod
@@ -261,6 +266,21 @@ class Scene(Section):
         data = self.model_dump(exclude_unset=True)
         return self.from_data(data, where=self.where, overrides=overrides)
 
+    def task_scene(self, k: int) -> Self:
+        """The scene of one task of the duty cycle, which must not be a rest.
+
+        Args:
+            k: Index of the task.
+
+        Raises:
+            InputError: If the task does not fit the time step; one line per fault.
+        """
+        task = self.cycle[k]
+        data = self.model_dump(exclude_unset=True) | {"cycle": []} | task.changes
+        if task.duration_s is not None:
+            data["simulation"] = data["simulation"] | {"duration_s": task.duration_s}
+        return self.from_data(data, where=f"{self.where}: cycle[{k}]")
+
     def with_drive(self, drive: str) -> Self:
         """A copy in which every joint has this drive, a design at default fidelity."""
         none = dict.fromkeys((*DRIVE_KEYS, "model"))
@@ -310,19 +330,3 @@ def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[s
     except InputError as exc:
         return [line.replace("\0: ", f"{path}.", 1) for line in str(exc).split("\n")]
     return []
-
-
-def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
-    """Resolve paths in a scene file relative to its folder; keep names unchanged."""
-
-    def anchor(table: Any, key: str) -> None:
-        value = table.get(key) if isinstance(table, dict) else None
-        if isinstance(value, str) and is_file(folder / value):
-            table[key] = str(folder / value)
-
-    anchor(data, "arm")
-    anchor(data.get("trajectory"), "file")
-    anchor(data.get("defaults"), "drive")
-    joints = data.get("joints")
-    for joint in joints.values() if isinstance(joints, dict) else ():
-        anchor(joint, "drive")

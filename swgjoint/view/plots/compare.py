@@ -27,6 +27,8 @@ HEADER = {
     "von_mises_MPa": ("von Mises stress", "MPa"),
     "fatigue_safety_factor": ("fatigue safety factor", ""),
     "peak_torque_of_rating": ("peak torque", "of repeated peak"),
+    "L10_h": ("bearing life L10", "h"),
+    "goodman_safety": ("Goodman safety of the flexspline", ""),
     "wall_s": ("computing time", "s"),
 }
 """Displayed name and unit of the figures of a row, by key."""

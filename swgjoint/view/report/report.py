@@ -12,7 +12,9 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
 from swgjoint.toml_text import toml_text
+from swgjoint.view.life.picture import life_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
+from swgjoint.view.report.life import life_tables
 from swgjoint.view.report.plots import joint_png
 from swgjoint.view.report.tables import (
     Table,
@@ -100,7 +102,15 @@ def write_report(
         description=scene.description,
         alerts=alerts(runs),
         summary=summary or summary_table(runs),
-        pictures=pictures or {},
+        tables=life_tables(runs),
+        pictures={
+            **(pictures or {}),
+            **{
+                f"Duty cycle of {label}": life_picture(run)
+                for label, run in runs.items()
+                if run.cycle
+            },
+        },
         labels=labels,
         joints=panels,
         sheets=sheets,

@@ -1,0 +1,1 @@
+"""Life of the drives of a scene over its duty cycle."""

@@ -1,0 +1,1 @@
+"""Life over a duty cycle for display: table and picture."""

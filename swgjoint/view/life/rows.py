@@ -1,0 +1,103 @@
+"""Rows of the table of the life over a duty cycle, for the terminal and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from swgjoint.view.words import format_figure, short
+
+COLUMNS = (
+    ("joint", ""),
+    ("cubic mean torque", "N·m"),
+    ("mean input speed", "rpm"),
+    ("L50", "h"),
+    ("L10", "h"),
+    ("root stress", "MPa, amplitude"),
+    ("Goodman safety", ""),
+    ("flexspline life", "h"),
+    ("momentary peak", "margin"),
+    ("ratcheting", "margin"),
+    ("buckling", "margin"),
+)
+"""Name and unit of every column."""
+
+
+def describe_cycle(cycle: Mapping[str, Any]) -> str:
+    """Duration and tasks of a duty cycle in one line.
+
+    >>> tasks = [{"name": "lift", "duration_s": 2.0, "times": 3, "rest": False}]
+    >>> describe_cycle({"duration_s": 6.0, "tasks": tasks})
+    'Duty cycle of 6 s: lift 3 x 2 s'
+    """
+    parts = [
+        f"{task['name']} "
+        + (f"{task['times']} x " if task["times"] > 1 else "")
+        + f"{task['duration_s']:g} s"
+        for task in cycle["tasks"]
+    ]
+    return f"Duty cycle of {cycle['duration_s']:g} s: {', '.join(parts)}"
+
+
+def life_cells(joint: str, life: Mapping[str, Any]) -> list[str]:
+    """Cells of one joint, in the order of :data:`COLUMNS`.
+
+    Args:
+        joint: Name of the joint.
+        life: Its figures ``life``.
+    """
+    bearing, flexspline = life["bearing"], life["flexspline"]
+    return [
+        short(joint),
+        format_figure(life["cubed_mean_Nm"]),
+        format_figure(life["mean_input_speed_rpm"]),
+        _hours(bearing["L50_h"]),
+        _hours(bearing["L10_h"]),
+        format_figure(flexspline["stress_amplitude_MPa"]),
+        format_figure(flexspline["goodman_safety"]),
+        "unlimited" if flexspline["unlimited"] else _hours(flexspline["life_h"]),
+        *(format_figure(life["margins"][k]) for k in life["margins"]),
+    ]
+
+
+def life_grid(
+    lives: Mapping[str, Mapping[str, Any]],
+) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """Columns and rows of the table; columns without any value are left out.
+
+    Args:
+        lives: Figures ``life`` by joint.
+    """
+    rows = [life_cells(joint, life) for joint, life in lives.items()]
+    used = [k for k in range(len(COLUMNS)) if any(row[k] != "-" for row in rows)]
+    return [COLUMNS[k] for k in used], [[row[k] for k in used] for row in rows]
+
+
+def _hours(value: float | None) -> str:
+    """A life with three digits; a dash if it is not known.
+
+    >>> _hours(6379812.3), _hours(1.44e12), _hours(None)
+    ('6,380,000', '1.44e+12', '-')
+    """
+    if value is None:
+        return "-"
+    return f"{float(f'{value:.3g}'):,.12g}" if value < 1e7 else f"{value:.3g}"
+
+
+def missing_lines(joints: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Reasons for missing figures, grouped by joints with the same reason.
+
+    Args:
+        joints: Figures ``life`` by joint.
+    """
+    names: dict[tuple[str, str], list[str]] = {}
+    for joint, life in joints.items():
+        for part, title in (("bearing", "bearing life"), ("flexspline", "fatigue")):
+            if reason := life[part]["missing"]:
+                names.setdefault((title, reason), []).append(short(joint))
+    return [
+        f"-: no {title}"
+        + ("" if len(of) == len(joints) else f" of {', '.join(of)}")
+        + f": {reason}"
+        for (title, reason), of in names.items()
+    ]

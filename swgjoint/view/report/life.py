@@ -1,0 +1,42 @@
+"""Life over the duty cycle in the HTML report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from swgjoint.view.life.rows import describe_cycle, life_grid, missing_lines
+from swgjoint.view.report.tables import Cell, Table
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+
+def life_tables(runs: Mapping[str, Run]) -> list[Table]:
+    """One table for every run with a duty cycle.
+
+    Args:
+        runs: Runs by displayed name.
+    """
+    tables = []
+    for label, run in runs.items():
+        if not run.cycle:
+            continue
+        metrics = run.metrics()
+        lives = {name: joint["life"] for name, joint in metrics["joints"].items()}
+        columns, rows = life_grid(lives)
+        tables.append(
+            Table(
+                title=f"Life of {label}",
+                header=columns,
+                rows=[
+                    [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
+                    for cells in rows
+                ],
+                notes=[
+                    f"{describe_cycle(metrics['cycle'])}.",
+                    *missing_lines(lives),
+                ],
+            )
+        )
+    return tables
