@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import settings_of
-from swgjoint.envs.core import Core, Entry, bounds
+from swgjoint.envs.core import Core
+from swgjoint.envs.entries import Entry, bounds
 from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task

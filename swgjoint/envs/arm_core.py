@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from swgjoint.drives.references import names_catalogue
 from swgjoint.envs.arguments import check_flag, check_number, format_value
-from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
+from swgjoint.envs.core import Core, EpisodeLimits
+from swgjoint.envs.entries import Entry, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
@@ -135,6 +136,7 @@ class ArmCore(Core):
             assembly.model,
             drives,
             count,
+            start=_start(assembly),
             sub_steps=round(task.period / assembly.step),
             threads=threads,
             variable=variable,
@@ -166,7 +168,6 @@ class ArmCore(Core):
         path = self._path[:, 0]
         self._authority = s.authority_of_rated * rated / ratio
         self._feedforward = assembly.feedforward[:: assembly.sub_steps][: steps + 1]
-        self._start = _start(assembly)
         top = 2.0 * ratio * np.abs(self._path[:, 1]).max(axis=0) + SPEED_MARGIN
         super().__init__(
             plant,
@@ -247,9 +248,18 @@ class ArmCore(Core):
             shares: Relative changes of the load inertia [-]. Shape (n_joints,).
         """
 
-    def draw(self, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> tuple[None, Array]:
         """Plan of every episode: the path of the scene."""
-        return self._path
+        return None, self._path
+
+    def sample(self, drawn: None, part: slice) -> Array:
+        """Part of the path of the scene.
+
+        Args:
+            drawn: None.
+            part: Range of the instants.
+        """
+        return self._path[part]
 
     def command(self, action: Array) -> Array:
         """Input of the scene's motor loops with the action [N·m]. (n, n_joints)."""
@@ -262,10 +272,6 @@ class ArmCore(Core):
             shift = s.shift_arcmin * arcmin * action
             own = self.loop.command(plan[:, 0] + shift, plan[:, 1])
         return np.asarray(own + self._feedforward[here])
-
-    def start(self, plan: Array) -> tuple[Array, Array]:
-        """Motor angles [rad] and drive torques [N·m] at the start of the scene."""
-        return self._start
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""

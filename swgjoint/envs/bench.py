@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from swgjoint.envs.arguments import check_flag, check_number, format_value
-from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
+from swgjoint.envs.core import Core, EpisodeLimits
+from swgjoint.envs.entries import Entry, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
@@ -201,6 +202,7 @@ class BenchCore(Core):
             model,
             [attached],
             count,
+            start=(np.zeros(1), np.zeros(1)),
             sub_steps=sub_steps,
             threads=threads,
             variable=variable,

@@ -9,92 +9,27 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import floor, log10
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.envs.entries import Entry, bounds
 from swgjoint.envs.loop import MotorLoop
+from swgjoint.envs.plans import Plans, PlanSize
 from swgjoint.envs.plant import Plant
 from swgjoint.envs.sensors import Readout, Sensors
 from swgjoint.envs.specimen import SpecimenTolerances
 from swgjoint.errors import InputError
-from swgjoint.joint.variation import Variation
-from swgjoint.maps.drive_map import DriveMap
+from swgjoint.joint.variation import SIZE, Variation
 from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 Rows = NDArray[np.intp]
 
-TRACKED = 50.0 * arcmin
-"""Largest observed link error [rad], twenty times the error of a rigid plan; relevant
-errors would be a tiny fraction of a much wider range. Larger errors are clipped."""
-REGAINED = 0.1
-"""Time in which the largest observed speed error accumulates to that error [s]."""
 LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
 """Names of the limits by their number in ``info["broken_limit"]``."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """One quantity of an observation or an action, with its unit and its bounds."""
-
-    meaning: str
-    """Name of the quantity for tables."""
-    unit: str
-    low: float
-    high: float
-    count: int = 1
-    """Number of values of this quantity, e.g. one per joint."""
-
-
-def table(entries: Sequence[Entry]) -> str:
-    """Table of the entries as text for a docstring."""
-    rows, first = [("index", "meaning", "unit", "range")], 0
-    for e in entries:
-        index = str(first) if e.count == 1 else f"{first}-{first + e.count - 1}"
-        rows.append((index, e.meaning, e.unit, f"{e.low:.5g} to {e.high:.5g}"))
-        first += e.count
-    widths = [max(len(row[c]) for row in rows) for c in range(4)]
-    line = "  ".join("=" * w for w in widths)
-    text = ["  ".join(x.ljust(w) for x, w in zip(r, widths, strict=True)) for r in rows]
-    return "\n".join(t.rstrip() for t in [line, text[0], line, *text[1:], line])
-
-
-def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
-    """Lower and upper bounds of all values. Shapes (n_values,)."""
-    low, high = np.array([(e.low, e.high) for e in entries for _ in range(e.count)]).T
-    return low, high
-
-
-def error_bounds(
-    ratio: float, *, speed: float, acceleration: float, age: float, period: float
-) -> tuple[float, float]:
-    """Bounds of the observed errors of motor angle [rad] and motor speed [rad/s].
-
-    A reading is compared with the current reference, so the bounds include the change
-    of the reference during the age of the reading.
-
-    Args:
-        ratio: Ratio of the drive [-].
-        speed: Largest speed of the reference at the link [rad/s].
-        acceleration: Largest acceleration of the reference at the link [rad/s²].
-        age: Age of the readings [s].
-        period: Control period, over which speeds are measured [s].
-    """
-    i = abs(ratio)
-    return (
-        ceiling(i * (TRACKED + speed * age)),
-        ceiling(i * (TRACKED / REGAINED + acceleration * (age + 0.5 * period))),
-    )
-
-
-def ceiling(value: float) -> float:
-    """Value > 0 rounded up to two significant digits, for bounds in a table."""
-    digit = 10.0 ** (floor(log10(value)) - 1)
-    return max(value, float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,15 +90,17 @@ class Core(ABC):
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
         self._readout = Readout(sensors, count, rated, period)
-        self._rows = np.arange(count)
         self.instant = np.zeros(count, dtype=np.intp)
         """Number of control periods since the start. Shape (n,)."""
-        # position, velocity, acceleration, load torque and known torque of the links
-        own = np.arange(1 if shared else count)
-        self._plan = np.zeros((own.size, steps + 1, 5, n))
-        self._planned = np.broadcast_to(own, count) if shared else own
+        size = PlanSize(
+            count=count,
+            instants=steps + 1,
+            joints=n,
+            channels=self._readout.channels,
+            shared=shared,
+        )
+        self._plans = Plans(size, self.draw, self.sample)
         self._task: Task | None = None
-        self._normal = np.zeros((count, steps + 1, self._readout.channels))
         self.variations: list[tuple[Variation, ...]] = [(Variation(),) * n] * count
         """Deviations of every simulation's drives from the nominal ones."""
         self.observation_entries, self.action_entries = self.entries()
@@ -180,24 +117,26 @@ class Core(ABC):
         """Entries of observation and action."""
 
     @abstractmethod
-    def draw(self, rng: np.random.Generator) -> Array:
-        """Draw the plan of one episode. Shape (steps + 1, 5, n_joints).
+    def draw(self, rng: np.random.Generator) -> tuple[Any, Array]:
+        """Draw the coefficients of the plan of one episode, and compute the plan.
 
         It consists of position, velocity, acceleration, load torque and known torque of
-        the links. The known torque is that of load, inertia and weight.
+        the links. The known torque is that of load, inertia and weight. Shape (steps +
+        1, 5, n_joints).
+        """
+
+    @abstractmethod
+    def sample(self, drawn: Any, part: slice) -> Array:
+        """Part of a plan. Shape (number of instants, 5, n_joints).
+
+        Args:
+            drawn: Coefficients of the plan.
+            part: Range of the instants, from 0 to the number of control periods.
         """
 
     @abstractmethod
     def command(self, action: Array) -> Array:
         """Motor input for a clipped action [N·m]. Shape (n, n_joints)."""
-
-    def start(self, plan: Array) -> tuple[Array, Array]:
-        """Motor angles [rad] and drive torques [N·m] at the start. Shapes (n_joints,).
-
-        Args:
-            plan: Plan of the episode. Shape (steps + 1, 5, n_joints).
-        """
-        return self.joints.ratio * plan[0, 0], plan[0, 4]
 
     @abstractmethod
     def columns(self) -> list[Array]:
@@ -226,31 +165,28 @@ class Core(ABC):
             rows: Indices of the simulations.
             rngs: Random generators, one for each of them.
         """
-        # new arrays, because the arrays that the last step returned must not change
-        torque = self.output_torque.copy()
-        for k, rng in zip(rows, rngs, strict=True):
-            maps: tuple[DriveMap, ...] = tuple(d.drive for d in self.plant.drives)
+        index, varied = np.asarray(rows, dtype=np.intp), None
+        if self.plant.variable:
+            varied = np.empty((len(rows), len(self.plant.drives), SIZE))
+        for m, (k, rng) in enumerate(zip(rows, rngs, strict=True)):
             if self.tolerances is not None:
-                drawn = [self.tolerances.draw(rng) for _ in maps]
+                drawn = [self.tolerances.draw(rng) for _ in self.plant.drives]
                 self.vary_load(k, np.array([share for _, share in drawn]))
-                if self.plant.variable:
+                if varied is not None:
                     self.variations[k] = specimens = tuple(v for v, _ in drawn)
-                    self.plant.vary(k, specimens)
-                    maps = tuple(
-                        v.apply_to(m) for v, m in zip(specimens, maps, strict=True)
-                    )
-            self._plan[self._planned[k]] = plan = self.draw(rng)
-            self._normal[k] = rng.standard_normal(self._normal.shape[1:])
-            angle, torque[k] = self.start(plan)
-            self.plant.place(k, angle, torque[k], maps)
+                    varied[m] = [v.numbers for v in specimens]
+            self._plans.begin(k, rng)
+        self.plant.place(index, varied)
+        # new arrays, because the arrays that the last step returned must not change
+        self.output_torque = self.output_torque.copy()
+        self.output_torque[index] = self.plant.start_torque
         self._task = None
-        index = np.asarray(rows, dtype=np.intp)
         self.instant[index] = 0
-        self.output_torque = torque
         self.action = _without(self.action, index)
         self.motor_torque = _without(self.motor_torque, index)
         self._look()
-        self._readout.start(index, self._true()[index], self._normal[index, 0])
+        noise = self._plans.noise_at(self._here)
+        self._readout.start(index, self._true()[index], noise[index])
         self.judge()
         self.forget(index)
 
@@ -273,6 +209,7 @@ class Core(ABC):
                 f" each of {len(self.action)} episodes"
             )
         self.action = np.clip(action, -1.0, 1.0)
+        self._plans.move_to(self.instant)
         command = self.command(self.action)
         plant.step(command, self.now[:, 3], active)
         self.instant += 1 if active is None else active
@@ -280,20 +217,20 @@ class Core(ABC):
         wanted = self.loop.torque(command, self.motor_angle, plant.motor_speed)
         self.motor_torque = np.clip(wanted, -limit, limit)
         self.output_torque = self.plant.output_torque()
-        self._readout.read(self._true(), self._normal[self._rows, self._here])
+        self._readout.read(self._true(), self._plans.noise_at(self._here))
         self.judge()
         self.remember()
 
     def next_plan(self) -> Array:
         """Plan at the end of the next step. Shape (n, 5, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
-        return np.asarray(self._plan[self._planned, after])
+        return self._plans.plan_at(after)
 
     def _look(self) -> None:
         """Read the state of the simulations."""
         plant = self.plant
         self._here = np.minimum(self.instant, self.steps)
-        self.now = self._plan[self._planned, self._here]
+        self.now = self._plans.plan_at(self._here)
         """Plan at the current instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
 
@@ -365,7 +302,7 @@ class Core(ABC):
         """Motions of all episodes; the axis of episodes precedes that of joints."""
         if self._task is None:
             # (5, steps + 1, n, n_joints); copied, as the next episodes overwrite it
-            plan = self._plan[self._planned].transpose(2, 1, 0, 3).copy()
+            plan = self._plans.whole_plans().transpose(2, 1, 0, 3).copy()
             age = self.sensors.delay_periods * self.period
             self._task = Task(
                 period=self.period,

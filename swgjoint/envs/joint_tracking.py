@@ -9,8 +9,15 @@ import numpy as np
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import BenchCore, BenchSettings
-from swgjoint.envs.core import Entry, ceiling
-from swgjoint.envs.references import KINDS, draw_motion, smooth_step
+from swgjoint.envs.entries import Entry, ceiling
+from swgjoint.envs.references import (
+    KINDS,
+    DrawnMotion,
+    Instants,
+    Motion,
+    draw_motion,
+    smooth_step,
+)
 from swgjoint.errors import InputError
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
@@ -60,10 +67,34 @@ class TrackingSettings(BenchSettings):
         return self.max_speed_rad_s / SHORTEST
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnTracking:
+    """Coefficients of the plan of one episode."""
+
+    motion: DrawnMotion
+    """Motion of the link."""
+    load: float
+    """Load torque after its growth [N·m]."""
+
+
 class TrackingCore(BenchCore):
     """Episodes of ``JointTracking-v0``."""
 
     settings: TrackingSettings
+
+    def __init__(self, count: int, threads: int, settings: TrackingSettings) -> None:
+        """Build the model once, then ``count`` simulations of it.
+
+        Args:
+            count: Number of episodes.
+            threads: Number of engine threads; 0: one per core.
+            settings: Arguments of the environment.
+        """
+        time = np.asarray(np.arange(settings.steps + 1) * settings.period_s, float)
+        self._start = int(np.searchsorted(time, MOTION_START))
+        self._instants = Instants(time[: time.size - self._start])
+        self._load = smooth_step(time, LOAD_RAMP)[0]
+        super().__init__(count, threads, settings)
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
         """Entries of observation and action."""
@@ -88,14 +119,11 @@ class TrackingCore(BenchCore):
             *self.sensor_entries(),
         ), (share,)
 
-    def draw(self, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> tuple[DrawnTracking, Array]:
         """Draw a reference of one of the kinds and a load that grows to its value."""
         s = self.settings
-        time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
-        start = int(np.searchsorted(time, MOTION_START))
-        motion = np.zeros((3, s.steps + 1))
-        motion[:, start:] = draw_motion(
-            time[: time.size - start],
+        motion, values = draw_motion(
+            self._instants,
             rng,
             kinds=s.kinds,
             max_speed=s.max_speed_rad_s,
@@ -104,9 +132,29 @@ class TrackingCore(BenchCore):
         )
         rated = self.joint.drive.ratings.rated_torque
         top = float(rng.uniform(-1.0, 1.0)) * s.load_of_rated * rated
-        load = top * smooth_step(time, LOAD_RAMP)[0]
-        known = load + s.link_inertia * motion[2]
-        return np.stack([*motion, load, known], axis=1)[:, :, None]
+        drawn = DrawnTracking(motion=motion, load=top)
+        return drawn, self._plan(drawn, values, slice(0, s.steps + 1))
+
+    def sample(self, drawn: DrawnTracking, part: slice) -> Array:
+        """Part of a plan.
+
+        Args:
+            drawn: Coefficients of the plan.
+            part: Range of the instants.
+        """
+        moving = slice(*(max(k - self._start, 0) for k in (part.start, part.stop)))
+        values = drawn.motion.sample(self._instants, moving)
+        return self._plan(drawn, values, part)
+
+    def _plan(self, drawn: DrawnTracking, values: Motion, part: slice) -> Array:
+        """Plan with the values of the motion at those instants that it covers."""
+        plan = np.zeros((part.stop - part.start, 5))
+        first = len(plan) - values[0].size
+        for column, one in enumerate(values):
+            plan[first:, column] = one
+        plan[:, 3] = drawn.load * self._load[part]
+        plan[:, 4] = plan[:, 3] + self.settings.link_inertia * plan[:, 2]
+        return plan[:, :, None]
 
     def command(self, action: Array) -> Array:
         """Motor torques: the action times the torque limit [N·m]. Shape (n, 1)."""

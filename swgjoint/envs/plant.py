@@ -11,11 +11,10 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import check_count
-from swgjoint.errors import InputError
+from swgjoint.envs.rest import DriveRest, balance_specimens
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.response import responses
 from swgjoint.joint.variation import SIZE, Variation
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
 Index = NDArray[np.intp]
@@ -35,6 +34,7 @@ class Plant:
         drives: Sequence[JointDrive],
         count: int,
         *,
+        start: tuple[Array, Array],
         sub_steps: int = 1,
         threads: int = 0,
         variable: bool = False,
@@ -45,6 +45,8 @@ class Plant:
             model: Compiled model, where actuator j applies the motor torque of joint j.
             drives: Drives of the joints, of level ``linear`` or ``full``.
             count: Number of simulations.
+            start: Motor angles [rad] and torques of the drives on the links [N·m] at
+                the start of every episode. Shapes (n_joints,).
             sub_steps: Number of engine steps per control period.
             threads: Number of engine threads; 0: one per core.
             variable: Whether drives differ between simulations.
@@ -63,7 +65,7 @@ class Plant:
         self._ctrl, self._load = batch.bind("ctrl"), batch.bind("qfrc_applied")
         self.variable = variable
         self._user = batch.expand("tendon_user") if variable else None
-        self._tendons = [int(model.tendon(d.tendon).id) for d in drives]
+        self._tendons = np.array([int(model.tendon(d.tendon).id) for d in drives])
         self._others: tuple[Array, Index] | None = None
         if all(d.level == "full" for d in drives):
             state = batch.bind("plugin_state")
@@ -76,6 +78,13 @@ class Plant:
             self._others = state, np.array(others)
             self._qacc = batch.bind("qacc")
             self._factor = batch.bind("qLD"), batch.bind("qLDiagInv")
+        self._start = start
+        self._nominal = self._balance(np.zeros((1, len(drives), SIZE)))
+
+    @property
+    def start_torque(self) -> Array:
+        """Torques of the drives on the links at the start [N·m]. Shape (n_joints,)."""
+        return self._start[1]
 
     @property
     def motor_angle(self) -> Array:
@@ -132,61 +141,61 @@ class Plant:
         self._load[:, self._link_v] = -load
         self.batch.step(active, nstep=self.sub_steps)
 
-    def place(
-        self,
-        index: int,
-        motor_angle: Array,
-        torque: Array,
-        maps: Sequence[DriveMap],
-    ) -> None:
-        """Set one simulation to a state of rest with given drive torques.
+    def place(self, rows: Index, variations: Array | None) -> None:
+        """Set simulations to rest at the start, the drives with their torques there.
 
         Args:
-            index: Index of the simulation.
-            motor_angle: Motor angles [rad]. Shape (n_joints,).
-            torque: Torques of the drives on the links [N·m]. Same shape.
-            maps: Drive maps of the joints, with the deviations of this simulation.
+            rows: Indices of the simulations. Shape (m,).
+            variations: ``numbers`` of the drives' deviations in these simulations, or
+                None for the nominal drives. Shape (m, n_joints, 5).
         """
-        batch, links = self.batch, np.empty(len(maps))
-        forces = np.zeros((len(maps), 2))
-        for j, (attached, drive) in enumerate(zip(self.drives, maps, strict=True)):
-            theta, wanted = float(motor_angle[j]), float(torque[j])
-            if attached.level == "linear":
-                links[j] = theta / drive.ratio - wanted / attached.stiffness
-            else:
-                links[j], forces[j] = _balance(drive, theta, wanted)
-        batch.reset([index], stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._qpos[index, self._link_q] = links
-        self._qpos[index, self._rotor_q] = motor_angle
+        rests = self._nominal
+        if variations is not None and self._user is not None:
+            rests = self._balance(variations)
+            self._user[rows[:, None], self._tendons, :SIZE] = variations
+        batch = self.batch
+        batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        for j, one in enumerate(rests):
+            self._qpos[rows, self._link_q[j]] = one.link_angle
+        self._qpos[rows[:, None], self._rotor_q] = self._start[0]
         if self._others is None:
             return
         # initialise the plugin state as in equilibrium: the accelerations due to all
         # other forces cancel those due to the drive, and hysteresis is relaxed
-        batch.forward([index])
+        batch.forward(rows)
         state, others = self._others
-        factor, inverse = (part[index] for part in self._factor)
+        factor, inverse = (part[rows] for part in self._factor)
         for side, dofs in enumerate((self._rotor_v, self._link_v)):
             weight = responses(self.model, factor, inverse, dofs)
-            state[index, others - 1 + side] = -weight * forces[:, side]
-        for j, drive in enumerate(maps):
-            first = others[j] + 1
-            torsion = float(drive.torsion(motor_angle[j], links[j]))
-            state[index, first : first + len(drive.hysteresis)] = torsion
+            for j, one in enumerate(rests):
+                force = (one.input_torque, one.output_torque)[side]
+                state[rows, others[j] - 1 + side] = -weight[:, j] * force
+        for j, one in enumerate(rests):
+            for k in range(len(self.drives[j].drive.hysteresis)):
+                state[rows, others[j] + 1 + k] = one.torsion
 
-    def vary(self, index: int, variations: Sequence[Variation]) -> None:
-        """Vary the drives of one simulation.
-
-        Args:
-            index: Index of the simulation.
-            variations: Deviations of the drives from their maps, one per joint.
-
-        Raises:
-            InputError: If the plant was made with ``variable=False``.
-        """
-        if self._user is None:
-            raise InputError("variations of drives need a plant with variable=True")
-        for tendon, variation in zip(self._tendons, variations, strict=True):
-            self._user[index, tendon, :SIZE] = variation.numbers
+    def _balance(self, variations: Array) -> list[DriveRest]:
+        """Equilibria of the drives at the start. ``variations`` as in :meth:`place`."""
+        rests = []
+        for j, (attached, theta, torque) in enumerate(
+            zip(self.drives, *self._start, strict=True)
+        ):
+            if attached.level == "full":
+                own = variations[:, j]
+                rests.append(balance_specimens(attached.drive, own, theta, torque))
+                continue
+            torsion = torque / attached.stiffness * np.ones(1)
+            angle = theta / attached.ratio - torsion
+            still = 0.0 * torsion
+            rests.append(
+                DriveRest(
+                    link_angle=angle,
+                    input_torque=still,
+                    output_torque=still,
+                    torsion=torsion,
+                )
+            )
+        return rests
 
 
 def specimen(attached: JointDrive, variation: Variation) -> JointDrive:
@@ -209,18 +218,3 @@ def _addresses(joints: Sequence[object]) -> tuple[Index, Index]:
         np.array([int(j.qposadr[0]) for j in joints]),  # type: ignore[attr-defined]
         np.array([int(j.dofadr[0]) for j in joints]),  # type: ignore[attr-defined]
     )
-
-
-def _balance(
-    drive: DriveMap, theta: float, torque: float
-) -> tuple[float, tuple[float, float]]:
-    """Link angle [rad] for an output torque, and torques on input and output [N·m]."""
-    psi = theta / drive.ratio
-    for _ in range(50):
-        on_input, on_output = (float(f) for f in drive.forces(theta, psi))
-        missing = torque - on_output
-        if abs(missing) < 1e-9 * drive.ratings.rated_torque:
-            break
-        torsion = drive.torsion(theta, psi)
-        psi -= missing / float(drive.stiffness(torsion, theta, psi))
-    return psi, (on_input, on_output)

@@ -15,6 +15,7 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,107 +34,195 @@ PARTS = 5
 """Number of oscillations in a multisine."""
 
 _STEP = np.polynomial.Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70])
-_STEP_1, _STEP_2 = _STEP.deriv(), _STEP.deriv(2)
+_STEPS = [p.coef[::-1].tolist() for p in (_STEP, _STEP.deriv(), _STEP.deriv(2))]
+"""Coefficients of the smooth step and its derivatives, highest power first."""
 
 
 def smooth_step(time: Array, duration: float) -> Motion:
     """Smooth step from 0 to 1 that starts at time 0, and its first two derivatives.
 
     Args:
-        time: Times [s]. Shape (n,).
+        time: Increasing times [s]. Shape (n,).
         duration: Duration of the step [s].
 
     Returns:
         Step [-] and its derivatives [1/s] and [1/s²]. Shapes (n,).
     """
-    x = np.clip(np.asarray(time) / duration, 0.0, 1.0)
-    return _STEP(x), _STEP_1(x) / duration, _STEP_2(x) / duration**2
+    x = np.asarray(time) / duration
+    first, last = np.searchsorted(x, 0.0, side="right"), np.searchsorted(x, 1.0)
+    step, slope, bend = np.zeros((3, x.size))
+    step[last:] = 1.0
+    inside = x[first:last]
+    for values, (highest, *others) in zip((step, slope, bend), _STEPS, strict=True):
+        value = values[first:last]
+        value += highest
+        for one in others:
+            value *= inside
+            if one:
+                value += one
+    slope /= duration
+    bend /= duration**2
+    return step, slope, bend
 
 
-def _oscillation(time: Array, frequency: Array, phase: Array, weight: Array) -> Motion:
-    """Sum of sines that starts at rest at angle 0 and grows over :data:`RAMP`."""
-    omega = 2.0 * np.pi * frequency
-    angle = omega * time[:, None] + phase
-    sin, cos = weight * np.sin(angle), weight * np.cos(angle)
-    # the offset makes y itself start at 0, in addition to the factor w
-    y = sin.sum(axis=1) - sin[0].sum()
-    y_1, y_2 = (omega * cos).sum(axis=1), (-(omega**2) * sin).sum(axis=1)
-    w, w_1, w_2 = smooth_step(time, RAMP)
-    return w * y, w_1 * y + w * y_1, w_2 * y + 2.0 * w_1 * y_1 + w * y_2
+class Instants:
+    """Times at which motions are sampled, with what all motions have in common."""
+
+    def __init__(self, time: Array) -> None:
+        """Prepare the times.
+
+        Args:
+            time: Increasing times from 0 on [s]. Shape (n,).
+        """
+        self.time: Array = np.asarray(time, float)
+        self.ramp = smooth_step(self.time, RAMP)
+        """Factor w with which oscillations grow from rest, and its derivatives."""
 
 
-def sinusoid(time: Array, rng: np.random.Generator) -> Motion:
-    """Draw one oscillation.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Oscillation:
+    """Sum of sines that starts at rest at angle 0 and grows over :data:`RAMP`.
 
-    Args:
-        time: Times from 0 on [s]. Shape (n,).
-        rng: Random number generator.
+    Arrays have shape (n_sines,).
     """
+
+    frequency: Array
+    """Frequencies [Hz]."""
+    phase: Array
+    """Phases at time 0 [rad]."""
+    weight: Array
+    """Amplitudes [-]."""
+
+    def sample(self, instants: Instants, part: slice) -> Motion:
+        """Motion of size 1 at some of the instants.
+
+        Args:
+            instants: Times of the motion.
+            part: Range of the instants.
+        """
+        omega = 2.0 * np.pi * self.frequency
+        # one row for each sine, so that its values follow each other in memory
+        angle = omega[:, None] * instants.time[part]
+        angle += self.phase[:, None]
+        sin, cos = np.sin(angle), np.cos(angle, out=angle)
+        sin *= self.weight[:, None]
+        cos *= self.weight[:, None]
+        # the offset makes y itself start at 0, in addition to the factor w
+        offset = (self.weight * np.sin(omega * 0.0 + self.phase)).sum()
+        y = _sum(sin) - offset
+        sin *= -(omega**2)[:, None]
+        cos *= omega[:, None]
+        y_1, y_2 = _sum(cos), _sum(sin)
+        w, w_1, w_2 = (one[part] for one in instants.ramp)
+        return w * y, w_1 * y + w * y_1, w_2 * y + 2.0 * w_1 * y_1 + w * y_2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Move:
+    """Move and return over half its distance, with a rest around each."""
+
+    turn: float
+    """Time at which the return begins [s]."""
+    end: float
+    """Time at which it ends [s]."""
+
+    def sample(self, instants: Instants, part: slice) -> Motion:
+        """Motion of size 1 at some of the instants.
+
+        Args:
+            instants: Times of the motion.
+            part: Range of the instants.
+        """
+        time, second = instants.time[part], self.end - self.turn
+        there = smooth_step(time - HOLD, self.turn - 2.0 * HOLD)
+        back = smooth_step(time - self.turn - HOLD, second - 2.0 * HOLD)
+        a, b, c = (x - 0.5 * y for x, y in zip(there, back, strict=True))
+        return a, b, c
+
+
+def _sum(rows: Array) -> Array:
+    """Sum of all rows in their order. Shape (n,)."""
+    total: Array = rows[0].copy()
+    for row in rows[1:]:
+        total += row
+    return total
+
+
+def _sinusoid(end: float, rng: np.random.Generator) -> Oscillation:
+    """Draw one oscillation."""
     frequency = rng.uniform(*FREQUENCIES, 1)
-    return _oscillation(time, frequency, rng.uniform(0, 2 * np.pi, 1), np.ones(1))
+    phase = rng.uniform(0, 2 * np.pi, 1)
+    return Oscillation(frequency=frequency, phase=phase, weight=np.ones(1))
 
 
-def multisine(time: Array, rng: np.random.Generator) -> Motion:
-    """Draw a sum of oscillations of equal speed with random frequencies and phases.
-
-    Args:
-        time: Times from 0 on [s]. Shape (n,).
-        rng: Random number generator.
-    """
+def _multisine(end: float, rng: np.random.Generator) -> Oscillation:
+    """Draw a sum of oscillations of equal speed with random frequencies and phases."""
     low, high = map(float, np.log(FREQUENCIES))
     frequency = np.exp(rng.uniform(low, high, PARTS))
     phase = rng.uniform(0, 2 * np.pi, PARTS)
-    return _oscillation(time, frequency, phase, 1.0 / frequency)
+    return Oscillation(frequency=frequency, phase=phase, weight=1.0 / frequency)
 
 
-def point_to_point(time: Array, rng: np.random.Generator) -> Motion:
-    """Draw a move and a return over half its distance, with a rest around each.
-
-    Args:
-        time: Times from 0 on [s]. Shape (n,).
-        rng: Random number generator.
-    """
-    first = rng.uniform(0.3, 0.6) * time[-1]
-    second = time[-1] - first
-    there = smooth_step(time - HOLD, first - 2.0 * HOLD)
-    back = smooth_step(time - first - HOLD, second - 2.0 * HOLD)
-    a, b, c = (x - 0.5 * y for x, y in zip(there, back, strict=True))
-    return a, b, c
+def _point_to_point(end: float, rng: np.random.Generator) -> Move:
+    """Draw a move and a return."""
+    return Move(turn=rng.uniform(0.3, 0.6) * end, end=end)
 
 
-KINDS: dict[str, Callable[[Array, np.random.Generator], Motion]] = {
-    "sinusoid": sinusoid,
-    "multisine": multisine,
-    "point_to_point": point_to_point,
+KINDS: dict[str, Callable[[float, np.random.Generator], Oscillation | Move]] = {
+    "sinusoid": _sinusoid,
+    "multisine": _multisine,
+    "point_to_point": _point_to_point,
 }
-"""Functions that draw a motion, by the name of its kind."""
+"""Functions that draw a motion of some duration [s], by the name of its kind."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnMotion:
+    """One motion and its size."""
+
+    shape: Oscillation | Move
+    size: float
+    """Factor of the motion [rad]."""
+
+    def sample(self, instants: Instants, part: slice) -> Motion:
+        """The motion at some of the instants.
+
+        Args:
+            instants: Times for which the motion was drawn.
+            part: Range of the instants.
+        """
+        q, v, a = self.shape.sample(instants, part)
+        return self.size * q, self.size * v, self.size * a
 
 
 def draw_motion(
-    time: Array,
+    instants: Instants,
     rng: np.random.Generator,
     *,
     kinds: tuple[str, ...],
     max_speed: float,
     max_angle: float,
     max_acceleration: float,
-) -> Motion:
+) -> tuple[DrawnMotion, Motion]:
     """Draw a motion with 40 to 100 % of the largest amplitude that the limits allow.
 
     Args:
-        time: Times from 0 on [s]. Shape (n,).
+        instants: Times of the motion.
         rng: Random number generator.
         kinds: Names of :data:`KINDS`, one of which is drawn.
         max_speed: Largest speed [rad/s].
         max_angle: Largest distance from the start [rad].
         max_acceleration: Largest acceleration [rad/s²].
+
+    Returns:
+        The motion, and its values at all instants.
     """
     kind = kinds[int(rng.integers(len(kinds)))]
-    position, velocity, acceleration = KINDS[kind](time, rng)
-    size = min(
-        max_speed / float(np.abs(velocity).max()),
-        max_angle / float(np.abs(position).max()),
-        max_acceleration / float(np.abs(acceleration).max()),
-    )
+    shape = KINDS[kind](float(instants.time[-1]), rng)
+    motion = shape.sample(instants, slice(None))
+    limits = (max_angle, max_speed, max_acceleration)
+    tops = [max(float(one.max()), -float(one.min())) for one in motion]
+    size = min(limit / top for limit, top in zip(limits, tops, strict=True))
     size *= float(rng.uniform(0.4, 1.0) * rng.choice([-1.0, 1.0]))
-    return size * position, size * velocity, size * acceleration
+    q, v, a = motion
+    return DrawnMotion(shape=shape, size=size), (size * q, size * v, size * a)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.bench import BenchCore, BenchSettings
-from swgjoint.envs.core import Entry, Rows, ceiling
+from swgjoint.envs.core import Rows
+from swgjoint.envs.entries import Entry, ceiling
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
@@ -92,6 +93,12 @@ class RippleCore(BenchCore):
             settings: Arguments of the environment.
         """
         s = settings
+        time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
+        self._up, self._bend, _ = smooth_step(time, RAMP)
+        # integral of the step by Simpson's rule, whose error is far below one count of
+        # any encoder
+        middle = smooth_step(time[:-1] + 0.5 * s.period_s, RAMP)[0]
+        self._parts = self._up[:-1] + 4.0 * middle + self._up[1:]
         super().__init__(
             count,
             threads,
@@ -128,25 +135,30 @@ class RippleCore(BenchCore):
             *self.sensor_entries(),
         ), (known("added motor torque relative to authority", "1", 1.0),)
 
-    def draw(self, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> tuple[tuple[float, float], Array]:
         """Draw speed and load, of random signs, that grow and then stay constant."""
         s = self.settings
-        time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
         share = rng.uniform(s.slowest, 1.0) * rng.choice([-1.0, 1.0])
         top = rng.uniform(-1.0, 1.0) * s.load_of_rated
         rated = self.joint.drive.ratings.rated_torque
-        up, bend, _ = smooth_step(time, RAMP)
-        speed = float(share) * s.max_speed_rad_s
-        velocity, acceleration = speed * up, speed * bend
-        # integral of the step by Simpson's rule, whose error is far below one count of
-        # any encoder
-        middle = smooth_step(time[:-1] + 0.5 * s.period_s, RAMP)[0]
-        parts = s.period_s / 6.0 * speed * (up[:-1] + 4.0 * middle + up[1:])
-        position = np.concatenate([[0.0], np.cumsum(parts)])
-        load = float(top) * rated * up
-        known = load + s.link_inertia * acceleration
-        plan = np.stack([position, velocity, acceleration, load, known], axis=1)
-        return plan[:, :, None]
+        drawn = float(share) * s.max_speed_rad_s, float(top) * rated
+        return drawn, self.sample(drawn, slice(0, s.steps + 1))
+
+    def sample(self, drawn: tuple[float, float], part: slice) -> Array:
+        """Part of a plan.
+
+        Args:
+            drawn: Speed [rad/s] and load torque [N·m] after their growth.
+            part: Range of the instants.
+        """
+        s, (speed, load) = self.settings, drawn
+        plan = np.zeros((part.stop, 5))
+        plan[1:, 0] = np.cumsum(s.period_s / 6.0 * speed * self._parts[: part.stop - 1])
+        plan[:, 1] = speed * self._up[: part.stop]
+        plan[:, 2] = speed * self._bend[: part.stop]
+        plan[:, 3] = load * self._up[: part.stop]
+        plan[:, 4] = plan[:, 3] + s.link_inertia * plan[:, 2]
+        return plan[part.start :, :, None]
 
     def command(self, action: Array) -> Array:
         """Input of the motor loop [N·m]: reference, feed-forward and added torque."""

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from messages import naming
 
 from swgjoint.envs import ENVIRONMENTS
-from swgjoint.envs.core import table
+from swgjoint.envs.entries import table
 from swgjoint.errors import InputError
 
 ALL = {"link_encoder": True, "torque_sensor": True}

@@ -345,7 +345,7 @@ def test_no_reference_is_clipped(episode_s, speed, angle, period_s, kind, load, 
     )
     high = env.observation_space.high[4:8]
     for k in range(5):
-        plan = env.core.draw(np.random.default_rng([seed, k]))[:, :4, 0]
+        plan = env.core.draw(np.random.default_rng([seed, k]))[1][:, :4, 0]
         assert np.isfinite(plan).all()
         # round-off of scaling a motion to its limit
         assert (np.abs(plan) <= high * (1.0 + 1e-12)).all()
