@@ -201,11 +201,15 @@ def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
         maps: Maps of all drives.
         torsion: Torsion [rad].
     """
-    found = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
-    for j in range(1, drive.segments):
-        if torsion >= maps.segment[drive.segment + j, 0]:
-            found = j
-    return found
+    low = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
+    high = int(drive.segments)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if torsion >= maps.segment[drive.segment + middle, 0]:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @wp.func
