@@ -21,6 +21,7 @@ _PUBLIC = {
     "SwgError": "swgjoint.errors",
     "attach": "swgjoint.drives.attach",
     "build_map": "swgjoint.drives.build_map",
+    "export_fmu": "swgjoint.drives.export_fmu",
     "export_mjcf": "swgjoint.sim.plain_mjcf",
     "load_drive": "swgjoint.drives.references",
     "load_plugin": "swgjoint.joint.plugin",
@@ -34,6 +35,7 @@ if _typing.TYPE_CHECKING:
     # for type checkers, which do not evaluate __getattr__
     from swgjoint.drives.attach import attach as attach
     from swgjoint.drives.build_map import build_map as build_map
+    from swgjoint.drives.export_fmu import export_fmu as export_fmu
     from swgjoint.drives.references import load_drive as load_drive
     from swgjoint.drives.spec_sheet import spec_sheet as spec_sheet
     from swgjoint.errors import ComputationError as ComputationError

@@ -18,6 +18,7 @@ EXTRAS = {
     "control": ("pinocchio", "casadi"),
     "envs": ("gymnasium",),
     "life": ("rainflow",),
+    "fmu": ("fmpy",),
     "report": ("pyvista",),
     "notebooks": ("jupytext", "ipykernel"),
     "cluster": ("dask", "distributed", "dask_jobqueue"),

@@ -9,34 +9,32 @@ from typing import Any
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 
-FORMATS = ("mjcf",)
+FORMATS = ("mjcf", "fmu")
+_ONLY = {"drives": "mjcf", "motors": "mjcf", "fmi": "fmu", "load_inertia": "fmu"}
+"""Formats of the options that apply to one format only, by attribute."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments: format, arm, drives, output file."""
+    """Add the arguments: format, arm or drive, output file, options of each format."""
     parser.add_argument(
         "format",
         choices=FORMATS,
         help="mjcf: the arm with its drives at level native, for any MuJoCo 4, without"
-        " the plugin",
+        " the plugin; fmu: the drive between a rotor and a load as a Functional Mock-up"
+        " Unit (model exchange and co-simulation)",
     )
     parser.add_argument(
         "source",
-        metavar="ARM",
-        help="MJCF or URDF file of an arm, or bundled name",
+        metavar="ARM|DRIVE",
+        help="mjcf: MJCF or URDF file of an arm, or bundled name; fmu: design, map or"
+        " catalogue drive",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="file to write (.xml)"
-    )
-    parser.add_argument(
-        "--drive",
-        metavar="[JOINT=]NAME",
-        action="append",
-        default=[],
-        dest="drives",
-        help="design, map or catalogue drive for all hinges, or for the joint or"
-        " pattern JOINT, as in 'wrist_*=CSG-17-100'; the first option that matches a"
-        " joint applies; repeatable; default: the drives that swgjoint run selects",
+        "-o",
+        "--output",
+        metavar="FILE",
+        required=True,
+        help="file to write (.xml or .fmu)",
     )
     parser.add_argument(
         "--model",
@@ -56,13 +54,36 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--step",
         type=float,
         metavar="S",
-        help="time step in the file [s]; default: that of the arm",
+        help="mjcf: time step in the file [s], default: that of the arm; fmu: largest"
+        " internal step of co-simulation [s], default: 0.001",
     )
-    parser.add_argument(
+    mjcf = parser.add_argument_group("options of mjcf")
+    mjcf.add_argument(
+        "--drive",
+        metavar="[JOINT=]NAME",
+        action="append",
+        default=[],
+        dest="drives",
+        help="design, map or catalogue drive for all hinges, or for the joint or"
+        " pattern JOINT, as in 'wrist_*=CSG-17-100'; the first option that matches a"
+        " joint applies; repeatable; default: the drives that swgjoint run selects",
+    )
+    mjcf.add_argument(
         "--motors",
         action="store_true",
         help="add a motor JOINT_motor, whose input is the torque on the rotor [N·m], to"
         " every joint with a drive but without an actuator",
+    )
+    fmu = parser.add_argument_group("options of fmu")
+    fmu.add_argument(
+        "--fmi", metavar="VERSION", help="version of FMI: 3.0 (default) or 2.0"
+    )
+    fmu.add_argument(
+        "--load-inertia",
+        type=float,
+        metavar="KGM2",
+        help="inertia of the load [kg·m²], a parameter of the FMU; default: that of the"
+        " rotor, reflected to the output",
     )
 
 
@@ -70,12 +91,63 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Write the file.
 
     Returns:
-        ``format``, ``arm``, ``step_s``, ``drives_by_rule``, ``joints`` (by name:
-        ``drive``, ``ratio``, ``rotor_inertia_kgm2`` and the differences from level
-        full: ``up_to_Nm``, ``torsion_arcmin``, ``left_out_error_pp_arcmin``,
-        ``left_out_ripple_pp_Nm``, ``link_angle_arcmin``, ``resonance`` with frequency
-        and damping ratio at ``native`` and ``full``, ``notes``), ``files``.
+        ``format`` and ``files``; for ``mjcf`` also ``arm``, ``step_s``,
+        ``drives_by_rule``, ``joints`` (by name: ``drive``, ``ratio``,
+        ``rotor_inertia_kgm2`` and the differences from level full: ``up_to_Nm``,
+        ``torsion_arcmin``, ``left_out_error_pp_arcmin``, ``left_out_ripple_pp_Nm``,
+        ``link_angle_arcmin``, ``resonance`` with frequency and damping ratio at
+        ``native`` and ``full``, ``notes``); for ``fmu`` also ``drive``, ``fmi``,
+        ``variables`` (list of objects with ``name``, ``kind``, ``unit``, ``start`` and
+        ``description``).
+
+    Raises:
+        InputError: If an option does not fit the format.
     """
+    _check_options(args)
+    return _fmu(args) if args.format == "fmu" else _mjcf(args)
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    for name, kind in _ONLY.items():
+        if getattr(args, name) not in (None, False, []) and kind != args.format:
+            option = {"drives": "drive"}.get(name, name.replace("_", "-"))
+            raise InputError(
+                f"--{option} does not apply to export {args.format}; accepted with"
+                f" export {kind}"
+            )
+
+
+def _fmu(args: argparse.Namespace) -> dict[str, Any]:
+    from swgjoint.drives.export_fmu import STEP, export_fmu
+
+    result = export_fmu(
+        args.source,
+        args.output,
+        version=args.fmi or "3.0",
+        rotor_inertia=args.rotor_inertia,
+        load_inertia=args.load_inertia,
+        step=STEP if args.step is None else args.step,
+        model=args.model,
+    )
+    return {
+        "format": args.format,
+        "drive": result.drive.name,
+        "fmi": result.version,
+        "variables": [
+            {
+                "name": one.name,
+                "kind": one.kind,
+                "unit": one.unit,
+                "start": one.start,
+                "description": one.text,
+            }
+            for one in result.variables
+        ],
+        "files": [str(result.path)],
+    }
+
+
+def _mjcf(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.sim.plain_mjcf import export_mjcf
 
     drives: dict[str, Any] = drives_of(args.drives)
@@ -137,7 +209,27 @@ def drives_of(options: list[str]) -> dict[str, str]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the drives, their differences from level full, and the files."""
+    """Format what was written: variables of an FMU, or joints of an arm."""
+    return _fmu_text(result) if result["format"] == "fmu" else _mjcf_text(result)
+
+
+def _fmu_text(result: dict[str, Any]) -> str:
+    rows = [
+        (one["name"], one["kind"], one["unit"], one["start"], one["description"])
+        for one in result["variables"]
+        if one["kind"] != "derivative"
+    ]
+    return "\n".join(
+        [
+            f"FMI {result['fmi']}, model exchange and co-simulation, of drive"
+            f" {result['drive']}",
+            table(rows, header=("variable", "kind", "unit", "start", "")),
+            *(f"wrote {path}" for path in result["files"]),
+        ]
+    )
+
+
+def _mjcf_text(result: dict[str, Any]) -> str:
     rows = [
         ("", "", "arcmin", "arcmin", "arcmin", "Hz", "Hz", "", ""),
         *(

@@ -38,7 +38,7 @@ COMMANDS = {
     "spec": "print a data sheet for a design, a map or a catalogue drive",
     "run": "simulate a robot arm with its drives",
     "compare": "compare drives or model levels in one scene, against limits",
-    "export": "write an arm with its drives for other simulators",
+    "export": "write a drive or an arm with drives for other simulators",
     "lot": "estimate accuracy, ripple and yield of a production lot",
     "tune": "tune controller gains and compare them with a textbook rule",
     "sweep": "evaluate many designs, locally or on a cluster; resumable",

@@ -67,6 +67,7 @@ def test_drives_by_rule_are_those_of_run(capsys):
             ["all joints", "CSG-25-100"],
         ),
         (["ur5e", "-o", "arm.xml", "--step", "nan"], ["nan s", "accepted"]),
+        (["ur5e", "-o", "arm.xml", "--fmi", "3.0"], ["--fmi", "fmu"]),
         (
             ["ur5e", "-o", "arm.xml", "--drive", "CSG-25-100", "--rotor-inertia", "0"],
             ["rotor_inertia", "kg·m²", "> 0"],
@@ -76,6 +77,42 @@ def test_drives_by_rule_are_those_of_run(capsys):
 def test_bad_input_is_refused(here, capsys, arguments, parts):
     """In one line, with exit status 2 and without a file."""
     assert main(["export", "mjcf", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and len(err.splitlines()) == 1 and names(err, *parts)
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize("version", ["3.0", "2.0"])
+def test_a_drive_is_written_as_an_fmu(here, capsys, version):
+    """The JSON object lists its variables with units and start values."""
+    options = ["--fmi", version, "--load-inertia", "0.5", "--step", "0.0005"]
+    assert main(["export", "fmu", "CSG-25-100", "-o", "a.fmu", *options, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["fmi"], result["drive"]) == (version, "CSG-25-100")
+    starts = {one["name"]: (one["unit"], one["start"]) for one in result["variables"]}
+    assert starts["load_inertia"] == ("kg.m2", 0.5)
+    assert starts["internal_step"] == ("s", 5e-4)
+    assert starts["ratio"] == ("1", -100.0)
+    assert starts["friction.coulomb"][1] > 0.0
+    assert [file.name for file in here.iterdir()] == result["files"] == ["a.fmu"]
+    assert main(["export", "fmu", "CSG-25-100", "-o", "a.fmu"]) == 0
+    assert names(capsys.readouterr().out, "motor_torque", "N.m", "a.fmu")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["CSG-25-101", "-o", "a.fmu"], ["CSG-25-101"]),
+        (["CSG-25-100", "-o", "a.xml"], ["a.xml", ".fmu"]),
+        (["CSG-25-100", "-o", "a.fmu", "--fmi", "1.0"], ["1.0", "3.0, 2.0"]),
+        (["CSG-25-100", "-o", "a.fmu", "--motors"], ["--motors", "mjcf"]),
+        (["CSG-25-100", "-o", "a.fmu", "--drive", "x"], ["--drive", "mjcf"]),
+        (["CSG-25-100", "-o", "a.fmu", "--load-inertia", "0"], ["load_inertia", "> 0"]),
+    ],
+)
+def test_bad_fmu_input_is_refused(here, capsys, arguments, parts):
+    """In one line, with exit status 2 and without a file."""
+    assert main(["export", "fmu", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and len(err.splitlines()) == 1 and names(err, *parts)
     assert list(here.iterdir()) == []
