@@ -12,7 +12,6 @@ from fmi3 import Fmu
 from messages import naming
 
 import swgjoint
-from swgjoint.drives.export_fmu import fmu_library
 from swgjoint.errors import InputError
 from swgjoint.joint.hysteresis_step import move_rests, yield_torsions
 from swgjoint.joint.reference import (
@@ -28,9 +27,6 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.sheet.loop import torque_loop
 
-pytestmark = pytest.mark.skipif(
-    not fmu_library().exists(), reason="the library of FMUs is not built"
-)
 ROTOR, LOAD = 4e-5, 0.5
 """Inertias [kg·m²]."""
 STATES = ("motor_angle", "output_angle", "motor_speed", "output_speed")

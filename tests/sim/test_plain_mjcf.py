@@ -17,6 +17,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from matplotlib.image import imsave
 from messages import naming
 
 import swgjoint
@@ -283,6 +284,37 @@ def test_meshes_move_with_the_file(tmp_path):
     model = mujoco.MjModel.from_xml_path(str(moved))
     sizes = np.linalg.norm(model.mesh_vert[:, None] - model.mesh_vert, axis=2)
     assert sizes.max() == pytest.approx(np.hypot(0.4, 0.05))
+
+
+def test_files_of_every_kind_are_found(tmp_path):
+    """Meshes of an included file, textures of one and six files, a height field."""
+    arm = make_arm(tmp_path / "a")
+    for name, grey in (("x", 0.2), ("y", 0.8)):
+        imsave(tmp_path / "a" / f"{name}.png", np.full((8, 8, 3), grey))
+    (tmp_path / "a" / "parts" / "x.png").write_bytes(
+        (tmp_path / "a" / "y.png").read_bytes()
+    )
+    mesh = '<asset><mesh name="m" file="link.obj"/></asset>'
+    (tmp_path / "a" / "more.xml").write_text(f"<mujoco>{mesh}</mujoco>")
+    sides = " ".join(
+        f'file{side}="{name}.png"'
+        for side, name in zip(
+            ("right", "left", "up", "down", "front", "back"), "xyxyxy", strict=True
+        )
+    )
+    assets = f"""<include file="more.xml"/><asset>
+      <texture name="one" type="2d" file="deep/x.png"/><texture type="skybox" {sides}/>
+      <hfield name="h" file="x.png" size="1 1 .1 .1"/></asset>"""
+    text = ONE_HINGE.replace(mesh, assets)
+    arm.write_text(text.replace("<compiler", '<compiler strippath="true"'))
+    result = swgjoint.export_mjcf(arm, tmp_path / "out.xml", "CSG-17-100")
+    assert len(result.assets) == 4  # two files x.png of different content
+    one, other = (
+        mujoco.MjModel.from_xml_path(str(path)) for path in (arm, result.path)
+    )
+    assert (other.nmesh, other.ntex, other.nhfield) == (1, 2, 1)
+    np.testing.assert_array_equal(other.tex_data, one.tex_data)
+    np.testing.assert_array_equal(other.mesh_vert, one.mesh_vert)
 
 
 @pytest.mark.parametrize("fault", ["mesh", "step", "itself", "drive", "folder"])
