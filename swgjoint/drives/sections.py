@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal, Self, get_args
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, shorten
+from swgjoint.gear.bearing.output_bearing import OutputBearing, catalogue_bearing
 from swgjoint.maps.fit.error_spectrum import LARGEST
+from swgjoint.units import arcmin, mm
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
@@ -168,6 +172,67 @@ class LifeSection(Section):
         return self
 
 
+class OutputBearingSection(Section):
+    """Bearing at the output of one drive, which yields to tilting moments."""
+
+    unit: str | None = None
+    """Housed unit in ``models/catalogue/output_bearings.csv`` that provides the values,
+    such as ``CSG-25``; other keys replace its values."""
+    tilt_stiffness_Nm_arcmin: Positive | None = None
+    """Tilting moment per tilt angle [N·m/arcmin]; required without ``unit``."""
+    permissible_moment_Nm: Positive | None = None
+    """Permissible dynamic tilting moment [N·m]."""
+    dynamic_rating_N: Positive | None = None
+    """Basic dynamic load rating [N], for the life."""
+    pitch_diameter_mm: Positive | None = None
+    """Pitch circle diameter of the rollers [mm], for the life."""
+    load_factor: Annotated[float, Field(ge=1, le=10)] = 1.2
+    """Load factor of the life [-]: 1 to 1.2 for smooth operation, 1.2 to 1.5 for
+    normal operation, 1.5 to 3 with shocks."""
+    damping_ratio: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """Damping ratio of the tilt vibration with the other joints locked [-]."""
+    centre_mm: Annotated[float, Field(ge=-10_000, le=10_000)] = 0.0
+    """Centre of the bearing on the joint axis, from the origin of the joint [mm]."""
+
+    @model_validator(mode="after")
+    def _stiff(self) -> Self:
+        if self.unit is None and self.tilt_stiffness_Nm_arcmin is None:
+            raise Fault(
+                ("tilt_stiffness_Nm_arcmin", "missing; a bearing without unit needs it")
+            )
+        try:
+            self.bearing()
+        except InputError as error:
+            raise Fault(("unit", str(error))) from None
+        return self
+
+    def bearing(self) -> OutputBearing:
+        """The bearing in SI units.
+
+        Raises:
+            InputError: If the catalogue has no such unit.
+        """
+        units = {
+            "tilt_stiffness": (self.tilt_stiffness_Nm_arcmin, 1.0 / arcmin),
+            "permissible_moment": (self.permissible_moment_Nm, 1.0),
+            "dynamic_rating": (self.dynamic_rating_N, 1.0),
+            "pitch_diameter": (self.pitch_diameter_mm, mm),
+        }
+        stated: dict[str, Any] = {
+            k: v * unit for k, (v, unit) in units.items() if v is not None
+        }
+        base = OutputBearing(tilt_stiffness=stated.get("tilt_stiffness", 1.0))
+        if self.unit is not None:
+            base = catalogue_bearing(self.unit)
+        return replace(
+            base,
+            load_factor=self.load_factor,
+            damping_ratio=self.damping_ratio,
+            centre=self.centre_mm * mm,
+            **stated,
+        )
+
+
 class JointSection(Section):
     """Drive of one joint; absent keys take their values from ``[defaults]``."""
 
@@ -219,6 +284,8 @@ class JointSection(Section):
     """Limits of the motor; by default it delivers any commanded torque."""
     life: LifeSection | None = None
     """Rated life and fatigue strength, for the life over the duty cycle."""
+    output_bearing: OutputBearingSection | None = None
+    """Bearing that lets the link tilt; by default the joint is a rigid hinge."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from swgjoint.drives.references import check_joint_names, drive_of
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
+from swgjoint.gear.bearing.output_bearing import OutputBearing
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.fitting import Fitting
 from swgjoint.joint.region import check_region
 from swgjoint.joint.step_damping import damp_as_asked, is_implicit
+from swgjoint.joint.tilt import add_tilt_hinges
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import Loops, add_actuators
@@ -24,10 +26,12 @@ from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.assembly_steps import (
     complete_sections,
+    engine_addresses,
     interpolate_samples,
     joints_in_contact,
     load_torque,
     motor_loops,
+    output_bearings,
     prescribed_errors,
     scaled_disturbances,
     site_of_force,
@@ -95,6 +99,12 @@ class Assembly:
     """Addresses of the motor angles in qpos, -1 without a rotor. Shape (n_joints,)."""
     motor_velocity: NDArray[np.intp]
     """Addresses of the motor speeds in qvel, -1 without a rotor. Shape (n_joints,)."""
+    bearings: dict[str, OutputBearing]
+    """Output bearings that tilt, by joint."""
+    tilt_position: NDArray[np.intp]
+    """Addresses of the tilt angles in qpos, two for each bearing. Shape (n_tilts,)."""
+    tilt_velocity: NDArray[np.intp]
+    """Addresses of the tilt speeds in qvel. Shape (n_tilts,)."""
 
     @property
     def step(self) -> float:
@@ -186,6 +196,9 @@ def assemble(
         transmission_of(attached[name], fittings[name].drive) for name in arm.joints
     )
 
+    bearings = output_bearings(scene, dict(zip(arm.joints, sections, strict=True)))
+    add_tilt_hinges(spec, bearings)
+
     # add motors, loads and disturbances after all drives are attached
     load = np.array([load_torque(scene, t.joint, t.drive) for t in transmissions])
     link_inertia = known_arm.inertia(trajectory.position[0])
@@ -234,7 +247,8 @@ def assemble(
         prescribed=prescribed,
         prescribed_rate=prescribed_rate,
         controlled_by=controlled_by,
-        **_addresses(model, arm.joints, transmissions),
+        bearings=bearings,
+        **engine_addresses(model, arm.joints, transmissions, tuple(bearings)),
     )
 
 
@@ -371,25 +385,3 @@ def _planned_torques(
         ratio=np.array([t.ratio for t in transmissions]),
         rotor_inertia=np.array([t.rotor_inertia for t in transmissions]),
     )
-
-
-def _addresses(
-    model: mujoco.MjModel,
-    joints: Sequence[str],
-    transmissions: Sequence[Transmission],
-) -> dict[str, NDArray[np.intp]]:
-    """Addresses of link and motor coordinates in qpos and qvel."""
-    rotors = [
-        None if t.law is None else model.joint(t.attached.rotor) for t in transmissions
-    ]
-    links = [model.joint(name) for name in joints]
-    return {
-        "link_position": np.array([j.qposadr[0] for j in links], dtype=np.intp),
-        "link_velocity": np.array([j.dofadr[0] for j in links], dtype=np.intp),
-        "motor_position": np.array(
-            [-1 if j is None else j.qposadr[0] for j in rotors], dtype=np.intp
-        ),
-        "motor_velocity": np.array(
-            [-1 if j is None else j.dofadr[0] for j in rotors], dtype=np.intp
-        ),
-    }

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
+from swgjoint.gear.bearing.output_bearing import OutputBearing
+from swgjoint.joint.tilt import tilt_names
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import Loops
 from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -201,3 +204,62 @@ def scaled_disturbances(
         one if isinstance(one, ToolForce) else one.scale_to(rated[one.joint])
         for one in scene.disturbance
     )
+
+
+def output_bearings(
+    scene: Scene, sections: Mapping[str, JointSection]
+) -> dict[str, OutputBearing]:
+    """Output bearings by joint, for the integrator that can step them.
+
+    Args:
+        scene: The scene.
+        sections: Settings by joint.
+
+    Raises:
+        InputError: If the scene has output bearings but an explicit integrator.
+    """
+    stated = {name: section.output_bearing for name, section in sections.items()}
+    bearings = {name: one.bearing() for name, one in stated.items() if one is not None}
+    if bearings and scene.simulation.integrator != "discrete":
+        raise InputError(
+            f"{scene.where}: simulation.integrator = {scene.simulation.integrator!r}"
+            " with an output_bearing; accepted: 'discrete', which steps its stiff tilt"
+            " implicitly"
+        )
+    return bearings
+
+
+def engine_addresses(
+    model: mujoco.MjModel,
+    joints: Sequence[str],
+    transmissions: Sequence[Transmission],
+    bearings: Sequence[str],
+) -> dict[str, NDArray[np.intp]]:
+    """Addresses of link, motor and tilt coordinates in qpos and qvel.
+
+    Args:
+        model: The compiled model.
+        joints: Names of the joints.
+        transmissions: Their drives.
+        bearings: Names of the joints with an output bearing.
+
+    Returns:
+        Addresses by name of the attribute of an assembly.
+    """
+    rotors = [
+        None if t.law is None else model.joint(t.attached.rotor) for t in transmissions
+    ]
+    links = [model.joint(name) for name in joints]
+    tilts = [model.joint(name) for joint in bearings for name in tilt_names(joint)]
+    return {
+        "link_position": np.array([j.qposadr[0] for j in links], dtype=np.intp),
+        "link_velocity": np.array([j.dofadr[0] for j in links], dtype=np.intp),
+        "motor_position": np.array(
+            [-1 if j is None else j.qposadr[0] for j in rotors], dtype=np.intp
+        ),
+        "motor_velocity": np.array(
+            [-1 if j is None else j.dofadr[0] for j in rotors], dtype=np.intp
+        ),
+        "tilt_position": np.array([j.qposadr[0] for j in tilts], dtype=np.intp),
+        "tilt_velocity": np.array([j.dofadr[0] for j in tilts], dtype=np.intp),
+    }

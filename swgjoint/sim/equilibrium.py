@@ -72,6 +72,8 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
     qpos[assembly.motor_position[flexible]] = theta[flexible]
     motor_rate = path.velocity[0] * assembly.ratio
     qvel[assembly.motor_velocity[flexible]] = motor_rate[flexible]
+    if assembly.bearings:
+        qpos[assembly.tilt_position] = _tilts(assembly, qpos)
     return qpos, qvel
 
 
@@ -115,6 +117,27 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
         elements = len(transmission.attached.elements)
         data.plugin_state[first + 2 : first + 2 + elements] = torsion
     mujoco.mj_forward(model, data)
+
+
+def _tilts(assembly: Assembly, qpos: Array) -> Array:
+    """Tilts of the output bearings under the weight of the arm [rad]. Shape (n_tilts,).
+
+    Args:
+        assembly: The compiled scene, with output bearings.
+        qpos: Positions of the model, with untilted bearings.
+    """
+    model, data = assembly.model, mujoco.MjData(assembly.model)
+    stiffness = np.repeat([b.tilt_stiffness for b in assembly.bearings.values()], 2)
+    tilts = np.zeros(len(stiffness))
+    for _ in range(20):  # each pass gains a factor of weight moment over stiffness
+        data.qpos[:] = qpos
+        data.qpos[assembly.tilt_position] = tilts
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        last, tilts = tilts, -data.qfrc_bias[assembly.tilt_velocity] / stiffness
+        if np.abs(tilts - last).max() < 1e-13:
+            break
+    return np.asarray(tilts)
 
 
 def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.figures.metrics import run_metrics
 from swgjoint.sim.life.loads import TaskLoads
+from swgjoint.sim.life.motion_loads import motion_loads
 from swgjoint.typing import Array
 
 
@@ -69,6 +70,10 @@ class Run:
     """Tool position on the commanded motion [m]. Shape of ``tool_position``."""
     wall: float
     """Wall time of all steps [s]."""
+    tilt: Array
+    """Tilts of the output bearings [rad], two for each bearing. Shape (n, n_tilts)."""
+    tilt_velocity: Array
+    """Tilt speeds [rad/s]. Shape of ``tilt``."""
     recording: Path | None = None
     """File of the recording for the viewer; None if none was written."""
     cycle: tuple[TaskLoads, ...] = ()
@@ -88,6 +93,11 @@ class Run:
     def contains(self) -> dict[str, Any]:
         """Contents of the compiled model, and what it leaves out and why."""
         return contents(self.assembly)
+
+    @cached_property
+    def repeated(self) -> tuple[TaskLoads, ...]:
+        """Loads of the duty cycle or, without one, of the motion of this run."""
+        return self.cycle or (motion_loads(self),)
 
     def tool_error(self, other: Run | None = None) -> Array:
         """Distance between the tool and a reference at every instant [m]. Shape (n,).

@@ -341,10 +341,34 @@ def _recorded(
         wanted_torque=wanted,
         slipping_torque=slipping,
         friction_torque=friction,
-        tool_position=assembly.arm.tool_positions(position),
+        tool_position=_tool_positions(assembly, q),
         tool_reference=assembly.arm.tool_positions(path.position),
         wall=wall,
+        tilt=q[:, assembly.tilt_position],
+        tilt_velocity=v[:, assembly.tilt_velocity],
     )
+
+
+def _tool_positions(assembly: Assembly, q: Array) -> Array:
+    """Tool positions of a run, with the tilts of the output bearings [m].
+
+    Args:
+        assembly: The scene as it was run.
+        q: Positions of its model. Shape (n, nq).
+
+    Returns:
+        Positions in the world. Shape (n, 3), or (n, 0) without a tool.
+    """
+    arm, model = assembly.arm, assembly.model
+    if not assembly.bearings or arm.tool < 0:
+        return arm.tool_positions(q[:, assembly.link_position])
+    data, out = mujoco.MjData(model), np.empty((len(q), 3))
+    place = data.site(assembly.scene.tool_site).xpos
+    for k, positions in enumerate(q):
+        data.qpos[:] = positions
+        mujoco.mj_kinematics(model, data)
+        out[k] = place
+    return out
 
 
 def _integrals(assembly: Assembly, states: Array) -> Array:

@@ -189,6 +189,13 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
                 f" {ratings['peak_Nm']:.3g} N·m (repeated peak"
                 f" {ratings['repeated_peak_Nm']:.3g} N·m)"
             )
+        bearing = joint.get("output_bearing")
+        if bearing is not None and bearing["within"] is False:
+            lines.append(
+                f"{name}: output bearing: moment of up to"
+                f" {bearing['peak_moment_Nm']:.3g} N·m (permissible"
+                f" {bearing['permissible_moment_Nm']:.3g} N·m)"
+            )
     return lines
 
 

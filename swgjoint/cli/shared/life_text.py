@@ -1,10 +1,26 @@
-"""Life over the duty cycle in terminal output."""
+"""Life over the duty cycle and output bearings in terminal output."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from swgjoint.cli.shared.text import table
+
+
+def bearing_lines(result: dict[str, Any]) -> list[str]:
+    """Format the tilt and the life of all output bearings; empty without any.
+
+    Args:
+        result: Figures of a run.
+    """
+    joints = result["joints"]
+    if not any("output_bearing" in joint for joint in joints.values()):
+        return []
+    from swgjoint.view.life.rows import BEARING_COLUMNS, bearing_grid, bearing_notes
+
+    names, units = zip(*BEARING_COLUMNS, strict=True)
+    rows = bearing_grid(joints)
+    return [table([units, *rows], header=names), *bearing_notes(joints)]
 
 
 def life_lines(result: dict[str, Any]) -> list[str]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from swgjoint.faults import Section
 from swgjoint.joint.prescribed import ratio_variation
 from swgjoint.joint.step_damping import StepMode, step_mode
+from swgjoint.joint.tilt import tilt_names
 from swgjoint.maps.hysteresis import vary_with_load
-from swgjoint.units import hertz
+from swgjoint.units import arcmin, hertz
 
 if TYPE_CHECKING:
     from swgjoint.joint.drive import JointDrive
@@ -44,7 +47,11 @@ def contents(assembly: Assembly) -> dict[str, Any]:
         "left_out": [
             {"joint": t.joint, **item}
             for t in assembly.transmissions
-            for item in (*_left_out(t), *_off_damping(assembly, t))
+            for item in (
+                *_left_out(t),
+                *_off_damping(assembly, t),
+                *_tilt_damping(assembly, t.joint),
+            )
         ],
         "absent": _absent(assembly),
     }
@@ -72,6 +79,14 @@ def _features(assembly: Assembly) -> dict[str, Any]:
     }
     if limits:
         features["motor_limits"] = limits
+    if assembly.bearings:
+        features["output_bearings"] = {
+            name: {
+                "tilt_stiffness_Nm_arcmin": one.tilt_stiffness * arcmin,
+                "source": one.source,
+            }
+            for name, one in assembly.bearings.items()
+        }
     if scene.payload is not None:
         features["payload"] = scene.payload.model_dump()
     if scene.sensors is not None:
@@ -100,6 +115,32 @@ def _absent(assembly: Assembly) -> list[dict[str, str]]:
         ("engine plugin", plugin, "no joint has a level that needs it"),
     )
     return [{"part": part, "reason": why} for part, there, why in parts if not there]
+
+
+def _tilt_damping(assembly: Assembly, joint: str) -> list[dict[str, str]]:
+    """Numerical damping of the tilt of an output bearing, if there is much of it.
+
+    The integrator ``discrete`` damps an angular frequency w by h w/2 of critical.
+    """
+    bearing = assembly.bearings.get(joint)
+    if bearing is None:
+        return []
+    model = assembly.model
+    dofs = [int(model.joint(name).dofadr[0]) for name in tilt_names(joint)]
+    rate = float(np.sqrt(bearing.tilt_stiffness / model.dof_M0[dofs].max()))
+    added = 0.5 * assembly.step * rate
+    if added < OFF_DAMPING:
+        return []
+    return [
+        {
+            "part": f"damping ratio {bearing.damping_ratio:g} of the tilt of the output"
+            " bearing",
+            "reason": f"time steps of {1e3 * assembly.step:g} ms raise the damping"
+            f" ratio of its vibration at {rate / hertz:.0f} Hz to"
+            f" {bearing.damping_ratio + added:.2g}; tilts that change slowly are"
+            " correct; use a shorter simulation.step_s",
+        }
+    ]
 
 
 def _set_keys(section: Section) -> dict[str, Any]:

@@ -42,11 +42,12 @@ def run_energy(run: Run) -> dict[str, float]:
     """
     joints = [joint_energy(run, j) for j in range(len(run.joints))]
     motor = sum(joint["motor_work_J"] for joint in joints)
-    in_arm = arm_dissipation(run)
+    tilting, tilt_damping = _tilt_energies(run)
+    in_arm = arm_dissipation(run) + tilt_damping
     dissipated = in_arm + sum(joint["dissipated_J"] for joint in joints)
     load = load_work(run)
     kinetic, weight = _rigid_energies(run)
-    elastic = sum(_elastic(run, j) for j in range(len(run.joints)))
+    elastic = tilting + sum(_elastic(run, j) for j in range(len(run.joints)))
     springs = _arm_springs(run)
     stored = kinetic + weight + elastic + springs
     return {
@@ -211,6 +212,19 @@ def _arm_springs(run: Run) -> float:
     return energies[1] - energies[0]
 
 
+def _tilt_energies(run: Run) -> tuple[float, float]:
+    """Change of elastic energy of all output bearings, and their dissipation [J]."""
+    assembly = run.assembly
+    if not assembly.bearings:
+        return 0.0, 0.0
+    stiffness = np.repeat([b.tilt_stiffness for b in assembly.bearings.values()], 2)
+    first, last = 0.5 * (run.tilt[[0, -1]] ** 2 @ stiffness)
+    damping = assembly.model.dof_damping[assembly.tilt_velocity]
+    step = assembly.scene.simulation.step_s
+    turned = np.diff(run.tilt, axis=0)
+    return float(last - first), float(np.sum(turned**2 @ damping)) / step
+
+
 def _motor_work(run: Run, j: int, part: slice) -> float:
     """Work of one motor during a part of the run [J]."""
     # the torque of a state acted during the whole step that led to it
@@ -264,6 +278,8 @@ def _rigid_energies(run: Run) -> tuple[float, float]:
         data.qvel[assembly.link_velocity] = run.velocity[k]
         data.qpos[assembly.motor_position[flexible]] = run.motor_position[k, flexible]
         data.qvel[assembly.motor_velocity[flexible]] = run.motor_velocity[k, flexible]
+        data.qpos[assembly.tilt_position] = run.tilt[k]
+        data.qvel[assembly.tilt_velocity] = run.tilt_velocity[k]
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_energyVel(model, data)

@@ -20,6 +20,7 @@ import numpy as np
 from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
 from swgjoint.sim.figures.orders import OrderLine, resample, strongest_lines
+from swgjoint.sim.figures.output_bearing import bearing_figures
 from swgjoint.sim.figures.rating_use import use_of_ratings
 from swgjoint.sim.figures.ripple_validity import (
     HARMONIC_LEVELS,
@@ -126,6 +127,11 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "energy": joint_energy(run, j),
         "settling": joint_settling(run, j),
         **({"life": life_figures(run, j)} if run.cycle else {}),
+        **(
+            {"output_bearing": bearing_figures(run, j)}
+            if run.joints[j] in run.assembly.bearings
+            else {}
+        ),
         **({} if untold is None else {"missing": {"orders": untold}}),
     }
 

@@ -82,6 +82,7 @@ def collisions(run: Run) -> list[Collision]:
     for k in np.linspace(0, run.time.size - 1, count).astype(int):
         data.qpos[assembly.link_position] = run.position[k]
         data.qpos[assembly.motor_position[flexible]] = run.motor_position[k, flexible]
+        data.qpos[assembly.tilt_position] = run.tilt[k]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.life.loads import TaskLoads
+from swgjoint.sim.life.motion_loads import motion_loads, rest_loads
 from swgjoint.sim.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -96,29 +94,22 @@ def run_cycle(
     """
     loads = []
     for task in tasks:
-        done = run
+        if task.rest:
+            loads.append(
+                rest_loads(task.name, task.duration, task.times, len(run.joints))
+            )
+            continue
+        done, reasons = run, []
         if task.assembly is not None:
             done = simulate(task.assembly, f"{run.name}, {task.name}")
-        loads.append(_loads(task, done, own=task.assembly is None))
+            reasons = done.metrics()["reasons"]
+        loads.append(
+            replace(
+                motion_loads(done),
+                name=task.name,
+                duration=task.duration,
+                times=task.times,
+                reasons=tuple(f"{task.name}: {reason}" for reason in reasons),
+            )
+        )
     return tuple(loads)
-
-
-def _loads(task: PreparedTask, run: Run, *, own: bool) -> TaskLoads:
-    """Loads of one task; those of the scene's own run have no reasons of their own."""
-    none = np.empty((0, len(run.joints)))
-    # the gear angle beta is that of the wave generator relative to the flexspline
-    of_input, of_output = np.transpose(
-        [angle_coefficients(t.drive.layout)[1] for t in run.assembly.transmissions]
-    )
-    place = -(of_input * run.motor_position + of_output * run.position)
-    reasons = () if own else tuple(run.metrics()["reasons"])
-    return TaskLoads(
-        name=task.name,
-        duration=task.duration,
-        times=task.times,
-        torque=none if task.rest else run.output_torque,
-        speed=none if task.rest else run.velocity,
-        input_speed=none if task.rest else run.motor_velocity,
-        place=none if task.rest else place,
-        reasons=tuple(f"{task.name}: {reason}" for reason in reasons),
-    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
@@ -33,6 +33,9 @@ class TaskLoads:
     place: Array
     """Angles of the flexsplines relative to their wave generators [rad]. Shape
     (n, n_joints)."""
+    bearings: Mapping[str, Array] = field(default_factory=dict)
+    """Radial and axial force [N] and tilting moment [N·m] on each output bearing, by
+    joint. Shapes (n, 3)."""
     reasons: tuple[str, ...] = ()
     """Reasons why the simulation of the task is not valid."""
 

@@ -84,6 +84,61 @@ def _hours(value: float | None) -> str:
     return f"{float(f'{value:.3g}'):,.12g}" if value < 1e7 else f"{value:.3g}"
 
 
+BEARING_COLUMNS = (
+    ("output bearing", ""),
+    ("tilt", "arcmin, mean"),
+    ("tilt", "arcmin, pp"),
+    ("peak moment", "N·m"),
+    ("permissible", "N·m"),
+    ("mean moment", "N·m"),
+    ("radial force", "N, mean"),
+    ("axial force", "N, mean"),
+    ("L10", "h"),
+)
+"""Name and unit of every column of the table of output bearings."""
+
+
+def bearing_grid(joints: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Rows of the table of output bearings; empty without any.
+
+    Args:
+        joints: Figures of the joints.
+    """
+    return [
+        [
+            short(name),
+            format_figure(one["tilt_arcmin"]["mean"]),
+            format_figure(one["tilt_arcmin"]["pp"]),
+            *(
+                format_figure(one[key])
+                for key in (
+                    "peak_moment_Nm",
+                    "permissible_moment_Nm",
+                    "mean_moment_Nm",
+                    "mean_radial_N",
+                    "mean_axial_N",
+                )
+            ),
+            _hours(one["L10_h"]),
+        ]
+        for name, joint in joints.items()
+        if (one := joint.get("output_bearing"))
+    ]
+
+
+def bearing_notes(joints: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Reasons for missing lives of output bearings.
+
+    Args:
+        joints: Figures of the joints.
+    """
+    return [
+        f"-: no life of the output bearing of {short(name)}: {one['missing']}"
+        for name, joint in joints.items()
+        if (one := joint.get("output_bearing")) and one["missing"]
+    ]
+
+
 def missing_lines(joints: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Reasons for missing figures, grouped by joints with the same reason.
 

@@ -5,11 +5,43 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from swgjoint.view.life.rows import describe_cycle, life_grid, missing_lines
+from swgjoint.view.life.rows import (
+    BEARING_COLUMNS,
+    bearing_grid,
+    bearing_notes,
+    describe_cycle,
+    life_grid,
+    missing_lines,
+)
 from swgjoint.view.report.tables import Cell, Table
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
+
+
+def bearing_tables(runs: Mapping[str, Run]) -> list[Table]:
+    """One table for every run with output bearings.
+
+    Args:
+        runs: Runs by displayed name.
+    """
+    tables = []
+    for label, run in runs.items():
+        if not run.assembly.bearings:
+            continue
+        joints = run.metrics()["joints"]
+        tables.append(
+            Table(
+                title=f"Output bearings of {label}",
+                header=BEARING_COLUMNS,
+                rows=[
+                    [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
+                    for cells in bearing_grid(joints)
+                ],
+                notes=bearing_notes(joints),
+            )
+        )
+    return tables
 
 
 def life_tables(runs: Mapping[str, Run]) -> list[Table]:

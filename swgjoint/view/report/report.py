@@ -14,7 +14,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.toml_text import toml_text
 from swgjoint.view.life.picture import life_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
-from swgjoint.view.report.life import life_tables
+from swgjoint.view.report.life import bearing_tables, life_tables
 from swgjoint.view.report.plots import joint_png
 from swgjoint.view.report.tables import (
     Table,
@@ -102,7 +102,7 @@ def write_report(
         description=scene.description,
         alerts=alerts(runs),
         summary=summary or summary_table(runs),
-        tables=life_tables(runs),
+        tables=[*life_tables(runs), *bearing_tables(runs)],
         pictures={
             **(pictures or {}),
             **{
