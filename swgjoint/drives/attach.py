@@ -14,11 +14,13 @@ from swgjoint.drives.rotors import catalogue_rotor_inertia
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.faults import validate
+from swgjoint.gear.bearing.output_bearing import OutputBearing, catalogue_bearing
 from swgjoint.gear.design.design import Design
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.fitting import Fitting, check_spec
 from swgjoint.joint.patterns import chosen_hinges
+from swgjoint.joint.tilt import add_tilt_hinges
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.maps.friction_temperature import at_temperature
@@ -44,6 +46,7 @@ class AttachOptions(TypedDict, total=False):
     kinematic_error_arcmin: float | None
     seed: int
     temperature_C: float | None
+    output_bearing: OutputBearing | str | None
 
 
 @overload
@@ -83,6 +86,7 @@ def attach(
     kinematic_error_arcmin: float | None = None,
     seed: int = 0,
     temperature_C: float | None = None,
+    output_bearing: OutputBearing | str | None = None,
 ) -> JointDrive | dict[str, JointDrive]:
     """Turn hinges of a model into outputs of strain wave gears.
 
@@ -134,6 +138,10 @@ def attach(
         seed: Seed of the assumed error; joints differ by their names.
         temperature_C: Temperature of the lubricant [°C] of drives that state their
             friction over temperature; None takes the friction of the drive.
+        output_bearing: Bearing on which every link tilts, see
+            :func:`~swgjoint.joint.tilt.add_tilt_hinges`, or the name of a housed unit
+            such as ``CSG-25``; it needs the integrator ``discrete``. None leaves rigid
+            hinges.
 
     Returns:
         The drive of the joint; with ``drives``, all drives by joint name in the order
@@ -161,6 +169,7 @@ def attach(
         )
     else:
         chosen, sources = chosen_hinges(spec, drives), dict(drives)
+    bearing = _bearing(spec, output_bearing, level=level, integrator=integrator)
     known: dict[str, DriveMap] = {}
     fittings = {}
     for name, key in chosen.items():
@@ -183,6 +192,8 @@ def attach(
             max_phase_step=max_phase_step,
         )
     attached = attach_all(spec, fittings, integrator=integrator, watch=True)
+    if bearing is not None:
+        add_tilt_hinges(spec, dict.fromkeys(attached, bearing))
     return attached if joint is None else attached[joint]
 
 
@@ -217,6 +228,37 @@ def _map(
         f"drive of {joint!r}: {type(source).__name__} {str(source)[:60]!r}; accepted: a"
         " catalogue name, a path, a Design or a DriveMap"
     )
+
+
+def _bearing(
+    spec: mujoco.MjSpec,
+    bearing: OutputBearing | str | None,
+    *,
+    level: str,
+    integrator: str,
+) -> OutputBearing | None:
+    """The output bearing, if the model will have an integrator that can step it."""
+    if bearing is None:
+        return None
+    if isinstance(bearing, str):
+        try:
+            bearing = catalogue_bearing(bearing)
+        except InputError as error:
+            raise InputError(f"output_bearing = {error}") from None
+    elif not isinstance(bearing, OutputBearing):
+        raise InputError(
+            f"output_bearing is a {type(bearing).__name__}; accepted: an OutputBearing"
+            " or the name of a housed unit"
+        )
+    kept = integrator == "keep" or level in ("rigid", "kinematic")
+    kept |= spec.option.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    if kept and spec.option.integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
+        raise InputError(
+            "output_bearing needs spec.option.integrator = mjINT_DISCRETE, which steps"
+            f" its stiff tilt implicitly; level {level!r} with integrator"
+            f" {integrator!r} keeps another one"
+        )
+    return bearing
 
 
 def _celsius(value: Any) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,10 @@ from swgjoint.gear.fatigue_life import (
 )
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.root_stress import root_points, root_stress
+from swgjoint.models_path import models_path
 from swgjoint.sim.life.loads import TaskLoads, mean_load
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.text import scene_toml
 from swgjoint.units import MPa, hour, rpm
 from swgjoint.view.run import run_scene
 
@@ -381,6 +385,29 @@ def test_a_bad_task_writes_nothing(tmp_path, capsys):
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and "cycle[0]" in lines[0]
     assert not out.exists() or not list(out.iterdir())
+
+
+def test_rainflow_that_is_not_installed_is_the_reason(bench, fields, monkeypatch):
+    """The bearing has its life nevertheless; the reason names the extra."""
+    monkeypatch.setitem(sys.modules, "rainflow", None)
+    drive = replace(LINEAR, fields=bending_fields(fields))
+    run = bench(drive, cycle=[{}], defaults__life=CURVE | LIFE)
+    life = run.metrics()["joints"]["joint"]["life"]
+    assert "swgjoint[life]" in life["flexspline"]["missing"]
+    assert life["bearing"]["L10_h"] > 0.0
+
+
+def test_text_of_a_scene_keeps_its_cycle(tmp_path):
+    """Tasks come back from the text, with absolute paths of their files."""
+    (tmp_path / "motion.csv").write_text("time_s,joint_deg\n0,0\n1,5\n")
+    task = '[[cycle]]\n[cycle.trajectory]\nkind = "csv"\nfile = "motion.csv"\n'
+    path = tmp_path / "own.toml"
+    text = (models_path() / "scenes" / "bench.toml").read_text(encoding="utf-8")
+    path.write_text(text + "\n" + task)
+    scene = Scene.load_file(path)
+    again = Scene.from_toml(scene_toml(scene))
+    assert again.cycle == scene.cycle
+    assert again.cycle[0].trajectory.file == str(tmp_path / "motion.csv")
 
 
 def test_commands_show_the_life(tmp_path, capsys):

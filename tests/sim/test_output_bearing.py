@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from messages import naming
 
+import swgjoint
 from swgjoint.errors import InputError
 from swgjoint.gear.bearing.output_bearing import OutputBearing, catalogue_bearing
 from swgjoint.gear.catalogue import table
@@ -280,6 +281,50 @@ def test_explicit_integrators_are_refused():
     }
     with pytest.raises(InputError, match=naming("simulation.integrator")):
         run_scene("bench", overrides=changes)
+
+
+def test_attach_adds_the_bearing():
+    """The link of any model tilts under its weight, at every level."""
+    for level in ("linear", "rigid"):
+        spec = mujoco.MjSpec.from_string(CANTILEVER)
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        swgjoint.attach(
+            spec,
+            joint="joint",
+            drive=LINEAR,
+            level=level,
+            rotor_inertia=1e-4,
+            output_bearing=OutputBearing(
+                tilt_stiffness=STIFFNESS / arcmin, damping_ratio=1.0
+            ),
+        )
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        for _ in range(500):
+            mujoco.mj_step(model, data)
+        tilt = MASS * G * REACH / (STIFFNESS / arcmin)
+        drop = data.site("tool").xpos[2]
+        assert drop == pytest.approx(-ARM * tilt, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "key"),
+    [
+        ({"output_bearing": "CSG-99"}, "CSG-25"),
+        ({"output_bearing": 5.0}, "output_bearing"),
+        ({"output_bearing": "CSG-25", "level": "rigid"}, "mjINT_DISCRETE"),
+        ({"output_bearing": "CSG-25", "integrator": "keep"}, "mjINT_DISCRETE"),
+    ],
+)
+def test_attach_rejects_what_it_cannot_step(options, key):
+    """The spec is unchanged."""
+    spec = mujoco.MjSpec.from_string(CANTILEVER)
+    before = saved(spec.compile())
+    with pytest.raises(InputError, match=naming(key)):
+        swgjoint.attach(
+            spec, joint="joint", drive=LINEAR, rotor_inertia=1e-4, **options
+        )
+    assert saved(spec.compile()) == before
 
 
 def test_commands_show_the_bearing(tmp_path, capsys):

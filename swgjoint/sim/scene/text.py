@@ -15,7 +15,8 @@ def scene_toml(scene: Scene) -> str:
     folder.
     """
     data = scene.model_dump(exclude_unset=True, exclude_none=True)
-    named = (data, data["trajectory"], data.get("defaults", {}))
+    tasks = [task.get("trajectory", {}) for task in data.get("cycle", [])]
+    named = (data, data["trajectory"], data.get("defaults", {}), *tasks)
     for table in (*named, *data.get("joints", {}).values()):
         for key in ("arm", "file", "drive"):
             if Path(table.get(key, "")).is_file():
