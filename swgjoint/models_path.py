@@ -90,8 +90,8 @@ def bundled_names(kind: str, suffix: str) -> list[str]:
         kind: Folder in ``models/``, e.g. ``drives`` or ``scenes``.
         suffix: Suffix of the files, including the dot.
 
-    >>> bundled_names("scenes", ".toml")[:2]
-    ['bench', 'bench-chirp']
+    >>> "bench" in bundled_names("scenes", ".toml")
+    True
     """
     return sorted(file.stem for file in (models_path() / kind).glob(f"*{suffix}"))
 

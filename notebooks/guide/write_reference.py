@@ -75,6 +75,10 @@ FILES = {
         "A file with limits for `swgjoint lot DESIGN --spec FILE`: the yield is the"
         " fraction of drives that meet all of them.",
     ),
+    "accept": (
+        "Limits for accept",
+        "A file with limits for `swgjoint accept DRIVE --spec FILE`.",
+    ),
 }
 
 

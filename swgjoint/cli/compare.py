@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from swgjoint.cli.shared.limits import add_limits, limits_of
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
@@ -54,19 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sort", metavar="KEY", help="sort by this quantity, best first"
     )
-    parser.add_argument(
-        "--spec",
-        metavar="FILE",
-        help="TOML file with a [spec] table of limits; the exit status is 1 if a limit"
-        " is missed",
-    )
-    parser.add_argument(
-        "--limit",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="add or replace a limit, e.g. tool_path_rms_mm=0.2; repeatable",
-    )
+    add_limits(parser, "tool_path_rms_mm=0.2")
     parser.add_argument(
         "--out",
         metavar="DIR",
@@ -101,7 +90,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(
             f"--sort {args.sort}: unknown key; {hint}accepted: {', '.join(SORTABLE)}"
         )
-    spec = _limits(args)
+    spec = limits_of(args, SORTABLE)
     scene = scene_or_arm(args.scene, args.overrides)
     require_cycle(scene, {args.sort, *(spec or {})} - {None})
     joints = joints_named(scene, args.joints)
@@ -138,18 +127,6 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if folder is not None:
         _write(folder, result, rows, spec, args.progress)
     return result
-
-
-def _limits(args: argparse.Namespace) -> dict[str, float] | None:
-    """Limits of the file, replaced by those of the options; None without any limit."""
-    from swgjoint.explore.compare.limits import checked_limits, read_spec
-    from swgjoint.sim.scene.overrides import parse_override
-
-    if not args.spec and not args.limit:
-        return None
-    limits = read_spec(args.spec) if args.spec else {}
-    from_options = dict(map(parse_override, args.limit))
-    return limits | checked_limits(from_options, where="--limit ")
 
 
 def _write(

@@ -39,6 +39,7 @@ COMMANDS = {
     "run": "simulate a robot arm with its drives",
     "compare": "compare drives or model levels in one scene, against limits",
     "export": "write a drive or an arm with drives for other simulators",
+    "accept": "test a drive on a bench, simulated or measured, against limits",
     "lot": "estimate accuracy, ripple and yield of a production lot",
     "tune": "tune controller gains and compare them with a textbook rule",
     "sweep": "evaluate many designs, locally or on a cluster; resumable",

@@ -8,7 +8,7 @@ from typing import Any
 
 from swgjoint.files import check_output_file, write_whole
 
-KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
+KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot", "accept")
 WIDTH = 88
 """Width of the list in characters."""
 

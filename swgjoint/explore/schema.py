@@ -25,7 +25,7 @@ from swgjoint.sim.figures import keys
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 """Version of JSON Schema."""
-KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
+KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot", "accept")
 """Kinds of input files."""
 _ROLE = re.compile(r":[a-z]+:`~?([^`]+)`")
 """Cross-reference of a docstring."""
@@ -54,11 +54,11 @@ def file_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of one kind of file.
 
     Args:
-        kind: One of :data:`KINDS`. ``optimise`` is the file of a search; ``spec`` and
-            ``lot`` are the files with the limits of ``swgjoint compare`` and
-            ``swgjoint lot``.
+        kind: One of :data:`KINDS`. ``optimise`` is the file of a search; ``spec``,
+            ``lot`` and ``accept`` are the files with the limits of ``swgjoint
+            compare``, ``lot`` and ``accept``.
     """
-    if kind in ("spec", "lot"):
+    if kind in ("spec", "lot", "accept"):
         return _limits(kind)
     model = _model(kind)
     schema = model.model_json_schema(schema_generator=_WithMeaning)
@@ -142,6 +142,7 @@ def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[str, str]]:
 def _limits(kind: str) -> dict[str, Any]:
     """Schema of a file with a table of limits."""
     from swgjoint.explore import bearing_lot, lot
+    from swgjoint.explore.accept import figures as accept
     from swgjoint.explore.compare import compare
 
     lower: tuple[str, ...]
@@ -150,6 +151,11 @@ def _limits(kind: str) -> dict[str, Any]:
         command, lower = "compare", keys.LOWER
         names = (*keys.UPPER, *keys.LOWER)
         meaning = meanings(compare.Compared)
+    elif kind == "accept":
+        command, lower, names = "accept", accept.LOWER, accept.LIMITED
+        meaning = {
+            key: text for of in accept.FIGURES.values() for key, text in of.items()
+        }
     else:
         command, lower = "lot", lot.LOWER
         names = tuple(dict.fromkeys((*lot.FIGURES, *bearing_lot.FIGURES)))

@@ -9,6 +9,7 @@ _UNITS = {
     "percent": "%",
     "mm": "N/mm",
     "factor": "",
+    "Hz": "Hz",
 }
 """Units by the last part of a key; ``mm`` is the end of ``N_mm``."""
 

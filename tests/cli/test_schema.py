@@ -11,6 +11,7 @@ from swgjoint.cli.main import main
 from swgjoint.cli.schema import KINDS
 from swgjoint.errors import DesignError
 from swgjoint.explore import schema as source
+from swgjoint.explore.accept.figures import LIMITED
 from swgjoint.explore.bearing_lot import FIGURES as BEARING_FIGURES
 from swgjoint.explore.lot import FIGURES
 from swgjoint.explore.sweep.keys import known_keys
@@ -127,7 +128,11 @@ def test_every_key_is_described(kind, capsys):
 
 @pytest.mark.parametrize(
     ("kind", "figures"),
-    [("spec", UPPER + LOWER), ("lot", (*FIGURES, *BEARING_FIGURES))],
+    [
+        ("spec", UPPER + LOWER),
+        ("lot", (*FIGURES, *BEARING_FIGURES)),
+        ("accept", LIMITED),
+    ],
 )
 def test_limits_are_the_figures_that_may_be_limited(kind, figures, capsys):
     """Each with its unit and a meaning, positive numbers only."""

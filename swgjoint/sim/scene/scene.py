@@ -24,6 +24,7 @@ from swgjoint.sim.scene.feature_sections import (
 )
 from swgjoint.sim.scene.overrides import merge
 from swgjoint.sim.scene.sections import (
+    AcceptanceSection,
     ControllerSection,
     LoadSection,
     Metrics,
@@ -87,6 +88,8 @@ class Scene(Section):
     """Contents and layout of the recording for the viewer."""
     metrics: Metrics = Metrics()
     """Reference values for the figures of a run."""
+    acceptance: AcceptanceSection | None = None
+    """Test of one drive for ``swgjoint accept``; ``run`` ignores it."""
 
     _where: str = PrivateAttr(default="scene")
 

@@ -172,3 +172,20 @@ class Metrics(Section):
     contacts_expected: bool = False
     """Whether bodies may touch in this scene. If not, a run with contacts is reported
     as not valid."""
+
+
+class AcceptanceSection(Section):
+    """Acceptance test that ``swgjoint accept`` evaluates from the run."""
+
+    test: Literal[
+        "no_load",
+        "starting",
+        "stiffness",
+        "kinematic_error",
+        "efficiency",
+        "back_driving",
+        "resonance",
+    ]
+    """Evaluation of the run."""
+    limits: dict[str, Positive] = Field(default_factory=dict)
+    """Limits by figure, unless a file with limits states others."""

@@ -1,0 +1,1 @@
+"""Acceptance tests of one drive, simulated or from measured logs."""
