@@ -40,7 +40,7 @@ def limits_of(
     Raises:
         InputError: If the file or a limit cannot be used.
     """
-    from swgjoint.explore.compare.compare import checked_limits, read_spec
+    from swgjoint.explore.compare.limits import checked_limits, read_spec
     from swgjoint.sim.scene.overrides import parse_override
 
     if not args.spec and not args.limit:
