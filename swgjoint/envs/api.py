@@ -16,6 +16,7 @@ from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import settings_of
 from swgjoint.envs.core import Core
 from swgjoint.envs.entries import Entry, bounds
+from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task
@@ -55,6 +56,8 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     """Class of the episodes, called with number of episodes, threads and settings."""
     settings_type: ClassVar[type[Any]]
     """Class of the settings, called with the arguments of the environment."""
+    episode_of: ClassVar[type[JointEpisode] | None] = None
+    """Class of the same episode without arrays, if there is one."""
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """Make one environment; the class docstring lists the arguments.
@@ -72,8 +75,12 @@ class SingleEnv(gymnasium.Env[Array, Array]):
                 " rerun viewer use swgjoint.envs.recording.EpisodeRecorder)"
             )
         settings = settings_of(self.settings_type, arguments)
-        core: Core = self.core_of(1, 1, settings)
-        self.core, self.render_mode = core, render_mode
+        core = self.core_of(1, 1, settings)
+        self.core: Core = core
+        self.render_mode = render_mode
+        self._episode: JointEpisode | None = None
+        if self.episode_of is not None:
+            self._episode = self.episode_of(core)
         self._picture: Picture | None = None
         self._began = False
         self.observation_space = _box(core.observation_entries)
@@ -98,6 +105,8 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         super().reset(seed=seed)
         self._began = True
         self.core.restart([0], [self.np_random])
+        if self._episode is not None:
+            self._episode.begin()
         return self.core.observation()[0], self._info(0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -111,8 +120,11 @@ class SingleEnv(gymnasium.Env[Array, Array]):
             InputError: If no episode has begun, or if the action is not accepted.
         """
         _check_began(self._began)
-        core = self.core
-        core.step(np.asarray(action)[None], None)
+        core, action = self.core, np.asarray(action)
+        if self._episode is not None and (outcome := self._episode.step(action)):
+            observation, reward, limit, over, info = outcome
+            return observation, reward, limit > 0, over, info
+        core.step(action[None], None)
         broken = int(core.broken()[0])
         return (
             core.observation()[0],

@@ -275,7 +275,7 @@ class ArmCore(Core):
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""
-        read, ratio, now = self._readout, self.joints.ratio, self.now
+        read, ratio, now = self.readout, self.joints.ratio, self.now
         angle, speed = read.value[:, : ratio.size], read.motor_speed
         return [
             angle,

@@ -89,17 +89,17 @@ class Core(ABC):
             )
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
-        self._readout = Readout(sensors, count, rated, period)
+        self.readout = Readout(sensors, count, rated, period)
         self.instant = np.zeros(count, dtype=np.intp)
         """Number of control periods since the start. Shape (n,)."""
         size = PlanSize(
             count=count,
             instants=steps + 1,
             joints=n,
-            channels=self._readout.channels,
+            channels=self.readout.channels,
             shared=shared,
         )
-        self._plans = Plans(size, self.draw, self.sample)
+        self.plans = Plans(size, self.draw, self.sample)
         self._task: Task | None = None
         self.variations: list[tuple[Variation, ...]] = [(Variation(),) * n] * count
         """Deviations of every simulation's drives from the nominal ones."""
@@ -175,7 +175,7 @@ class Core(ABC):
                 if varied is not None:
                     self.variations[k] = specimens = tuple(v for v, _ in drawn)
                     varied[m] = [v.numbers for v in specimens]
-            self._plans.begin(k, rng)
+            self.plans.begin(k, rng)
         self.plant.place(index, varied)
         # new arrays, because the arrays that the last step returned must not change
         self.output_torque = self.output_torque.copy()
@@ -185,8 +185,8 @@ class Core(ABC):
         self.action = _without(self.action, index)
         self.motor_torque = _without(self.motor_torque, index)
         self._look()
-        noise = self._plans.noise_at(self._here)
-        self._readout.start(index, self._true()[index], noise[index])
+        noise = self.plans.noise_at(self._here)
+        self.readout.start(index, self._true()[index], noise[index])
         self.judge()
         self.forget(index)
 
@@ -209,7 +209,7 @@ class Core(ABC):
                 f" each of {len(self.action)} episodes"
             )
         self.action = np.clip(action, -1.0, 1.0)
-        self._plans.move_to(self.instant)
+        self.plans.move_to(self.instant)
         command = self.command(self.action)
         plant.step(command, self.now[:, 3], active)
         self.instant += 1 if active is None else active
@@ -217,20 +217,20 @@ class Core(ABC):
         wanted = self.loop.torque(command, self.motor_angle, plant.motor_speed)
         self.motor_torque = np.clip(wanted, -limit, limit)
         self.output_torque = self.plant.output_torque()
-        self._readout.read(self._true(), self._plans.noise_at(self._here))
+        self.readout.read(self._true(), self.plans.noise_at(self._here))
         self.judge()
         self.remember()
 
     def next_plan(self) -> Array:
         """Plan at the end of the next step. Shape (n, 5, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
-        return self._plans.plan_at(after)
+        return self.plans.plan_at(after)
 
     def _look(self) -> None:
         """Read the state of the simulations."""
         plant = self.plant
         self._here = np.minimum(self.instant, self.steps)
-        self.now = self._plans.plan_at(self._here)
+        self.now = self.plans.plan_at(self._here)
         """Plan at the current instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
 
@@ -259,7 +259,7 @@ class Core(ABC):
 
     def readings(self) -> list[Array]:
         """Readings of link encoder and torque sensor that exist. (n, n_joints)."""
-        n, value = len(self.joints.names), self._readout.value
+        n, value = len(self.joints.names), self.readout.value
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
     def broken(self) -> NDArray[np.int64]:
@@ -302,7 +302,7 @@ class Core(ABC):
         """Motions of all episodes; the axis of episodes precedes that of joints."""
         if self._task is None:
             # (5, steps + 1, n, n_joints); copied, as the next episodes overwrite it
-            plan = self._plans.whole_plans().transpose(2, 1, 0, 3).copy()
+            plan = self.plans.whole_plans().transpose(2, 1, 0, 3).copy()
             age = self.sensors.delay_periods * self.period
             self._task = Task(
                 period=self.period,

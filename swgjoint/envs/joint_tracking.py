@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.entries import Entry, ceiling
+from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.references import (
     KINDS,
     DrawnMotion,
@@ -22,6 +24,8 @@ from swgjoint.errors import InputError
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
+Values = TypeVar("Values", float, Array)
+"""One number, or an array with one value for each episode."""
 LOAD_RAMP = 0.3
 """Time over which the load grows [s]."""
 MOTION_START = 0.1
@@ -162,7 +166,7 @@ class TrackingCore(BenchCore):
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""
-        read, ratio, now = self._readout, self.joint.ratio, self.now
+        read, ratio, now = self.readout, self.joint.ratio, self.now
         angle, speed = read.value[:, :1], read.motor_speed
         return [
             angle,
@@ -179,12 +183,36 @@ class TrackingCore(BenchCore):
 
     def reward(self) -> Array:
         """Reward as :class:`JointTrackingEnv` defines it."""
-        s = self.settings
-        error = self.link_error[:, 0] / (s.error_scale_arcmin * arcmin)
         effort = self.motor_torque[:, 0] / self.limits.motor_torque[0]
-        return np.asarray(
-            1.0 / (1.0 + error * error) - s.effort_weight * (effort * effort)
-        )
+        return np.asarray(_reward(self.settings, self.link_error[:, 0], effort))
+
+
+def _reward(s: TrackingSettings, link_error: Values, effort: Values) -> Values:
+    """Reward for link errors [rad] and motor torques relative to their limit [-]."""
+    error = link_error / (s.error_scale_arcmin * arcmin)
+    return 1.0 / (1.0 + error * error) - s.effort_weight * (effort * effort)
+
+
+class TrackingEpisode(JointEpisode):
+    """The only episode of a :class:`TrackingCore`."""
+
+    core: TrackingCore
+
+    def command(self, action: float) -> float:
+        """Motor torque: the action times the torque limit [N·m]."""
+        return action * self.limit
+
+    def columns(self) -> list[float]:
+        """Parts of the observation in the order of its table."""
+        angle, speed, ratio = self.readings[0], self.measured_speed, self.ratio
+        q, v, a, load, _ = self.now
+        errors = ratio * q - angle, ratio * v - speed
+        return [angle, speed, *errors, q, v, a, load, self.action]
+
+    def reward(self) -> float:
+        """Reward as :class:`JointTrackingEnv` defines it."""
+        effort = self.motor_torque / self.limit
+        return _reward(self.core.settings, self.link_error, effort)
 
 
 class JointTrackingEnv(SingleEnv):
@@ -285,6 +313,7 @@ class JointTrackingEnv(SingleEnv):
     """
 
     core_of = TrackingCore
+    episode_of = TrackingEpisode
     settings_type = TrackingSettings
 
 

@@ -143,6 +143,13 @@ class Plans:
         """
         return np.asarray(self._noise[self._rows, instant - self._first])
 
+    def views_of_one(self) -> tuple[Array, Array]:
+        """Views of the plan and the noise of a single episode of one joint.
+
+        Shapes (instants, 5) and (instants, n_channels).
+        """
+        return self._plan[0, :, :, 0], self._noise[0]
+
     def whole_plans(self) -> Array:
         """Copy of the whole plans. Shape (n, instants, 5, n_joints)."""
         if self._size.shared or self._whole:

@@ -79,6 +79,7 @@ class Plant:
             self._qacc = batch.bind("qacc")
             self._factor = batch.bind("qLD"), batch.bind("qLDiagInv")
         self._start = start
+        self._one = int(self._link_v[0]), int(self._rotor_v[0])
         self._nominal = self._balance(np.zeros((1, len(drives), SIZE)))
 
     @property
@@ -140,6 +141,32 @@ class Plant:
         self._ctrl[:, : torque.shape[1]] = torque
         self._load[:, self._link_v] = -load
         self.batch.step(active, nstep=self.sub_steps)
+
+    def step_one(self, torque: float, load: float) -> tuple[float, float, float, float]:
+        """Advance the only simulation of a single joint, as :meth:`step`.
+
+        Args:
+            torque: Input of the motor [N·m].
+            load: Load torque against positive rotation of the link [N·m].
+
+        Returns:
+            Motor angle [rad] and speed [rad/s], link angle [rad], and torque of the
+            drive on the link [N·m].
+        """
+        link, rotor = self._one
+        self._ctrl[0, 0], self._load[0, link] = torque, -load
+        self.batch.step(None, nstep=self.sub_steps)
+        # the bench has hinges only, so that angles and speeds have the same addresses
+        theta, psi = self._qpos.item(rotor), self._qpos.item(link)
+        speed = self._qvel.item(rotor)
+        if self._others is not None:
+            state, (index,) = self._others
+            added = self._qacc.item(link) - state.item(index)
+            # the mass matrix of the bench is diagonal
+            return theta, speed, psi, added / self._factor[1].item(link)
+        drive, ratio = self.drives[0], self.drives[0].ratio
+        torsion, rate = theta / ratio - psi, speed / ratio - self._qvel.item(link)
+        return theta, speed, psi, drive.stiffness * torsion + drive.damping * rate
 
     def place(self, rows: Index, variations: Array | None) -> None:
         """Set simulations to rest at the start, the drives with their torques there.

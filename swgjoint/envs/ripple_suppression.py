@@ -12,6 +12,7 @@ from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Rows
 from swgjoint.envs.entries import Entry, ceiling
+from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
@@ -107,11 +108,15 @@ class RippleCore(BenchCore):
             loop_damping_ratio=s.loop_damping_ratio,
         )
         rated = self.joint.drive.ratings.rated_torque
-        self._authority = s.authority_of_rated * rated / abs(self.joint.ratio)
-        self._ripple_scale = s.ripple_scale_of_rated * rated
-        self._alpha = angle_coefficients(self.joint.drive.layout)[0]
+        self.authority = s.authority_of_rated * rated / abs(self.joint.ratio)
+        """Largest added motor torque [N·m]."""
+        self.ripple_scale = s.ripple_scale_of_rated * rated
+        """Ripple scale of the reward [N·m]."""
+        self.angle_slopes = angle_coefficients(self.joint.drive.layout)[0]
+        """Derivatives of the wave-generator angle by theta and psi [-]."""
         self._mean = np.zeros((2, count))
-        self._first = round((RAMP + SETTLE) / s.period_s)
+        self.first_step = round((RAMP + SETTLE) / s.period_s)
+        """Last instant without a reward."""
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
         """Entries of observation and action."""
@@ -166,13 +171,13 @@ class RippleCore(BenchCore):
         rotor = self.settings.rotor_inertia_kgm2
         known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
         loop = self.loop.command(plan[:, 0], plan[:, 1])
-        return np.asarray(loop + known + action * self._authority)
+        return np.asarray(loop + known + action * self.authority)
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""
-        read, ratio, now = self._readout, self.joint.ratio, self.now
+        read, ratio, now = self.readout, self.joint.ratio, self.now
         angle, speed = read.value[:, :1].copy(), read.motor_speed
-        by_theta, by_psi = self._alpha
+        by_theta, by_psi = self.angle_slopes
         alpha = by_theta * angle + by_psi * (angle / ratio)
         return [
             angle,
@@ -208,14 +213,18 @@ class RippleCore(BenchCore):
         self._mean[:, rows] = self._errors[:, rows]
         self.link_ripple, self.error_ripple = self._errors - self._mean
 
+    def list_means(self) -> list[float]:
+        """Running means of the link and transmission errors of the first episode."""
+        return [float(one) for one in self._mean[:, 0]]
+
     def reward(self) -> Array:
         """Reward as :class:`RippleSuppressionEnv` defines it."""
         s = self.settings
-        a = self.ripple / self._ripple_scale
+        a = self.ripple / self.ripple_scale
         b = self.link_ripple / (s.error_scale_arcmin * arcmin)
         effort = self.action[:, 0]
         value = 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
-        return np.where(self.instant > self._first, value, 0.0)
+        return np.where(self.instant > self.first_step, value, 0.0)
 
     def info(self) -> dict[str, NDArray[Any]]:
         """True values, including the ripples and whether the reward counts."""
@@ -223,7 +232,71 @@ class RippleCore(BenchCore):
             "torque_ripple_Nm": self.ripple,
             "link_error_ripple_arcmin": self.link_ripple / arcmin,
             "transmission_error_ripple_arcmin": self.error_ripple / arcmin,
-            "steady": self.instant > self._first,
+            "steady": self.instant > self.first_step,
+        }
+
+
+class RippleEpisode(JointEpisode):
+    """The only episode of a :class:`RippleCore`."""
+
+    core: RippleCore
+
+    def begin(self) -> None:
+        """Take over the state of the core after its reset."""
+        super().begin()
+        self._means = self.core.list_means()
+
+    def command(self, action: float) -> float:
+        """Input of the motor loop [N·m]: reference, feed-forward and added torque."""
+        (q, v, a, _, known), ratio = self.plan_at(self.instant + 1), self.ratio
+        known = known / ratio + ratio * self.core.settings.rotor_inertia_kgm2 * a
+        stiffness, damping = self.gains
+        loop = stiffness * (ratio * q) + damping * (ratio * v)
+        return loop + known + action * self.core.authority
+
+    def columns(self) -> list[float]:
+        """Parts of the observation in the order of its table."""
+        angle, speed, ratio = self.readings[0], self.measured_speed, self.ratio
+        by_theta, by_psi = self.core.angle_slopes
+        alpha = by_theta * angle + by_psi * (angle / ratio)
+        q, v, _, load, _ = self.now
+        errors = ratio * q - angle, ratio * v - speed
+        # numpy's sine may differ from that of the math library in the last bit
+        sine, cosine = float(np.sin(alpha)), float(np.cos(alpha))
+        return [angle, speed, *errors, sine, cosine, v, load, self.action]
+
+    def judge(self) -> None:
+        """Set the torque ripple [N·m] and the ripple of the errors [rad]."""
+        core, now = self.core, self.now
+        inertia = core.settings.link_inertia
+        self.ripple = self.output_torque - now[3] - inertia * now[2]
+        error = self.link_angle - self.motor_angle / self.ratio
+        share, errors = self.period / MEMORY, (self.link_error, error)
+        self._means = [
+            mean + share * (one - mean)
+            for one, mean in zip(errors, self._means, strict=True)
+        ]
+        self.link_ripple, self.error_ripple = (
+            one - mean for one, mean in zip(errors, self._means, strict=True)
+        )
+
+    def reward(self) -> float:
+        """Reward as :class:`RippleSuppressionEnv` defines it."""
+        s, core = self.core.settings, self.core
+        if self.instant <= core.first_step:
+            return 0.0
+        a = self.ripple / core.ripple_scale
+        b = self.link_ripple / (s.error_scale_arcmin * arcmin)
+        effort = self.action
+        return 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
+
+    def info(self) -> dict[str, Any]:
+        """True values, including the ripples and whether the reward counts."""
+        return super().info() | {
+            "torque_ripple_Nm": self.ripple,
+            "link_error_ripple_arcmin": self.link_ripple / arcmin,
+            "transmission_error_ripple_arcmin": self.error_ripple / arcmin,
+            "steady": float(self.instant > self.core.first_step),
         }
 
 
@@ -305,6 +378,7 @@ class RippleSuppressionEnv(SingleEnv):
     """
 
     core_of = RippleCore
+    episode_of = RippleEpisode
     settings_type = RippleSettings
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
@@ -134,6 +135,14 @@ class Readout:
             np.floor(reading[:, self._coarse] / self._rounds) * self._rounds
         )
         return reading
+
+    def channel_errors(self) -> list[tuple[float, float]]:
+        """Standard deviation of the noise and angle of one count of every channel."""
+        return list(zip(self._noise.tolist(), self._resolution.tolist(), strict=True))
+
+    def list_past(self) -> deque[list[float]]:
+        """Readings of the first simulation after its restart, the oldest first."""
+        return deque(self._ring[:, 0].tolist())
 
     def start(self, rows: NDArray[np.intp], true: Array, normal: Array) -> None:
         """Restart some simulations, whose joints were at rest before the start.

@@ -120,7 +120,7 @@ def test_what_evens_the_link_takes_ripple_and_not_the_transmission_error():
         # the load drives the motor through the slope of the error
         torque += task.link_torque[:, 0] * slope
         for k in range(core.steps):
-            action = compensate * torque[k + 1 : k + 2] / core._authority
+            action = compensate * torque[k + 1 : k + 2] / core.authority
             rows.append((0.0, env.step(action)[-1]))
         runs.append(
             {
