@@ -40,10 +40,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     start = time.perf_counter()
     folder = output_folder(args.out)
     from swgjoint.drives.references import load_drive
+    from swgjoint.joint import plugin
     from swgjoint.sim.figures.metrics import against_rigid
     from swgjoint.sim.scene.scene import Scene
     from swgjoint.view.run import run_scene
 
+    plugin.load()  # reports another MuJoCo before maps are built
     maps = {name: load_drive(name, progress=args.progress) for name in DRIVES.values()}
     scene = Scene.load_file(SCENE)
     scenes = {

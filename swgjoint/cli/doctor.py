@@ -122,7 +122,10 @@ def _plugin() -> str:
     except ImportError as exc:
         raise SwgError(f"cannot be imported: {exc}") from None
     plugin.load()
-    return f"{plugin.NAME} loaded from {plugin.library()}"
+    return (
+        f"{plugin.NAME} for MuJoCo {plugin.MUJOCO_VERSION} loaded from"
+        f" {plugin.library()}"
+    )
 
 
 def _kernels() -> str:

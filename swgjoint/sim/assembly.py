@@ -13,6 +13,7 @@ from swgjoint.drives.references import check_joint_names, drive_of
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.gear.bearing.output_bearing import OutputBearing
+from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.fitting import Fitting
@@ -174,6 +175,8 @@ def assemble(
     trajectory = trajectory_of(scene, arm)
     check_ranges(arm, trajectory, where=scene.where)
 
+    if any(section.level == "full" for section in sections):
+        plugin.load()  # reports another MuJoCo before maps are built
     # drives keep the harmonics that the scene's own step resolves, so the contents of a
     # run depend on the step that the user chose, not on the number of sub-steps
     spec = _spec_at_step(scene, arm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import sysconfig
+import tomllib
 from pathlib import Path
 
 import mujoco
@@ -93,6 +94,32 @@ def test_another_mujoco(capsys, monkeypatch):
         attach(spec, joint="j", drive=drive, level="linear", rotor_inertia=1e-4)
     _, result = run(capsys)
     assert by_name(result)["engine plugin"]["ok"]
+
+
+@pytest.mark.parametrize("command", ["demo", "run ur5e-sweep"])
+def test_another_mujoco_is_reported_before_maps_are_built(
+    command, capsys, monkeypatch, tmp_path
+):
+    """One line with both versions and the remedy, not after minutes."""
+
+    def build(*args, **kwargs):
+        raise AssertionError("a map is built")
+
+    monkeypatch.setattr("swgjoint.drives.build_map.build_map", build)
+    monkeypatch.setattr(mujoco, "__version__", "4.1.0")
+    plugin.load.cache_clear()
+    assert main([*command.split(), "--out", str(tmp_path / "out")]) == 1
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert names(line, "4.1.0", "4.0.0", "pip install mujoco==4.0.0")
+
+
+def test_the_pinned_mujoco_is_the_one_of_the_plugin():
+    """Build and run time require the version that the package states."""
+    path = Path(__file__).parents[2] / "pyproject.toml"
+    project = tomllib.loads(path.read_text(encoding="utf-8"))
+    pin = f"mujoco=={plugin.MUJOCO_VERSION}"
+    assert pin in project["build-system"]["requires"]
+    assert pin in project["project"]["dependencies"]
 
 
 def test_mujoco_that_is_missing(capsys, monkeypatch):
