@@ -24,7 +24,7 @@ MAX_NAME, MAX_PATH = 255, 4096
 are not larger."""
 ECHOED = 120
 """Largest length of a reference that a message quotes in full [characters]."""
-LISTED = 400
+LISTED = 200
 """Largest length of a list of bundled names in a message [characters]."""
 _SHOWN_AS = {"drives": "designs"}
 """Names of kinds in messages and commands, where they differ from the folder."""

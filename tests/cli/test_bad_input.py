@@ -250,7 +250,7 @@ def test_an_arm_is_suggested_where_a_scene_may_be_one(here, capsys):
     """A wrong name has those of arms beside those of scenes."""
     err = refused(capsys, "run", "ur10e")
     assert err.count("\n") == 1
-    assert names(err, "'ur10e'", "mean ur5e", "ur5e-sweep", "two-link", "models/arms")
+    assert names(err, "'ur10e'", "mean ur5e", "list scenes", "two-link", "models/arms")
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ def test_friction_is_what_the_argument_says(own, tmp_path):
             {"scene": "bench-chirp"},
             ("'bench-chirp'", "controller", "'computed_torque'", "pd"),
         ),
-        ({"scene": "nothing"}, ("'nothing'", "models/scenes", "bench", "ur5e-circle")),
+        ({"scene": "nothing"}, ("'nothing'", "models/scenes", "bench", "list scenes")),
         ({"action": "speed"}, ("action", "'speed'", "torque", "setpoint")),
         ({"error_scale_mm": 0.0}, ("error_scale_mm", "0.0 mm", "> 0")),
         ({"loop": 1}, ("'loop'", "scene", "level", "effort_weight")),

@@ -45,7 +45,7 @@ def test_run_prints_a_table(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "nope"], ("'nope'", "models/scenes", "bench", "ur5e-sweep")),
+        (["run", "nope"], ("'nope'", "models/scenes", "bench", "swgjoint list scenes")),
         (["run", "bench", "--set", "simulation.step=1"],
          ("bench.toml", "simulation.step", "step_s", "duration_s", "integrator")),
         (["run", "bench", "--set", "defaults.drive=x.swg"], ("x.swg", "No such file")),
