@@ -184,9 +184,9 @@ class Core(ABC):
         self.instant[index] = 0
         self.action = _without(self.action, index)
         self.motor_torque = _without(self.motor_torque, index)
-        self._look()
-        noise = self.plans.noise_at(self._here)
-        self.readout.start(index, self._true()[index], noise[index])
+        self._look(index)
+        noise = self.plans.noise_at(self.instant[index], index)
+        self.readout.start(index, self._true()[index], noise)
         self.judge()
         self.forget(index)
 
@@ -226,13 +226,17 @@ class Core(ABC):
         after = np.minimum(self.instant + 1, self.steps)
         return self.plans.plan_at(after)
 
-    def _look(self) -> None:
-        """Read the state of the simulations."""
+    def _look(self, rows: Rows | None = None) -> None:
+        """Read the state of the simulations, of which some may have restarted."""
         plant = self.plant
-        self._here = np.minimum(self.instant, self.steps)
-        self.now = self.plans.plan_at(self._here)
-        """Plan at the current instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
+        self._here = np.minimum(self.instant, self.steps)
+        if rows is None or rows.size == self.instant.size:
+            self.now = self.plans.plan_at(self._here)
+            """Plan at the current instant. Shape (n, 5, n_joints)."""
+        else:
+            self.now = self.now.copy()
+            self.now[rows] = self.plans.plan_at(self._here[rows], rows)
 
     def judge(self) -> None:
         """Set the quantities of reward and info that depend on the state alone."""

@@ -126,22 +126,37 @@ class Plans:
                 self._plan[k, :count] = self._sample(self._drawn[k], part)
             self._first[k] = first
 
-    def plan_at(self, instant: NDArray[np.intp]) -> Array:
-        """Plans of all episodes. Shape (n, 5, n_joints).
+    def plan_at(
+        self, instant: NDArray[np.intp], rows: NDArray[np.intp] | None = None
+    ) -> Array:
+        """Plans of episodes. Shape (m, 5, n_joints).
 
         Args:
-            instant: Instant of every episode, in its window. Shape (n,).
+            instant: Instant of each of the episodes, in its window. Shape (m,).
+            rows: Indices of the episodes; None: all. Shape (m,).
         """
-        here = instant if self._size.shared else instant - self._first
-        return np.asarray(self._plan[self._planned, here])
+        if self._size.shared:
+            return np.asarray(self._plan[0, instant])
+        return np.asarray(self._plan[self._place(instant, rows)])
 
-    def noise_at(self, instant: NDArray[np.intp]) -> Array:
-        """Noise of all episodes. Shape (n, n_channels).
+    def noise_at(
+        self, instant: NDArray[np.intp], rows: NDArray[np.intp] | None = None
+    ) -> Array:
+        """Noise of episodes. Shape (m, n_channels).
 
         Args:
-            instant: Instant of every episode, in its window. Shape (n,).
+            instant: Instant of each of the episodes, in its window. Shape (m,).
+            rows: Indices of the episodes; None: all. Shape (m,).
         """
-        return np.asarray(self._noise[self._rows, instant - self._first])
+        return np.asarray(self._noise[self._place(instant, rows)])
+
+    def _place(
+        self, instant: NDArray[np.intp], rows: NDArray[np.intp] | None
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and places of instants in the windows."""
+        first = self._first if rows is None else self._first[rows]
+        here = instant if self._whole else instant - first
+        return self._rows if rows is None else rows, here
 
     def views_of_one(self) -> tuple[Array, Array]:
         """Views of the plan and the noise of a single episode of one joint.

@@ -79,6 +79,7 @@ class Plant:
             self._qacc = batch.bind("qacc")
             self._factor = batch.bind("qLD"), batch.bind("qLDiagInv")
         self._start = start
+        self._kept: Array | None = None
         self._one = int(self._link_v[0]), int(self._rotor_v[0])
         self._nominal = self._balance(np.zeros((1, len(drives), SIZE)))
 
@@ -174,7 +175,7 @@ class Plant:
         Args:
             rows: Indices of the simulations. Shape (m,).
             variations: ``numbers`` of the drives' deviations in these simulations, or
-                None for the nominal drives. Shape (m, n_joints, 5).
+                None if drives and loads are nominal. Shape (m, n_joints, 5).
         """
         rests = self._nominal
         if variations is not None and self._user is not None:
@@ -187,10 +188,13 @@ class Plant:
         self._qpos[rows[:, None], self._rotor_q] = self._start[0]
         if self._others is None:
             return
+        state, others = self._others
+        if variations is None and self._kept is not None:
+            state[rows] = self._kept
+            return
         # initialise the plugin state as in equilibrium: the accelerations due to all
         # other forces cancel those due to the drive, and hysteresis is relaxed
         batch.forward(rows)
-        state, others = self._others
         factor, inverse = (part[rows] for part in self._factor)
         for side, dofs in enumerate((self._rotor_v, self._link_v)):
             weight = responses(self.model, factor, inverse, dofs)
@@ -200,6 +204,8 @@ class Plant:
         for j, one in enumerate(rests):
             for k in range(len(self.drives[j].drive.hysteresis)):
                 state[rows, others[j] + 1 + k] = one.torsion
+        if variations is None:
+            self._kept = state[rows[0]].copy()
 
     def _balance(self, variations: Array) -> list[DriveRest]:
         """Equilibria of the drives at the start. ``variations`` as in :meth:`place`."""

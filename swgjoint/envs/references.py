@@ -223,6 +223,6 @@ def draw_motion(
     limits = (max_angle, max_speed, max_acceleration)
     tops = [max(float(one.max()), -float(one.min())) for one in motion]
     size = min(limit / top for limit, top in zip(limits, tops, strict=True))
-    size *= float(rng.uniform(0.4, 1.0) * rng.choice([-1.0, 1.0]))
+    size *= rng.uniform(0.4, 1.0) * (2.0 * int(rng.integers(2)) - 1.0)
     q, v, a = motion
     return DrawnMotion(shape=shape, size=size), (size * q, size * v, size * a)

@@ -43,6 +43,9 @@ def responses(
     diagonal = []
     for dof in dofs:
         row, count = int(model.M_rowadr[dof]), int(model.M_rownnz[dof])
+        if count == 1:  # carried by no other dof
+            diagonal.append(inverse_diagonal[..., dof])
+            continue
         carriers = model.M_colind[row : row + count]
         # one column of L^-T, from the dof up to the root
         x = np.zeros((*factor.shape[:-1], count))
