@@ -32,8 +32,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only",
         metavar="TEST,...",
-        help="run only these tests, such as stiffness,resonance; default: all bundled"
-        " scenes acceptance-TEST",
+        action="append",
+        default=[],
+        help="run only these tests, such as stiffness,resonance; repeatable; default:"
+        " all bundled scenes acceptance-TEST",
     )
     add_limits(parser, "lost_motion_arcmin=0.8")
     parser.add_argument(
@@ -68,7 +70,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         model=args.model,
         spec=limits_of(args, LIMITED),
         measured=args.measured,
-        only=[] if args.only is None else [k.strip() for k in args.only.split(",")],
+        only=[key.strip() for text in args.only for key in text.split(",")],
         progress=args.progress,
     )
     result: dict[str, Any] = {

@@ -29,53 +29,6 @@ _CHUNK = 1000  # approximate number of engine steps between two progress reports
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
-def simulate_scene(
-    scene: Scene | str | Path,
-    *,
-    overrides: Mapping[str, Any] | Iterable[str] | None = None,
-    drives: Mapping[str, DriveMap] | None = None,
-    controller: Controller | None = None,
-    known_drives: Mapping[str, DriveMap] | None = None,
-    known_arm: KnownArm | None = None,
-    name: str | None = None,
-    progress: Progress = silent,
-) -> Run:
-    """Simulate a scene from its initial equilibrium to its end.
-
-    :func:`swgjoint.run_scene` also records the run for the viewer.
-
-    Args:
-        scene: The scene, or the path or bundled name of a scene file.
-        overrides: Changes of the scene, see :meth:`Scene.load_file`.
-        drives: Maps by drive reference, used instead of loading or building them.
-        controller: External controller; None runs the scene's own controller.
-        known_drives: Drive maps in the controller's model, by joint.
-        known_arm: Arm in the controller's model; None uses the arm of the scene.
-        name: Name of the run; None uses the name of the scene.
-        progress: Called with the number of completed steps, and while maps are built.
-
-    Returns:
-        The recorded run.
-
-    Raises:
-        InputError: If the scene or an argument is not valid.
-        ComputationError: If the motion diverges, the start has no equilibrium, or a
-            joint needs more sub-steps than the scene accepts.
-    """
-    assembly, loop = prepare_scene(
-        scene,
-        overrides=overrides,
-        drives=drives,
-        controller=controller,
-        known_drives=known_drives,
-        known_arm=known_arm,
-        progress=progress,
-    )
-    return simulate(
-        assembly, name=name or assembly.scene.name, loop=loop, progress=progress
-    )
-
-
 def prepare_scene(
     scene: Scene | str | Path,
     *,
