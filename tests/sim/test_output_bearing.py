@@ -16,6 +16,7 @@ from swgjoint.gear.catalogue import table
 from swgjoint.joint.tilt import add_tilt_hinges, tilt_names
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import assemble
+from swgjoint.sim.figures.output_bearing import bearing_loads
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
@@ -102,6 +103,9 @@ def test_a_force_at_the_tool_adds_its_moment(cantilever):
     stiff = cantilever(bearing=False)
     drop = run.tool_position[-1, 2] - stiff.tool_position[-1, 2]
     assert drop == pytest.approx(-ARM * tilt, rel=1e-3)
+    _, axial, moment = bearing_loads(run)["joint"][-100:-10].mean(0)
+    assert axial == pytest.approx(MASS * G + 20.0, rel=1e-3)
+    assert moment == pytest.approx(MASS * G * REACH + 20.0 * ARM, rel=1e-3)
 
 
 def test_centre_of_the_bearing_is_the_pivot(cantilever, tmp_path):
