@@ -13,7 +13,7 @@ BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "env_throughput.py"
 @pytest.mark.slow
 @pytest.mark.parametrize("randomise", [False, True])
 def test_batched_is_at_least_three_times_as_fast(randomise):
-    """64 environments in one run, the same actions in turns; a median of rounds."""
+    """256 environments in one run, the same actions in turns; a median of rounds."""
     compare = runpy.run_path(str(BENCHMARK))["compare"]
-    got = compare(64, 2, rounds=3, steps=50, randomise=randomise)
+    got = compare(256, 2, rounds=3, steps=50, randomise=randomise)
     assert got["ratio"] > 3.0
