@@ -181,6 +181,7 @@ def _limits(kind: str) -> dict[str, Any]:
         "type": "object",
         "properties": {"spec": table},
         "required": ["spec"],
+        "additionalProperties": False,
     }
 
 

@@ -297,6 +297,14 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch, capsys
     assert names(err, *message)
 
 
+def test_keys_beside_the_limits_are_refused(tmp_path, capsys):
+    """A limit written above the table would otherwise be left out in silence."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text("K1_Nm_rad = 1e4\n[spec]\nK2_Nm_rad = 1e4\n[bearing]\nlife = 1\n")
+    assert main(["compare", "CSG-25-100", "--spec", str(spec)]) == 2
+    assert names(capsys.readouterr().err, "spec.toml: K1_Nm_rad, bearing: unknown key")
+
+
 def test_a_ripple_that_is_not_valid_is_marked_and_misses_its_limit(
     synthetic_map, tmp_path, capsys
 ):

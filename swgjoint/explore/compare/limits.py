@@ -25,11 +25,17 @@ def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str,
         accepted: Figures that may be limited.
 
     Raises:
-        InputError: If the file cannot be read, has no limits, or a limit is invalid.
+        InputError: If the file cannot be read, has no limits or other keys beside them,
+            or a limit is invalid.
     """
-    table = read_toml(Path(path), what="spec").get("spec")
+    data = read_toml(Path(path), what="spec")
+    table = data.pop("spec", None)
     if not isinstance(table, Mapping) or not table:
         raise InputError(f"{path}: no limits; accepted: a table [spec] with limits")
+    if data:
+        raise InputError(
+            f"{path}: {', '.join(data)}: unknown key; accepted: the table [spec] alone"
+        )
     return checked_limits(table, accepted, where=f"{path}: spec.")
 
 
