@@ -228,7 +228,7 @@ class PlaneRace:
         # forces of the elements of the race and of the balls below this part of it
         element = np.arange(n * m)
         local = bore + NODE * (element % m)[:, None] + np.arange(2 * NODE)
-        nodal, blocks = ring.forces(q)
+        _, nodal, blocks = ring.forces(q)
         gradient[:, bore : bore + NODE * m] = nodal[: flat.size].reshape(n, -1)
         add(element // m, local, None, blocks[: n * m])
         balls = on_balls.press_balls(q, alpha, self.phase, self._feet(race, alpha))

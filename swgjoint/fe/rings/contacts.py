@@ -38,8 +38,8 @@ def linearise(
     rim, race = state.q[:first], state.q[first:]
     both = (("rim", model.rim, rim, 0), ("race", model.race, race, first))
     for name, ring, q, shift in both:
-        gradient, hessian = ring.forces(q)
-        total.energy += ring.energy(q)
+        energy, gradient, hessian = ring.forces(q)
+        total.energy += energy
         total.gradient[shift : shift + ring.size] += gradient
         total.add(name, ring.dofs + shift, None, hessian)
     state = _balls(model, state, race, total)

@@ -29,27 +29,34 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
 """Gauss points and weights on an element [-]. They suffice because the bending of an
 element is linear and its stretch nearly constant."""
-_EYE = np.eye(2)
 _CROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # v x w = v . (_CROSS w)
 
 
+_CUBICS = np.array(
+    [[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64
+)
+"""Coefficients of the four shape functions by power of the parameter."""
+_POWERS = np.arange(1.0, 4.0)
+_SLOPES = np.pad(_CUBICS[:, 1:] * _POWERS, ((0, 0), (0, 1)))
+_BENDS = np.pad(_SLOPES[:, 1:] * _POWERS, ((0, 0), (0, 1)))
+_SHAPES = np.concatenate([_CUBICS, _SLOPES, _BENDS]).T
+"""Coefficients of shape functions, first and second derivatives (4, 12)."""
+
+
 def hermite(xi: Array) -> tuple[Array, Array, Array]:
-    """Shape functions and first two derivatives at parameters (n,), each (n, 4)."""
-    x, one = xi, np.ones_like(xi)
-    value = [
-        1 - 3 * x**2 + 2 * x**3,
-        x - 2 * x**2 + x**3,
-        3 * x**2 - 2 * x**3,
-        x**3 - x**2,
-    ]
-    first = [
-        6 * x**2 - 6 * x,
-        1 - 4 * x + 3 * x**2,
-        6 * x - 6 * x**2,
-        3 * x**2 - 2 * x,
-    ]
-    second = [12 * x - 6 * one, 6 * x - 4 * one, 6 * one - 12 * x, 6 * x - 2 * one]
-    return np.stack(value, -1), np.stack(first, -1), np.stack(second, -1)
+    """Shape functions and first two derivatives at parameters (...), each (..., 4)."""
+    value, first, second = np.moveaxis(_shapes(xi), -2, 0)
+    return value, first, second
+
+
+def _shapes(xi: Array) -> Array:
+    """Shape functions and first two derivatives at parameters (...), (..., 3, 4)."""
+    powers = np.empty((*xi.shape, 4))
+    powers[..., 0] = 1.0
+    powers[..., 1] = xi
+    powers[..., 2] = xi * xi
+    powers[..., 3] = powers[..., 2] * xi
+    return np.asarray(powers @ _SHAPES).reshape(*xi.shape, 3, 4)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,8 +139,7 @@ class HermiteRing:
             own: Elements whose cubics are extended, see :meth:`split` (n,).
         """
         element, xi = self.split(place, own)
-        local = self.nodal(q)[element]
-        value, first, second = (np.einsum("na,nai->ni", h, local) for h in hermite(xi))
+        value, first, second = (_shapes(xi) @ self.nodal(q)[element]).swapaxes(0, 1)
         return value, first, second
 
     def split(self, place: Array, own: Index | None = None) -> tuple[Index, Array]:
@@ -150,17 +156,19 @@ class HermiteRing:
         return np.mod(whole, self.elements).astype(np.int64), place - whole
 
     @cached_property
-    def _shape(self) -> tuple[Array, Array]:
-        """Both derivatives of the shape functions at the Gauss points, each (3, 4)."""
-        _, first, second = hermite(GAUSS[0])
-        return first, second
+    def _shape(self) -> Array:
+        """First two derivatives of the position at the Gauss points, by coordinates.
+
+        Shape (3, 4, 8).
+        """
+        both = _shapes(GAUSS[0])[:, 1:]
+        return np.asarray(np.kron(both, np.eye(2)), np.float64)
 
     def _strains(self, q: Array) -> tuple[Array, ...]:
         """Both derivatives, length, stretch and curvature at all Gauss points."""
-        first, second = self._shape
-        local = self.nodal(q)
-        v = np.einsum("ga,eai->egi", first, local)
-        w = np.einsum("ga,eai->egi", second, local)
+        local = self.nodal(q).reshape(self.elements, 8)
+        both = local @ self._shape.reshape(-1, 8).T
+        v, w = both.reshape(self.elements, -1, 2, 2).transpose(2, 0, 1, 3)
         length = np.hypot(v[..., 0], v[..., 1])
         cross = v[..., 0] * w[..., 1] - v[..., 1] * w[..., 0]
         return v, w, length, length / self.step, cross / length**2 / self.step
@@ -181,62 +189,61 @@ class HermiteRing:
     def energy(self, q: Array) -> float:
         """Strain energy [J]."""
         *_, stretch, turning = self._strains(q)
+        return self._energy(stretch, turning)
+
+    def _energy(self, stretch: Array, turning: Array) -> float:
+        """Strain energy of stretches and curvatures at the Gauss points [J]."""
         stretch0, turning0 = self._unstrained
         density = self.stretching * (stretch - stretch0) ** 2
         density += self.bending * (turning - turning0) ** 2
         return float(0.5 * self.step * (density @ GAUSS[1]).sum())
 
-    def forces(self, q: Array) -> tuple[Array, Array]:
-        """Gradient of the energy (size,) [N] and Hessians (elements, 8, 8) [N/m]."""
+    def forces(self, q: Array) -> tuple[float, Array, Array]:
+        """Energy [J], its gradient (size,) [N] and Hessians (elements, 8, 8) [N/m]."""
         v, w, length, stretch, turning = self._strains(q)
         stretch0, turning0 = self._unstrained
-        h = self.step
-        hoop = self.stretching * (stretch - stretch0)
-        moment = self.bending * (turning - turning0)
-        weight = h * GAUSS[1]
-
-        unit = v / length[..., None]
+        h, weight = self.step, self.step * GAUSS[1]
+        hoop = weight * self.stretching * (stretch - stretch0)
+        moment = weight * self.bending * (turning - turning0)
         square = length**2
-        turn_w = w @ _CROSS.T  # derivative of v x w with respect to v
-        turn_v = -v @ _CROSS.T  # derivative with respect to w
-        cross = turning * square * h
-        d_v = (turn_w - (2.0 * cross / square)[..., None] * v) / square[..., None] / h
-        d_w = turn_v / square[..., None] / h
+
         # gradients of stretch and curvature with respect to (v, w)
-        s = np.concatenate([unit / h, np.zeros_like(unit)], axis=-1)
-        k = np.concatenate([d_v, d_w], axis=-1)
-        grad = hoop[..., None] * s + moment[..., None] * k
+        by_v = np.stack([w[..., 1], -w[..., 0]], axis=-1)  # of v x w
+        by_w = np.stack([-v[..., 1], v[..., 0]], axis=-1)
+        grad = np.zeros((*length.shape, 2, 4))
+        s, k = grad[..., 0, :], grad[..., 1, :]
+        s[..., :2] = v / (h * length)[..., None]
+        k[..., :2] = (by_v / h - (2.0 * turning)[..., None] * v) / square[..., None]
+        k[..., 2:] = by_w / (h * square)[..., None]
 
-        def outer(a: Array, b: Array) -> Array:
-            return np.asarray(a[..., :, None] * b[..., None, :])
+        # second derivatives of the stretch, then of the curvature
+        twice = moment / (h * square)
+        of_stretch = hoop / (h * length)
+        along = 4.0 * moment * turning / square - 0.5 * of_stretch
+        across = along[..., None] * v / square[..., None]
+        across -= (2.0 * twice / square)[..., None] * by_v
+        hess = np.zeros((*length.shape, 4, 4))
+        vv = across[..., :, None] * v[..., None, :]
+        hess[..., :2, :2] = vv + np.swapaxes(vv, -1, -2)
+        diagonal = of_stretch - 2.0 * moment * turning / square
+        hess[..., 0, 0] += diagonal
+        hess[..., 1, 1] += diagonal
+        vw = (-2.0 * twice / square)[..., None, None] * v[..., :, None]
+        vw = vw * by_w[..., None, :] + twice[..., None, None] * _CROSS
+        hess[..., :2, 2:] = vw
+        hess[..., 2:, :2] = np.swapaxes(vw, -1, -2)
 
-        def scaled(matrix: Array, by: Array) -> Array:
-            return np.asarray(matrix * by[..., None, None])
+        stiffness = np.array([self.stretching, self.bending])
+        scaled = (weight[:, None] * stiffness)[..., None] * grad
+        hess += np.swapaxes(grad, -1, -2) @ scaled
+        force = hoop[..., None] * s + moment[..., None] * k
 
-        hess = self.stretching * outer(s, s) + self.bending * outer(k, k)
-        eye = np.broadcast_to(_EYE, (*length.shape, 2, 2))
-        hess[..., :2, :2] += scaled(eye - outer(unit, unit), hoop / length / h)
-        mixed = outer(turn_w, v)
-        mixed = mixed + np.swapaxes(mixed, -1, -2)
-        vv = -scaled(mixed, 2.0 / square**2) - scaled(eye, 2.0 * cross / square**2)
-        vv += scaled(outer(v, v), 8.0 * cross / square**3)
-        vw = scaled(np.broadcast_to(_CROSS, eye.shape), 1.0 / square)
-        vw -= scaled(outer(v, turn_v), 2.0 / square**2)
-        hess[..., :2, :2] += scaled(vv, moment / h)
-        hess[..., :2, 2:] += scaled(vw, moment / h)
-        hess[..., 2:, :2] += np.swapaxes(scaled(vw, moment / h), -1, -2)
-
-        first, second = self._shape
-        both = np.stack([first, second], axis=1)  # (g, 2, 4)
-        grad = grad.reshape(*length.shape, 2, 2)
-        element = np.einsum("g,gpa,egpi->eai", weight, both, grad, optimize=True)
+        element = force.reshape(self.elements, -1) @ self._shape.reshape(-1, 8)
         gradient = np.zeros(self.size)
-        np.add.at(gradient, self.dofs, element.reshape(self.elements, 8))
-        hess = hess.reshape(*length.shape, 2, 2, 2, 2)
-        matrix = np.einsum(
-            "g,gpa,egpiqj,gqb->eaibj", weight, both, hess, both, optimize=True
-        )
-        return gradient, matrix.reshape(self.elements, 8, 8)
+        gradient += np.bincount(self.dofs.ravel(), element.ravel(), self.size)
+        by_dofs = (hess @ self._shape).reshape(self.elements, -1, 8)
+        matrix = self._shape.reshape(-1, 8).T @ by_dofs
+        return self._energy(stretch, turning), gradient, matrix
 
     def nearest(
         self, q: Array, points: Array, start: Array, own: Index | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -121,6 +122,19 @@ class RaceOnBalls:
             Centres [m] and their derivatives with respect to ``alpha`` and ``phase``
             [m/rad], each (balls, 2).
         """
+        at = alpha, phase
+        if at not in self._latest:
+            self._latest.clear()
+            self._latest[at] = self._placed(alpha, phase)
+        return self._latest[at]
+
+    @cached_property
+    def _latest(self) -> dict[tuple[float, float], tuple[Array, Array, Array]]:
+        """Latest result of :meth:`balls`, because a Newton iteration asks again."""
+        return {}
+
+    def _placed(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
+        """Result of :meth:`balls`."""
         lag = self.cage_lag
         spacing = 2.0 * pi / self.bearing.balls * np.arange(self.bearing.balls)
         pose = self.cam.pose(phase + lag * alpha + spacing)

@@ -178,7 +178,7 @@ class SolidRace:
         plane = race[..., :2]
         whole = np.concatenate([plane, -plane]) if self.half else plane
         q = whole.ravel()
-        nodal, blocks = plane_ring.forces(q)
+        _, nodal, blocks = plane_ring.forces(q)
         gradient, hessian = np.zeros((n, 2 * NODE)), np.zeros((n, 2 * NODE, 2 * NODE))
         gradient[:, PLANE[:4]] = nodal.reshape(-1, 4)[:n]
         hessian[:, PLANE[:, None], PLANE] = blocks[:n]
