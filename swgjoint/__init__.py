@@ -13,6 +13,7 @@ _PUBLIC = {
     "DriveMap": "swgjoint.maps.drive_map",
     "InputError": "swgjoint.errors",
     "JointDrive": "swgjoint.joint.drive",
+    "LinearScene": "swgjoint.sim.linearisation",
     "MeshingRun": "swgjoint.fe.meshing_run",
     "Ratings": "swgjoint.gear.ratings",
     "Scene": "swgjoint.sim.scene.scene",
@@ -23,6 +24,7 @@ _PUBLIC = {
     "build_map": "swgjoint.drives.build_map",
     "export_fmu": "swgjoint.drives.export_fmu",
     "export_mjcf": "swgjoint.sim.plain_mjcf",
+    "linearise": "swgjoint.sim.linearisation",
     "load_drive": "swgjoint.drives.references",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.view.run",
@@ -50,6 +52,8 @@ if _typing.TYPE_CHECKING:
     from swgjoint.joint.drive import JointDrive as JointDrive
     from swgjoint.joint.plugin import load_plugin as load_plugin
     from swgjoint.maps.drive_map import DriveMap as DriveMap
+    from swgjoint.sim.linearisation import LinearScene as LinearScene
+    from swgjoint.sim.linearisation import linearise as linearise
     from swgjoint.sim.plain_mjcf import export_mjcf as export_mjcf
     from swgjoint.sim.scene.scene import Scene as Scene
     from swgjoint.view.run import SceneRun as SceneRun

@@ -161,8 +161,9 @@ def follow(page, folder, monkeypatch, capsys, skip=()):
     monkeypatch.chdir(folder)
     for urdf in blocks(page, "xml"):
         (folder / "arm.urdf").write_text(urdf)
+    names = {"__name__": "example"}  # a block continues the one before it
     for number, block in enumerate(blocks(page, "python")):
-        exec(compile(block, f"{page.name}:{number}", "exec"), {"__name__": "example"})
+        exec(compile(block, f"{page.name}:{number}", "exec"), names)
     for block in blocks(page, "sh"):
         for line in block.splitlines():
             _, *arguments = shlex.split(line, comments=True)
@@ -197,6 +198,14 @@ def test_first_drive_tutorial(tmp_path, monkeypatch, capsys):
     slow = ("meshing", "map", "spec", "compare", "run", "view")
     follow(page, tmp_path, monkeypatch, capsys, skip=slow)
     assert {"my.toml", "steeper.toml", "teeth"} == {p.name for p in tmp_path.iterdir()}
+
+
+def test_linear_control_page(tmp_path, monkeypatch, capsys):
+    """The regulator runs, and prints the table of the page."""
+    page = GUIDE / "how-to" / "linear-control.md"
+    out = follow(page, tmp_path, monkeypatch, capsys).splitlines()
+    table = blocks(page, "text")[0].splitlines()
+    assert len(table) == 2 and out[-2:] == table
 
 
 def test_citation_names_the_version():
