@@ -77,3 +77,9 @@ if _sys.modules.get("mujoco") is not None:
     from swgjoint.engine import register as _register
 
     _register()
+
+if _sys.modules.get("gymnasium") is not None:
+    # gymnasium was imported before, or imports this package for an environment
+    from swgjoint.environments import register_environments as _register_environments
+
+    _register_environments()

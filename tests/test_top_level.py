@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 import swgjoint
 
 
@@ -33,7 +35,8 @@ def test_importing_is_cheap():
     program = """
 import sys, swgjoint, swgjoint.engine
 assert not swgjoint.engine.register()
-print([m for m in ("mujoco", "numpy", "scipy", "pydantic") if m in sys.modules])
+heavy = ("mujoco", "numpy", "scipy", "pydantic", "gymnasium")
+print([m for m in heavy if m in sys.modules])
 """
     assert fresh(program).strip() == "[]"
 
@@ -45,6 +48,26 @@ def test_the_engine_knows_the_drives_when_both_are_imported():
             f"import {imports}\nmujoco.MjSpec().activate_plugin('swgjoint.drive')\n"
             "assert 'numpy' in __import__('sys').modules"
         )
+
+
+@pytest.mark.parametrize(
+    ("imports", "module"),
+    [
+        ("gymnasium", "swgjoint:"),
+        ("gymnasium", "swgjoint.envs:"),
+        ("gymnasium, swgjoint", ""),
+        ("swgjoint, gymnasium", "swgjoint.envs:"),
+    ],
+)
+def test_gymnasium_finds_the_environments(imports, module):
+    """Without an import by the user; what it costs is little beside gymnasium."""
+    pytest.importorskip("gymnasium")
+    fresh(
+        f"import {imports}, sys\n"
+        "assert not {'mujoco', 'scipy'} & set(sys.modules)\n"
+        f"env = gymnasium.make('{module}swgjoint/JointTracking-v0')\n"
+        "assert env.unwrapped.core is not None"
+    )
 
 
 def test_another_engine_is_left_alone():

@@ -7,26 +7,16 @@ Importing this package registers them. Both calls below import it first:
 
 from __future__ import annotations
 
+from swgjoint.environments import ENVIRONMENTS, register_environments
 from swgjoint.errors import MissingExtraError
 
+__all__ = ["ENVIRONMENTS"]
+
 try:
-    from gymnasium.envs.registration import register, registry
+    import gymnasium  # noqa: F401
 except ImportError as error:
     raise MissingExtraError(
         "environments need gymnasium: pip install 'swgjoint[envs]'"
     ) from error
 
-ENVIRONMENTS = {
-    "swgjoint/JointTracking-v0": "joint_tracking:JointTracking",
-    "swgjoint/RippleSuppression-v0": "ripple_suppression:RippleSuppression",
-    "swgjoint/ArmTracking-v0": "arm_tracking:ArmTracking",
-}
-"""Module and common prefix of its two class names for each environment id."""
-
-for _name, _place in ENVIRONMENTS.items():
-    if _name not in registry:
-        register(
-            _name,
-            entry_point=f"swgjoint.envs.{_place}Env",
-            vector_entry_point=f"swgjoint.envs.{_place}VectorEnv",
-        )
+register_environments()
