@@ -35,12 +35,8 @@ from swgjoint.units import arcmin
 
 ACTIONS = ("torque", "setpoint")
 """Accepted kinds of actions."""
-
-
 ANGLE_MARGIN = 0.3
 """Deviation of a link from the range of its path at which an episode ends [rad]."""
-
-
 SPEED_MARGIN = 20.0
 """Excess of a motor speed over twice the largest motor speed of the path at which an
 episode ends [rad/s]."""
@@ -317,7 +313,10 @@ class ArmCore(Core):
 def _scene(settings: ArmSettings) -> Scene:
     """The scene with level, friction and kinematic error of the settings."""
     name = str(settings.scene)
-    scene = scene_of_arm(name) if is_arm(name) else Scene.load_file(name)
+    if is_arm(name):
+        scene = scene_of_arm(name).with_changes({"controller.kind": "pd"})
+    else:
+        scene = Scene.load_file(name)
     scene = scene.with_level(settings.level)  # type: ignore[arg-type]
     scene = scene.with_friction(bool(settings.friction))
     return scene.with_kinematic_error(settings.kinematic_error_arcmin)

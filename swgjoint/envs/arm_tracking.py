@@ -60,7 +60,8 @@ class ArmTrackingEnv(SingleEnv):
 
     Args (all by keyword):
         scene: Name or path of a scene that starts at rest, or of an arm, whose joints
-            are then swept. Default: ``ur5e-circle``.
+            are then swept with motor loops without integral terms. Default:
+            ``ur5e-circle``.
         level: ``full`` or ``linear``. Default: ``full``.
         friction: Whether drives have the friction of their maps; overrides the scene.
             Default: True.
