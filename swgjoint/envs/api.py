@@ -57,7 +57,8 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     settings_type: ClassVar[type[Any]]
     """Class of the settings, called with the arguments of the environment."""
     episode_of: ClassVar[type[JointEpisode] | None] = None
-    """Class of the same episode without arrays, if there is one."""
+    """Class of the same episode without arrays, if there is one; used with its core
+    only, so that a derived core needs none."""
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """Make one environment; the class docstring lists the arguments.
@@ -79,7 +80,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         self.core: Core = core
         self.render_mode = render_mode
         self._episode: JointEpisode | None = None
-        if self.episode_of is not None:
+        if self.episode_of is not None and self.episode_of.core_of is type(core):
             self._episode = self.episode_of(core)
         self._picture: Picture | None = None
         self._began = False

@@ -196,6 +196,7 @@ def _reward(s: TrackingSettings, link_error: Values, effort: Values) -> Values:
 class TrackingEpisode(JointEpisode):
     """The only episode of a :class:`TrackingCore`."""
 
+    core_of = TrackingCore
     core: TrackingCore
 
     def command(self, action: float) -> float:

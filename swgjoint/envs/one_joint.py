@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import floor, isfinite
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,10 @@ length, and info."""
 
 class JointEpisode(ABC):
     """The only episode of a core, whose arrays keep the state of its start."""
+
+    core_of: ClassVar[type[BenchCore]]
+    """Class of the core whose results it computes; others, derived ones included, may
+    have another reward or observation."""
 
     def __init__(self, core: BenchCore) -> None:
         """Prepare what all episodes have in common.

@@ -239,6 +239,7 @@ class RippleCore(BenchCore):
 class RippleEpisode(JointEpisode):
     """The only episode of a :class:`RippleCore`."""
 
+    core_of = RippleCore
     core: RippleCore
 
     def begin(self) -> None:

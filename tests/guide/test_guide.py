@@ -12,6 +12,7 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import swgjoint
@@ -206,6 +207,29 @@ def test_linear_control_page(tmp_path, monkeypatch, capsys):
     out = follow(page, tmp_path, monkeypatch, capsys).splitlines()
     table = blocks(page, "text")[0].splitlines()
     assert len(table) == 2 and out[-2:] == table
+
+
+def test_own_environment_page(capsys):
+    """The environment passes the checker, pays as told, and its batch is as alone."""
+    check_env = pytest.importorskip("gymnasium.utils.env_checker").check_env
+    names = {"__name__": "example"}
+    for block in blocks(GUIDE / "how-to" / "own-environment.md", "python"):
+        exec(compile(block, "own-environment.md", "exec"), names)
+    assert "10 values" in capsys.readouterr().out
+    del names["gymnasium"].registry["Gentle-v0"]
+    env, many = names["env"].unwrapped, names["many"]
+    check_env(env, skip_render_check=True)
+    (first, _), (each, _) = env.reset(seed=3), many.reset(seed=3)
+    assert (first == each[0]).all()
+    rated = env.core.joint.drive.ratings.rated_torque
+    for k in range(200):
+        one = env.step(np.full(1, 0.05 * np.sin(0.1 * k)))
+        all_of = many.step(np.full((256, 1), 0.05 * np.sin(0.1 * k)))
+        info, (observation, reward) = one[4], one[:2]
+        assert (observation == all_of[0][0]).all() and reward == all_of[1][0]
+        assert observation[2] == info["output_torque_Nm"]
+        load, error = info["output_torque_Nm"] / rated, info["link_error_arcmin"] / 3.0
+        assert reward == pytest.approx(1.0 / (1.0 + error**2) - 0.2 * load**2)
 
 
 def test_citation_names_the_version():
