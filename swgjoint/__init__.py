@@ -25,6 +25,7 @@ _PUBLIC = {
     "export_fmu": "swgjoint.drives.export_fmu",
     "export_mjcf": "swgjoint.sim.plain_mjcf",
     "linearise": "swgjoint.sim.linearisation",
+    "load_controller": "swgjoint.explore.tune.controller",
     "load_drive": "swgjoint.drives.references",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.view.run",
@@ -44,6 +45,7 @@ if _typing.TYPE_CHECKING:
     from swgjoint.errors import DesignError as DesignError
     from swgjoint.errors import InputError as InputError
     from swgjoint.errors import SwgError as SwgError
+    from swgjoint.explore.tune.controller import load_controller as load_controller
     from swgjoint.fe.meshing import simulate_meshing as simulate_meshing
     from swgjoint.fe.meshing_run import MeshingRun as MeshingRun
     from swgjoint.fe.solid.meshing import SolidRun as SolidRun

@@ -163,9 +163,12 @@ def follow(page, folder, monkeypatch, capsys, skip=()):
     for urdf in blocks(page, "xml"):
         (folder / "arm.urdf").write_text(urdf)
     names = {"__name__": "example"}  # a block continues the one before it
-    for number, block in enumerate(blocks(page, "python")):
-        exec(compile(block, f"{page.name}:{number}", "exec"), names)
-    for block in blocks(page, "sh"):
+    pattern = r"^```(python|sh)\n(.*?)^```"
+    parts = re.findall(pattern, text_of(page), re.DOTALL | re.MULTILINE)
+    for number, (language, block) in enumerate(parts):
+        if language == "python":
+            exec(compile(block, f"{page.name}:{number}", "exec"), names)
+            continue
         for line in block.splitlines():
             _, *arguments = shlex.split(line, comments=True)
             if arguments[0] not in skip:
