@@ -140,6 +140,23 @@ def test_infos_of_running_episodes_are_left_out(adapter):
     assert ended >= 1
 
 
+def test_a_limit_in_the_last_step_is_no_time_limit(adapter, monkeypatch):
+    """A value after the end then counts as zero, as for any limit."""
+    many = adapter.BatchVecEnv(batch(2, load_of_rated=0.0))
+    many.reset()
+    step = many.batch.step
+
+    def step_beyond(actions):
+        observation, reward, _, truncated, info = step(actions)
+        return observation, reward, np.array([True, False]) & truncated, truncated, info
+
+    monkeypatch.setattr(many.batch, "step", step_beyond)
+    for _ in range(125):
+        _, _, done, infos = many.step(np.zeros((2, 1)))
+    assert done.all()
+    assert [info["TimeLimit.truncated"] for info in infos] == [False, True]
+
+
 def test_seeds_are_used_once(adapter):
     """As in the package, the generators go on at the next reset."""
     many = adapter.BatchVecEnv(batch(2))

@@ -43,6 +43,10 @@ def hold(arm="two-link", start=None, **overrides):
     return Scene.from_data(data, overrides=dotted)
 
 
+BEARING = {"unit": "CSG-17", "centre_mm": 20.0}
+"""Output bearing beside the plane of the arm."""
+
+
 class Torque:
     """Constant torques with a rectangular wave around them."""
 
@@ -164,13 +168,15 @@ def test_derivatives_are_those_of_the_engine():
     assert (np.abs(longer.B - gain) / scale).max() < 1e-4
 
 
-def test_it_predicts_the_scene():
+@pytest.mark.parametrize("bearing", [{}, {"joints__elbow__output_bearing": BEARING}])
+def test_it_predicts_the_scene(bearing):
     """Angles, speeds, output torques and tool follow the linear model for 0.2 s."""
-    scene = hold(start={"shoulder": 40.0, "elbow": -70.0})
+    scene = hold(start={"shoulder": 40.0, "elbow": -70.0}, **bearing)
     plant = linearise(scene)
     law = Torque(plant, 1e-4)
     run = run_scene(scene.with_friction(False), controller=law)
-    x, outputs = np.zeros(8), []
+    assert len(plant.states) == 8 + 4 * len(bearing)
+    x, outputs = np.zeros(len(plant.states)), []
     for k in range(len(run.time)):
         outputs.append(plant.output + plant.C @ x)
         x = plant.A @ x + plant.B @ law.wave(k)
@@ -245,6 +251,7 @@ def test_joints_without_a_rotor(level):
     h = plant.period
     np.testing.assert_allclose(plant.A, [[1.0, h], [0.0, 1.0]], rtol=0, atol=1e-9)
     ratio = plant.C[plant.outputs.index("joint.motor_angle"), 0]
+    assert plant.C[plant.outputs.index("joint.motor_speed"), 1] == pytest.approx(ratio)
     expected = ratio * h / inertia
     np.testing.assert_allclose(plant.B[:, 0], [h * expected, expected], rtol=1e-6)
     assert abs(ratio) == pytest.approx(100.0)
