@@ -175,18 +175,18 @@ def test_a_million_steps_need_no_more_memory():
 
 @pytest.mark.parametrize("name", list(ENVIRONMENTS)[:2])
 def test_episodes_and_environments_leave_nothing_behind(name):
-    """Neither 1,000 short episodes nor 40 environments."""
+    """Neither 400 short episodes nor 20 batches."""
     env = gymnasium.make(name, randomise=True).unwrapped
     env.reset(seed=0)
 
     def run_episodes():
-        for _ in range(500):
+        for _ in range(200):
             env.reset()
             env.step(np.zeros(1))
         return memory()
 
     def make_environments():
-        for _ in range(20):
+        for _ in range(10):
             other = gymnasium.make_vec(name, 4)
             other.reset()
             other.close()
