@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import jupytext
 import pytest
+from executed import executed, executed_pages
+from nbclient.exceptions import CellExecutionError
 
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
@@ -56,14 +55,27 @@ def test_stored_maps_are_of_the_bundled_designs(path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_runs(path, tmp_path):
-    """Every cell runs without error or warning, in an empty folder."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(path)],
-        cwd=tmp_path,
-        env={**os.environ, "MPLBACKEND": "Agg"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert list(tmp_path.iterdir()) == []
+def test_runs(path):
+    """Every cell runs without error or warning in an empty folder, which stays so.
+
+    The notebook has a picture for the gallery and says nothing on stderr.
+    """
+    notebook = executed(path)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert all(cell.execution_count for cell in cells if cell.source.strip())
+    outputs = [output for cell in cells for output in cell.outputs]
+    assert [out.text for out in outputs if out.get("name") == "stderr"] == []
+    assert executed_pages().thumbnail(notebook).startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_a_failing_notebook_is_noticed(tmp_path):
+    """A warning, and a file that is left behind."""
+    path = tmp_path / "one.py"
+    for line, error in (
+        ("warnings.warn('old', DeprecationWarning)", CellExecutionError),
+        ("open('left.txt', 'w').close()", RuntimeError),
+    ):
+        path.write_text(f"# %% [markdown]\n# # One\n\n# %%\nimport warnings\n{line}\n")
+        with pytest.raises(error, match=r"old|left\.txt"):
+            executed_pages().execute(path)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 
 import swgjoint
+
+sys.path.insert(0, str(Path(__file__).parent))  # sphinx -P leaves it out
+from executed_pages import write_pages
 
 for _name in swgjoint.__all__:  # autodoc would import them with TYPE_CHECKING = True
     getattr(swgjoint, _name)
@@ -14,8 +20,9 @@ project = "swgjoint"
 author = "the authors of swgjoint"
 release = version = swgjoint.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["dollarmath"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+nb_execution_mode = "off"  # executed_pages executes the notebooks
+myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 smartquotes = False  # options begin with two hyphens
 autodoc_member_order = "bysource"
@@ -43,6 +50,9 @@ def _write(text: str):
 
 
 def setup(app):
-    """Register the renderer of formulas."""
+    """Register the renderer of formulas, and the notebooks as pages."""
     inline, block = _write("{}"), _write("<div class='formula'>{}</div>")
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
+    app.connect(
+        "builder-inited", lambda app: write_pages(Path(app.srcdir) / "examples")
+    )

@@ -1,13 +1,10 @@
-"""The guide: links lead somewhere, commands are accepted, examples and site work."""
+"""The guide: links lead somewhere, commands are accepted, examples work."""
 
 from __future__ import annotations
 
 import ast
-import importlib.util
 import re
 import shlex
-import subprocess
-import sys
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -21,7 +18,11 @@ from swgjoint.models_path import bundled_names
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "notebooks" / "guide"
-PAGES = [ROOT / "README.md", *sorted(GUIDE.rglob("*.md"))]
+EXAMPLES = GUIDE / "examples"  # written by Sphinx, from the notebooks
+PAGES = [
+    ROOT / "README.md",
+    *sorted(page for page in GUIDE.rglob("*.md") if page.parent != EXAMPLES),
+]
 LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
 
 
@@ -276,24 +277,3 @@ def test_tune_tutorial(tmp_path, monkeypatch, capsys):
     """The environment by hand, a short tuning and the closed form of the response."""
     page = GUIDE / "tutorials" / "tune-a-controller.md"
     assert "held-out" in follow(page, tmp_path, monkeypatch, capsys)
-
-
-@pytest.mark.slow
-def test_site_builds_without_a_warning(tmp_path):
-    """Sphinx treats warnings as errors: references, headings, pages in no contents."""
-    missing = [
-        name
-        for name in ("sphinx", "myst_parser", "furo")
-        if not importlib.util.find_spec(name)
-    ]
-    if missing:
-        pytest.skip(f"{', '.join(missing)} not installed: pip install '.[docs]'")
-    command = ["-W", "--keep-going", "-q", "-b", "html", "-d", tmp_path / "trees"]
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "sphinx", *command, GUIDE, tmp_path / "html"],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    pages = {p.relative_to(GUIDE).with_suffix(".html") for p in GUIDE.rglob("*.md")}
-    assert all((tmp_path / "html" / page).exists() for page in pages)
