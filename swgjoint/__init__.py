@@ -3,7 +3,7 @@
 import sys as _sys
 import typing as _typing
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # name -> module; modules are imported on first use to keep the package import fast
 _PUBLIC = {

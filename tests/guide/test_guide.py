@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
+import tomllib
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -237,10 +238,15 @@ def test_own_environment_page(capsys):
 
 
 def test_citation_names_the_version():
-    """The version of the citation file and of the page is that of the package."""
+    """The version of the citation file and of the pages is that of the package."""
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {swgjoint.__version__}\n" in text
     assert f"version {swgjoint.__version__}," in text_of(GUIDE / "sources.md")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["version"] == swgjoint.__version__
+    (date,) = re.findall(r"^date-released: (\S+)$", text, re.MULTILINE)
+    headings = re.findall(r"^## (.+)$", text_of(GUIDE / "changes.md"), re.MULTILINE)
+    assert headings[0] == f"{swgjoint.__version__} ({date})"
 
 
 def cited_names(text):
