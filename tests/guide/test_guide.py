@@ -8,6 +8,7 @@ import shlex
 import tomllib
 from collections import Counter
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -122,21 +123,85 @@ def test_shown_commands_are_accepted(line):
         assert scene in names
 
 
+def refusal(line, capsys):
+    """What the parser says of a command line; empty if it accepts it."""
+    _, name, *arguments = shlex.split(line)
+    try:
+        command_parser(name).parse_args(arguments)
+    except SystemExit:
+        return capsys.readouterr().err
+    return ""
+
+
+INCOMPLETE = ("arguments are required", "expected one argument")
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_mentioned_commands_exist(page):
-    """So do the options that the text gives them."""
+def test_mentioned_commands_exist(page, capsys):
+    """The parser accepts them, or asks for what the text leaves out.
+
+    Alternatives such as ``design|scene`` are tried one by one.
+    """
     for line in mentioned_commands(page):
         name, *rest = line.split()[1:]
         if name.isupper() or name.startswith("-"):  # COMMAND, --version
             continue
         assert name in COMMANDS, line
-        known = {
-            option
-            for action in command_parser(name)._actions
-            for option in action.option_strings
-        }
-        options = [word.partition("=")[0] for word in rest if word[0] == "-"]
-        assert set(options) <= known, line
+        options = [[word] if word.isupper() else word.split("|") for word in rest]
+        for words in product(*options):
+            if words and words[0].isupper() and name in ("list", "schema"):  # KIND
+                continue
+            found = refusal(shlex.join(["swgjoint", name, *words]), capsys)
+            assert not found or any(part in found for part in INCOMPLETE), line
+
+
+def other_commands(page):
+    """Commands of other programs in the blocks and the text of a page."""
+    lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
+    parts = [part.strip(" &") for line in lines for part in line.split("&&")]
+    spans = [" ".join(one.split()) for one in re.findall(r"`([^`]+)`", prose(page))]
+    begins = ("python ", "python3 ", "pip ", ".ci/")
+    parts += [one for one in spans if one.startswith(begins) and " " in one]
+    return [one for one in parts if one and not one.startswith(("swgjoint ", "#"))]
+
+
+def unknown(line):
+    """What a command of another program names that does not exist."""
+    words = shlex.split(line, comments=True)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = project["project"]["optional-dependencies"]
+    if "pip" in words[:3]:
+        asked = [
+            extra
+            for word in words
+            for group in re.findall(r"\[([\w,]+)\]", word)
+            for extra in group.split(",")
+        ]
+        return [extra for extra in asked if extra not in extras]
+    if words[0] in ("git", "cd"):
+        return []
+    if words[0] in ("python", "python3") and words[1] == "-m":
+        known = {"sphinx", *project["project"]["dependencies"]}
+        known = {re.split(r"[\[>=]", name)[0] for name in known}
+        return [] if words[2].split(".")[0] in known else [words[2]]
+    if words[0] in ("python", "python3"):
+        return [] if (ROOT / words[1]).is_file() else [words[1]]
+    if words[0].startswith("."):
+        return [] if (ROOT / words[0]).is_file() else [words[0]]
+    programs = {re.split(r"[\[>=]", one)[0] for name in extras for one in extras[name]}
+    return [] if words[0] in programs else [words[0]]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_other_commands_exist(page):
+    """Scripts, modules, programs and extras that a page names are there."""
+    assert [found for line in other_commands(page) for found in unknown(line)] == []
+
+
+def test_an_unknown_program_or_extra_is_noticed():
+    """A script, a module, an extra and a program that are not there."""
+    lines = ("python tests/no.py", "python -m no", "pip install '.[no]'", "no --x")
+    assert [unknown(line) for line in lines] == [["tests/no.py"], *[["no"]] * 3]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
