@@ -123,6 +123,39 @@ def test_shown_commands_are_accepted(line):
         assert scene in names
 
 
+CHEAP = """\
+swgjoint list drives
+swgjoint schema scene
+swgjoint doctor
+swgjoint design check reference-2d
+swgjoint design new reference-2d -o my.toml
+swgjoint design new reference-2d --teeth 160/162 --module 0.4 -o my.toml
+swgjoint design check my.toml
+swgjoint profile my.toml --out teeth
+swgjoint profile reference-2d --out pictures
+swgjoint spec CSG-25-100
+swgjoint study response --only CSG-25-100 --closed-form --load-inertia 2
+swgjoint export fmu CSG-25-100 -o drive.fmu
+swgjoint export fmu CSG-25-100 --load-inertia 0.5 -o drive.fmu
+swgjoint export mjcf ur5e -o arm.xml
+swgjoint run bench --drive CSG-25-100
+swgjoint run two-link --drive CSG-25-100
+swgjoint run ur5e --drive CSG-25-100
+swgjoint meshing reference-2d --torque 20
+""".splitlines()
+"""Commands of the pages that take seconds, in an order in which files are there."""
+
+
+@pytest.mark.slow
+def test_cheap_commands_succeed(tmp_path, monkeypatch):
+    """The commands that need no map of finite elements, as the pages show them."""
+    shown = {line.partition("#")[0].strip() for line in COMMAND_LINES}
+    assert set(CHEAP) <= shown
+    monkeypatch.chdir(tmp_path)
+    failed = [line for line in CHEAP if main(shlex.split(line)[1:]) != 0]
+    assert failed == []
+
+
 def refusal(line, capsys):
     """What the parser says of a command line; empty if it accepts it."""
     _, name, *arguments = shlex.split(line)
