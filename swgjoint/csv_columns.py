@@ -95,6 +95,48 @@ def read_columns(
     return {name: np.array(column) for name, column in values.items()}
 
 
+def read_table(path: str | Path, text: str) -> list[dict[str, str | float | None]]:
+    """Read a table with one column of text; its other columns contain numbers or text.
+
+    Args:
+        path: File with one header line, see :func:`read_columns`.
+        text: Name of the required column of text, which is never empty.
+
+    Returns:
+        The rows by column name; numbers are floats, empty cells are None.
+
+    Raises:
+        InputError: If the file cannot be read, if the column is missing, if a column
+            occurs twice, or if a row has another number of cells than the header.
+    """
+    path = Path(path)
+    sheet = _sheet(path, f"accepted: a table with a column {text}")
+    header = sheet.header
+    if text not in header or len(set(header)) < len(header):
+        raise InputError(
+            f"{path}: columns {', '.join(map(repr, header))[:200]}; accepted: a column"
+            f" {text}, every name once"
+        )
+    rows = []
+    for number, cells in sheet.rows:
+        row = dict(zip(header, map(_text_or_number, cells), strict=False))
+        row[text] = cells[header.index(text)].strip() if len(cells) == len(row) else ""
+        if len(cells) != len(header) or not row[text]:
+            raise InputError(
+                f"{path}, line {number}: {len(cells)} cells; accepted:"
+                f" {len(header)}, with a text under {text}"
+            )
+        rows.append(row)
+    return rows
+
+
+def _text_or_number(cell: str) -> str | float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return cell.strip() or None
+
+
 def header_of(path: str | Path) -> list[str]:
     """Column names; an empty list if :func:`read_columns` would reject the file."""
     try:

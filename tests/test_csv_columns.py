@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.csv_columns import header_of, read_columns
+from swgjoint.csv_columns import header_of, read_columns, read_table
 from swgjoint.errors import InputError
 
 WANTED = {"torque": {"torque_Nm": 1.0}, "torsion": {"torsion_rad": 1.0}}
@@ -53,3 +53,29 @@ def test_what_was_read_is_said(tmp_path, text, parts):
     """Names that were found, what was taken to separate them, a decimal comma."""
     with pytest.raises(InputError, match=naming("a.csv", *parts)):
         read(tmp_path, text)
+
+
+def test_a_table_with_text_keeps_empty_cells(tmp_path):
+    """Numbers, texts and empty cells by column; the column of text stays text."""
+    path = tmp_path / "a.csv"
+    path.write_text("# prices\ndrive;mass;note\n14;0.5;\nb;;new\n")
+    assert read_table(path, "drive") == [
+        {"drive": "14", "mass": 0.5, "note": None},
+        {"drive": "b", "mass": None, "note": "new"},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("name,mass\na,1\n", ("'name'", "drive")),
+        ("drive,mass,mass\na,1,2\n", ("'mass', 'mass'", "once")),
+        ("drive,mass\na\n", ("line 2", "1 cells", "2")),
+        ("drive,mass\n,1\n", ("line 2", "drive")),
+    ],
+)
+def test_a_table_with_faults_is_refused(tmp_path, text, parts):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=naming("a.csv", *parts)):
+        read_table(path, "drive")

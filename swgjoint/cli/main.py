@@ -38,6 +38,7 @@ COMMANDS = {
     "spec": "print a data sheet for a design, a map or a catalogue drive",
     "run": "simulate a robot arm with its drives",
     "compare": "compare drives or model levels in one scene, against limits",
+    "select": "select the cheapest drives of an arm that meet limits",
     "export": "write a drive or an arm with drives for other simulators",
     "accept": "test a drive on a bench, simulated or measured, against limits",
     "lot": "estimate accuracy, ripple and yield of a production lot",

@@ -1,0 +1,36 @@
+"""Text of a selection of drives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from swgjoint.cli.shared.text import table
+
+
+def selection_lines(result: dict[str, Any]) -> list[str]:
+    """Format the selected drives, what they use of their limits, and the result.
+
+    Args:
+        result: JSON object of the command ``select``.
+    """
+    from swgjoint.view.selection import limit_lines, selection_tables
+
+    count = len(result["simulated"])
+    lines = [
+        f"scene {result['scene']}: {count} sets simulated in {result['wall_s']:.0f} s"
+    ]
+    for one in selection_tables(result)[: 1 + bool(count)]:
+        cells = [[cell.text for cell in row] for row in one.rows]
+        names = [f"{name} [{unit}]" if unit else name for name, unit in one.header]
+        lines += [table(cells, header=names), *one.notes]
+    lines += limit_lines(result)
+    if not result["careful"]:
+        lines.append(
+            "many sets are close to a limit of the tool error: a cheaper set whose"
+            " error is within 0.5 % of it may have been dropped"
+        )
+    if result["passed"]:
+        lines.append(f"cheapest set by {result['by']}: {result['cost']:g}")
+    else:
+        lines.append(f"no set of drives: {result['failure']}")
+    return lines

@@ -1,0 +1,1 @@
+"""Selection of the cheapest drives that meet a specification, one per joint."""
