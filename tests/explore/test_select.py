@@ -7,13 +7,13 @@ import json
 from decimal import Decimal
 from functools import cache
 from math import inf, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
 from messages import names, naming
 
 from swgjoint.cli.main import main
-from swgjoint.drives.sections import LifeSection
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.select import search, select
 from swgjoint.explore.select.evaluation import (
@@ -33,6 +33,7 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm, rpm
 from swgjoint.view.run import run_scene
 
+ROBOTS = Path(__file__).parents[1] / "robots" / "models"
 SMALL = ("CSG-14-100", "CSG-17-100", "CSG-20-100")
 """Three drives, for two joints nine sets."""
 
@@ -134,7 +135,7 @@ def test_loads_follow_the_formulas_by_hand():
     (option,) = [one for one in options() if one.drive == "CSG-17-120"]
     spec = {**RATINGS, "L10_h": 1e4, "K1_Nm_rad": 1.0}
     for j in range(2):
-        checks = check_loads(own, cycle, j, option, spec, LifeSection())
+        checks = check_loads(own, cycle, j, option, spec, None)
         value = {check.key: check.value for check in checks}
         torque, speed = own.torque[:, j], np.abs(own.trajectory.velocity[:, j])
         mean = (np.sum(np.abs(torque) ** 3 * speed) / speed.sum()) ** (1 / 3)
@@ -175,7 +176,7 @@ def linear_option(name: str, stiffness: float, cost: int) -> DriveOption:
     drive = DriveMap.linear(stiffness, rated_torque=200.0, name=name)
     return DriveOption(
         drive=name, cost=Decimal(cost), mass=None, max_input_speed=inf,
-        average_input_speed=inf, rotor_inertia=1e-4, map=drive,
+        average_input_speed=inf, rotor_inertia=1e-4, life=None, map=drive,
     )  # fmt: skip
 
 
@@ -379,8 +380,17 @@ def test_a_table_adds_drives_and_another_cost(tmp_path, capsys):
     assert "max_input_speed_rpm" in rows[1]["dropped"]
     status, found = run(capsys, *argv[:-2], "--without-catalogue")
     assert status == 0 and {*found["drives"].values()} == {"CSG-17-100"}
+    # a map has no rated life, unless the table states it
     status, found = run(capsys, *argv, "--limit", "L10_h=10")
     assert status == 0 and {*found["drives"].values()} == {"CSG-17-100"}
+    lines = table.read_text().replace("\n", ";\n").splitlines()
+    table.write_text("\n".join([f"{lines[0]}L50_h", f"{lines[1]}35000", *lines[2:]]))
+    argv += ["--limit", "L10_h=10", "--out", str(tmp_path / "out")]
+    status, found = run(capsys, *argv)
+    assert status == 0 and found["cost"] == 181.0
+    written = Scene.load_file(tmp_path / "out/scene.toml")
+    assert written.joint_settings("elbow").life.L50_h == 35000.0
+    assert "own.swg" in written.joint_settings("elbow").drive
 
 
 @pytest.mark.parametrize(
@@ -401,6 +411,7 @@ def test_a_table_adds_drives_and_another_cost(tmp_path, capsys):
         (["ur5e-sweep", "--task", "ur5e-circle"], ("--task", "ur5e-sweep")),
         (["ur5e", "--task", "ur5e-sweep", "--pose", "home"], ("--pose",)),
         (["two-link", "--task", "ur5e-sweep"], ("joint",)),
+        (["ur5e", "--limit", "tool_rp_mm=1"], ("tool_rp_mm", "repeated")),
     ],
 )
 def test_bad_input_is_one_line(argv, message, capsys, tmp_path):
@@ -419,3 +430,39 @@ def test_bad_input_is_one_line(argv, message, capsys, tmp_path):
 def test_options_have_different_names():
     with pytest.raises(InputError, match=naming("CSG-14-100", "once")):
         select_drives(scene(), [*small(), small()[0]])
+
+
+# ---- whole arms
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arm", "payload", "feedback", "limit"),
+    [
+        ("ur5e", 5, "link", 0.3),
+        ("ur5e", 5, "motor", 2.0),
+        ("kuka_iiwa/iiwa.xml", 3, "link", 0.3),
+        ("universal_robots_ur10/ur10_robot.urdf", 3, "motor", 4.0),
+    ],
+)
+def test_drives_of_whole_arms_meet_the_spec(
+    arm, payload, feedback, limit, tmp_path, capsys
+):
+    """Bundled, MJCF and URDF: the winner meets the spec on its own."""
+    out = tmp_path / "out"
+    path = str(ROBOTS / arm) if "/" in arm else arm
+    argv = [path, "--payload", str(payload), "--set", f"controller.feedback={feedback}"]
+    limits = {"tool_path_rms_mm": limit, "L10_h": 1e4}
+    for key, value in limits.items():
+        argv += ["--limit", f"{key}={value}"]
+    status, found = run(capsys, *argv, "--out", str(out))
+    assert status == 0 and found["careful"]
+    alone = run_scene(Scene.load_file(out / "scene.toml")).metrics()
+    assert alone["verdict"] == "VALID" and alone["tool"]["path_rms_mm"] <= limit
+    for name, joint in alone["joints"].items():
+        assert joint["drive"] == found["drives"][name] and joint["ratings"]["within"]
+        life = joint["life"]["bearing"]
+        assert life["unlimited"] or life["L10_h"] >= 1e4
+    # no set of the same or a lower cost that was simulated meets the spec
+    cheaper = [one for one in found["simulated"] if one["cost"] < found["cost"]]
+    assert not any(one["met"] for one in cheaper)

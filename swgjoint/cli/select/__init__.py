@@ -44,7 +44,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="CSV table of further drives: a column drive (design, map or catalogue"
         " name), and mass_kg, max_input_speed_rpm, average_input_speed_rpm,"
-        " rotor_inertia_kgm2 or other numbers",
+        " rotor_inertia_kgm2, L50_h or other numbers",
     )
     parser.add_argument(
         "--without-catalogue",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.drives.sections import JointSection
+from swgjoint.drives.sections import JointSection, LifeSection
 from swgjoint.errors import ComputationError
 from swgjoint.explore.compare.compare import Compared, missed_limits, row_of
 from swgjoint.explore.select.loads import LIFE, MEAN, PEAK, LimitCheck
@@ -20,6 +20,7 @@ from swgjoint.sim.scene.scene import Scene
 
 OF_TOOL = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm")
 """Figures of the whole arm; all others are figures of single joints."""
+_OF_BEARING = {"L50_h", "L10_h", "rated_speed_rpm"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +81,7 @@ class SimulatedSet:
 def scene_of_set(
     scene: Scene, joints: Sequence[str], options: Sequence[DriveOption]
 ) -> Scene:
-    """The scene with a drive in every joint, and with its rotor.
+    """The scene with a drive in every joint, and with its rotor and rated life.
 
     Args:
         scene: The scene.
@@ -93,7 +94,13 @@ def scene_of_set(
         inertia = option.rotor_inertia
         if inertia is None:
             inertia = scene.joint_settings(name).rotor_inertia_kgm2 or ROTOR_INERTIA
-        sections[name] = section.model_copy(update={"rotor_inertia_kgm2": inertia})
+        changes: dict[str, Any] = {"rotor_inertia_kgm2": inertia}
+        if option.life is not None:
+            life = scene.joint_settings(name).life or LifeSection()
+            fatigue = life.model_dump(exclude=_OF_BEARING, exclude_none=True)
+            rated = option.life.model_dump(exclude_none=True)
+            changes["life"] = LifeSection(**fatigue, **rated)
+        sections[name] = section.model_copy(update=changes)
     return scene.model_copy(update={"joints": sections})
 
 

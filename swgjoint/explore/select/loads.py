@@ -181,7 +181,7 @@ def check_loads(
     j: int,
     option: DriveOption,
     spec: Mapping[str, float],
-    life: LifeSection,
+    life: LifeSection | None,
 ) -> tuple[LimitCheck, ...]:
     """Ratings, input speeds, and limits of stiffness and life that a drive meets.
 
@@ -191,7 +191,7 @@ def check_loads(
         j: Index of the joint.
         option: The drive.
         spec: Limits by figure, with those of :data:`RATINGS`.
-        life: Table ``life`` of the joint.
+        life: Table ``life`` of the joint, which the rated life of the drive precedes.
     """
     drive = option.map
     loads = [task.joint_loads(j, drive) for task in cycle]
@@ -217,7 +217,7 @@ def check_loads(
     if STIFFNESS in spec:
         values[STIFFNESS] = drive.spec_sheet((STIFFNESS,))[STIFFNESS]
     if LIFE in spec:
-        rated = rated_life(drive, life)
+        rated = rated_life(drive, option.life or life or LifeSection())
         values[LIFE] = None
         if mean.torque is None:
             values[LIFE] = inf

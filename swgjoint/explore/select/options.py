@@ -11,6 +11,7 @@ from pathlib import Path
 from swgjoint.csv_columns import read_table
 from swgjoint.drives.references import load_drive
 from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.sections import LifeSection
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import is_file, models_path, near_names
@@ -26,6 +27,7 @@ NUMBERS = (
     "max_input_speed_rpm",
     "average_input_speed_rpm",
     "rotor_inertia_kgm2",
+    "L50_h",
 )
 """Columns with a meaning, all of them positive numbers; others may state a cost."""
 
@@ -48,6 +50,8 @@ class DriveOption:
     """Limit of the average input speed [rad/s]; inf if not stated."""
     rotor_inertia: float | None
     """Inertia of rotor and wave generator [kg·m²]; None to keep that of the scene."""
+    life: LifeSection | None
+    """Rated life; None for that of the scene or of the catalogue."""
     map: DriveMap
     """Map of the drive, without the options of a joint."""
 
@@ -129,7 +133,7 @@ def _option(name: str, row: Row, cost: float, progress: Progress) -> DriveOption
         value = row.get(key)
         return value * unit if isinstance(value, float) else None
 
-    inertia = number("rotor_inertia_kgm2")
+    inertia, life = number("rotor_inertia_kgm2"), number("L50_h")
     return DriveOption(
         drive=name,
         cost=Decimal(repr(cost)),
@@ -137,6 +141,7 @@ def _option(name: str, row: Row, cost: float, progress: Progress) -> DriveOption
         max_input_speed=number("max_input_speed_rpm", rpm) or inf,
         average_input_speed=number("average_input_speed_rpm", rpm) or inf,
         rotor_inertia=inertia or catalogue_rotor_inertia(name),
+        life=None if life is None else LifeSection(L50_h=life),
         map=load_drive(name, progress=progress),
     )
 

@@ -22,8 +22,7 @@ import mujoco
 import numpy as np
 
 from swgjoint.drives.references import given_drives
-from swgjoint.drives.sections import LifeSection
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.select.evaluation import (
     SimulatedSet,
     evaluate_set,
@@ -90,7 +89,8 @@ def select_drives(
         progress: Called after every simulation.
 
     Raises:
-        InputError: If the scene or an option cannot be used.
+        InputError: If the scene or an option cannot be used, or if the scene lacks a
+            limited figure of the tool.
         ComputationError: If bodies collide, or if the search is too long.
     """
     check_options(options)
@@ -126,7 +126,7 @@ class _Selector:
         self.joints = own.arm.joints
         self.drives: dict[str, tuple[ScreenedDrive, ...]] = {}
         for j, name in enumerate(self.joints):
-            life = scene.joint_settings(name).life or LifeSection()
+            life = scene.joint_settings(name).life
             screened = []
             for option in options:
                 checks = check_loads(own, cycle, j, option, spec, life)
@@ -278,9 +278,25 @@ class _Selector:
             one = replace(one, reasons=(str(error),))
         else:
             one = evaluate_set(one, run, self.spec)
+            self._require_tool_figures(one)
         self.tried[chosen] = one
         self._learn(chosen, one)
         self.progress(_STAGE, len(self.tried), MOST)
+
+    def _require_tool_figures(self, one: SimulatedSet) -> None:
+        """Check that the motion has all limited figures of the tool.
+
+        Raises:
+            InputError: If it has not, so that no set can meet the spec.
+        """
+        absent = [key for key, value in one.figures[""].items() if value is None]
+        if absent and one.run is not None:
+            missing = one.run.metrics()["tool"]["missing"]
+            why = missing.get(absent[0].removeprefix("tool_"), missing.get("tool", ""))
+            raise InputError(
+                f"{absent[0]}: scene {self.scene.name!r} has no such figure"
+                f"{': ' if why else ''}{why}"
+            )
 
     def _predict(self, key: str, chosen: Places) -> float:
         """Predicted tool error [mm]."""
