@@ -25,7 +25,7 @@ from swgjoint.explore.select.evaluation import (
 from swgjoint.explore.select.loads import MARGIN, RATINGS, check_loads, rigid_tasks
 from swgjoint.explore.select.options import DriveOption, read_options
 from swgjoint.explore.select.prediction import PATH, ToolPrediction
-from swgjoint.explore.select.search import QuadraticBound, SetSearch
+from swgjoint.explore.select.search import QuadraticBound, SetSearch, predict_squared
 from swgjoint.explore.select.select import select_drives
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.scene import scene_of_arm
@@ -64,7 +64,7 @@ def scene(payload: float = 3.0) -> Scene:
 # ---- search
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(30))
 def test_the_search_finds_what_enumeration_finds(seed):
     """Random costs with equal ones, two quadratic bounds with terms of both signs."""
     random = np.random.default_rng(seed)
@@ -90,7 +90,11 @@ def test_the_search_finds_what_enumeration_finds(seed):
             sum(costs[j][k][part] for j, k in enumerate(chosen)) for part in (0, 1)
         )
         found[chosen] = (total, values)
-    limits = [np.quantile([v[i] for _, v in found.values()], 0.5) for i in (0, 1)]
+    # not exactly the value of a set, whose sum depends on the order of its terms
+    limits = [
+        (1.0 + 1e-9) * np.quantile([v[i] for _, v in found.values()], 0.5)
+        for i in (0, 1)
+    ]
     bounds = [
         QuadraticBound(form=form, largest=limit)
         for form, limit in zip(forms, limits, strict=True)
@@ -107,7 +111,7 @@ def test_the_search_finds_what_enumeration_finds(seed):
         assert chosen in good and good.pop(chosen) == min(
             [*good.values(), found[chosen][0]]
         )
-        assert finder.predict_squared(forms[1], chosen) == pytest.approx(
+        assert predict_squared(forms[1], sizes, chosen) == pytest.approx(
             found[chosen][1][1]
         )
         skipped.add(chosen)
@@ -185,13 +189,12 @@ def test_the_prediction_of_linear_drives_is_the_simulation():
     soft, stiff = linear_option("soft", 4e3, 1), linear_option("stiff", 4e4, 2)
     own, _ = rigid_tasks(scene())
     prediction = ToolPrediction(own, [[soft, stiff]] * 2)
-    finder = SetSearch([[(one.cost, Decimal(0)) for one in (soft, stiff)]] * 2)
     changed = scene_of_set(scene(), own.arm.joints, (soft, stiff))
     run = run_scene(changed, drives={"soft": soft.map, "stiff": stiff.map})
     simulated = run.metrics()["tool"]["path_rms_mm"]
 
     def predicted() -> float:
-        return sqrt(finder.predict_squared(prediction.form_of(PATH), (0, 1))) / mm
+        return sqrt(predict_squared(prediction.form_of(PATH), (2, 2), (0, 1))) / mm
 
     assert simulated > 1.0
     assert predicted() == pytest.approx(0.97 * simulated, rel=0.02)

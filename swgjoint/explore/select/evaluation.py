@@ -15,9 +15,11 @@ from swgjoint.explore.select.loads import LIFE, MEAN, PEAK, LimitCheck
 from swgjoint.explore.select.options import DriveOption
 from swgjoint.explore.select.prediction import tool_jacobian
 from swgjoint.sim.arm.scene import ROTOR_INERTIA
+from swgjoint.sim.figures.keys import RIPPLE
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 
+GOODMAN = "goodman_safety"
 OF_TOOL = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm")
 """Figures of the whole arm; all others are figures of single joints."""
 _OF_BEARING = {"L50_h", "L10_h", "rated_speed_rpm"}
@@ -135,7 +137,10 @@ def evaluate_set(
             if key == LIFE and unlimited:
                 continue
             value = figures[name][key]
-            check = LimitCheck(key=key, value=value, limit=spec[key])
+            why = row.ripple_missing if key in RIPPLE else None
+            if name and key == GOODMAN:
+                why = metrics["joints"][name]["life"]["flexspline"]["missing"]
+            check = LimitCheck(key=key, value=value, limit=spec[key], reason=why or "")
             missed.append(MissedLimit(joint=name or None, check=check))
     faults: dict[str, str] = {}
     for reason in metrics["reasons"]:

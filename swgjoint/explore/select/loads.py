@@ -57,6 +57,8 @@ class LimitCheck:
     """Value; None if it is not known."""
     limit: float
     """Limit: a lower one for the keys of :data:`LOWER`, else an upper one."""
+    reason: str = ""
+    """Reason why the value is not known."""
 
     @property
     def use(self) -> float:
@@ -70,9 +72,10 @@ class LimitCheck:
     @property
     def text(self) -> str:
         """Figure, value and limit."""
-        known = self.value is not None
-        value = f"= {self.value:.4g}" if known else "without a value"
-        return f"{self.key} {value}, limit {self.limit:.4g}"
+        if self.value is None:
+            why = f" ({self.reason})" if self.reason else ""
+            return f"{self.key} without a value{why}, limit {self.limit:.4g}"
+        return f"{self.key} = {self.value:.4g}, limit {self.limit:.4g}"
 
     def to_json(self) -> dict[str, Any]:
         """Figure, value, limit and use; an infinite number is None."""
@@ -210,6 +213,7 @@ def check_loads(
         MAX_SPEED: abs(drive.ratio) * top / rpm,
         AVERAGE_SPEED: mean.input_speed / rpm,
     }
+    reasons: dict[str, str] = {}
     limits = dict(spec) | {
         MAX_SPEED: option.max_input_speed / rpm,
         AVERAGE_SPEED: option.average_input_speed / rpm,
@@ -226,8 +230,10 @@ def check_loads(
                 drive.ratings.rated_torque, mean.torque, mean.input_speed
             )
             values[LIFE] = factor * rated.L10 / hour
+        else:
+            reasons[LIFE] = rated.partition(";")[0]
     return tuple(
-        LimitCheck(key=key, value=value, limit=limits[key])
+        LimitCheck(key=key, value=value, limit=limits[key], reason=reasons.get(key, ""))
         for key, value in values.items()
     )
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from swgjoint.explore.select.evaluation import SimulatedSet
+from swgjoint.explore.select.evaluation import SimulatedSet, tool_shares
 from swgjoint.explore.select.loads import LimitCheck
 from swgjoint.explore.select.options import DriveOption
 from swgjoint.sim.scene.scene import Scene
@@ -109,3 +109,39 @@ def describe_nearest(dropped: Mapping[str, LimitCheck | str | None]) -> str:
         return f"{drive}: {fault}"
     drive = min(checks, key=lambda drive: checks[drive].use)
     return f"the nearest is {drive} with {checks[drive].text}"
+
+
+def explain_failure(
+    dropped: Mapping[str, Mapping[str, LimitCheck | str]],
+    remaining: Sequence[Collection[int]],
+    simulated: Collection[SimulatedSet],
+) -> str:
+    """Joint and limit that leave no set after the simulations, as text.
+
+    If a figure of the tool leaves none, the joint is the one that contributes most.
+
+    Args:
+        dropped: Reasons why drives were dropped, by joint and drive.
+        remaining: Drives that were not dropped, by joint.
+        simulated: All simulated sets.
+    """
+    for (name, own), left in zip(dropped.items(), remaining, strict=True):
+        if not left:
+            why = describe_nearest(own)
+            return f"{name}: no drive meets the spec in a simulation; {why}"
+    runs = [one for one in simulated if one.missed]
+    if not runs:
+        reasons = [why for one in simulated for why in one.to_json()["reasons"]]
+        return f"no set could be simulated; the first: {reasons[0]}"
+    best = min(runs, key=lambda one: max(miss.check.use for miss in one.missed))
+    miss = max(best.missed, key=lambda miss: miss.check.use)
+    text = f"the nearest set has {miss.check.text}"
+    if miss.joint is not None:
+        return f"{miss.joint}: {text}"
+    assert best.run is not None
+    shares = tool_shares(best.run)
+    name = max(shares, key=lambda name: shares[name])
+    return (
+        f"{name}: {text}, to which this joint with {best.drives[name]} contributes"
+        f" most, {100.0 * shares[name]:.0f} % of the mean square"
+    )

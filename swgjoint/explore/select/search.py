@@ -23,15 +23,16 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.typing import Array
 
-MOST_NODES = 300_000
+MOST_NODES = 100_000
 """Largest number of partial sets that one search extends."""
 
 Cost = tuple[Decimal, Decimal]
 """Cost, and the value that orders sets of equal cost; both add up over the joints."""
 
-_Node = tuple[Cost, int, tuple[int, ...], tuple[float, ...], list[Array]]
-"""Least cost of a partial set, its number, the options, and for every bound the value
-so far and the sums of the rows of the chosen options."""
+_Node = tuple[Cost, int, int, tuple[int, ...], tuple[float, ...], tuple[Array, ...]]
+"""Least cost of a partial set, minus the number of its joints, the number of the node,
+the options, and for every bound the value of the form and the sums of its rows, both
+without those of the last option in the latter."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,9 +57,24 @@ class SetSearch:
     def __init__(
         self, costs: Sequence[Sequence[Cost]], bounds: Sequence[QuadraticBound] = ()
     ) -> None:
-        self._costs, self._bounds = costs, bounds
-        first = np.cumsum([0, *map(len, costs)])
-        self._slices = [slice(a, b) for a, b in pairwise(first.tolist())]
+        given = _slices(costs)
+
+        def influence(j: int) -> float:
+            terms = (np.diag(b.form)[given[j]].max(initial=0.0) for b in bounds)
+            return max(
+                (float(t) / b.largest for t, b in zip(terms, bounds, strict=True)),
+                default=0.0,
+            )
+
+        # joints of large terms come first, so that sets are dropped early
+        self._order = sorted(range(len(costs)), key=influence, reverse=True)
+        rows = [k for j in self._order for k in range(given[j].start, given[j].stop)]
+        self._costs = [costs[j] for j in self._order]
+        self._slices = _slices(self._costs)
+        self._bounds = [
+            QuadraticBound(form=b.form[np.ix_(rows, rows)], largest=b.largest)
+            for b in bounds
+        ]
 
     def find_cheapest(
         self, skipped: Collection[tuple[int, ...]] = ()
@@ -77,22 +93,29 @@ class SetSearch:
         least = [min(options) for options in self._costs]
         rest = [_sum(least[k:]) for k in (*joints, len(least))]
         opened = [self._open_pairs(bound.form) for bound in self._bounds]
-        number = count()
-        start = [np.zeros(len(bound.form)) for bound in self._bounds]
-        heap: list[_Node] = [(rest[0], next(number), (), (0.0,) * len(start), start)]
-        nodes = 0
+        none = tuple(np.zeros(len(bound.form)) for bound in self._bounds)
+        heap: list[_Node] = [(rest[0], 0, 0, (), (0.0,) * len(none), none)]
+        number, nodes = count(1), 0
         while heap:
-            cost, _, chosen, values, crossed = heapq.heappop(heap)
+            cost, _, _, chosen, values, before = heapq.heappop(heap)
             depth = len(chosen)
             if depth == len(self._costs):
-                if chosen not in skipped:
-                    return chosen
+                found = tuple(chosen[self._order.index(j)] for j in joints)
+                if found not in skipped:
+                    return found
                 continue
             nodes += 1
             if nodes > MOST_NODES:
                 raise ComputationError(
                     f"no set is found among the first {MOST_NODES} partial sets; use"
                     " fewer drives or joints, or a wider limit"
+                )
+            crossed = before
+            if depth:
+                row = self._slices[depth - 1].start + chosen[-1]
+                crossed = tuple(
+                    cross + bound.form[row]
+                    for bound, cross in zip(self._bounds, before, strict=True)
                 )
             place = self._slices[depth]
             fits = np.ones(len(self._costs[depth]), dtype=bool)
@@ -106,32 +129,13 @@ class SetSearch:
                     bound.largest
                 )
             for option in np.flatnonzero(fits).tolist():
-                row = place.start + option
-                here = self._costs[depth][option]
+                total = _sum([_less(cost, least[depth]), self._costs[depth][option]])
+                terms = tuple(float(own[option]) for own in sums)
+                node = (*chosen, option)
                 heapq.heappush(
-                    heap,
-                    (
-                        _sum([_less(cost, least[depth]), here]),
-                        next(number),
-                        (*chosen, option),
-                        tuple(float(own[option]) for own in sums),
-                        [
-                            cross + bound.form[row]
-                            for bound, cross in zip(self._bounds, crossed, strict=True)
-                        ],
-                    ),
+                    heap, (total, -len(node), next(number), node, terms, crossed)
                 )
         return None
-
-    def predict_squared(self, form: Array, chosen: Sequence[int]) -> float:
-        """Value of a quadratic form for one set.
-
-        Args:
-            form: Matrix of the form, see :class:`QuadraticBound`.
-            chosen: Index of the option by joint.
-        """
-        rows = [s.start + c for s, c in zip(self._slices, chosen, strict=True)]
-        return float(form[np.ix_(rows, rows)].sum())
 
     def _open_pairs(self, form: Array) -> NDArray[np.float64]:
         """Least sum over pairs of joints from a depth on. Shape (n_joints + 1,)."""
@@ -151,6 +155,24 @@ class SetSearch:
             own = diagonal[s] + 2.0 * (cross[s] + form[place, s])
             added += own.min(axis=1)
         return added
+
+
+def predict_squared(form: Array, sizes: Sequence[int], chosen: Sequence[int]) -> float:
+    """Value of a quadratic form for one set.
+
+    Args:
+        form: Matrix of the form, see :class:`QuadraticBound`.
+        sizes: Number of options by joint.
+        chosen: Index of the option by joint.
+    """
+    rows = np.cumsum([0, *sizes])[:-1] + np.array(chosen)
+    return float(form[np.ix_(rows, rows)].sum())
+
+
+def _slices(costs: Sequence[Sequence[Cost]]) -> list[slice]:
+    """Rows of the options of every joint in a form."""
+    first = np.cumsum([0, *map(len, costs)])
+    return [slice(a, b) for a, b in pairwise(first.tolist())]
 
 
 def _sum(costs: Sequence[Cost]) -> Cost:

@@ -27,7 +27,6 @@ from swgjoint.explore.select.evaluation import (
     SimulatedSet,
     evaluate_set,
     scene_of_set,
-    tool_shares,
 )
 from swgjoint.explore.select.loads import (
     RATINGS,
@@ -43,8 +42,14 @@ from swgjoint.explore.select.result import (
     DriveSelection,
     ScreenedDrive,
     describe_nearest,
+    explain_failure,
 )
-from swgjoint.explore.select.search import Cost, QuadraticBound, SetSearch
+from swgjoint.explore.select.search import (
+    Cost,
+    QuadraticBound,
+    SetSearch,
+    predict_squared,
+)
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.figures.keys import LOWER, UPPER
 from swgjoint.sim.scene.cycle_section import CycleTask
@@ -158,13 +163,20 @@ class _Selector:
         """Find the cheapest set, or the reason why there is none."""
         for name, kept in zip(self.joints, self.kept, strict=True):
             if not kept:
-                return self._result(None, self._why_no_drive(name))
+                over = {one.option.drive: one.excess for one in self.drives[name]}
+                why = f"no drive carries the task; {describe_nearest(over)}"
+                return self._result(None, f"{name}: {why}")
         while len(self.tried) < MOST:
             chosen = self._cheapest()
             if chosen is None:
                 chosen = self._most_accurate()
             if chosen is None:
-                return self._result(None, self._why_none())
+                return self._result(
+                    None,
+                    explain_failure(
+                        self.dropped, self._remaining(), self.tried.values()
+                    ),
+                )
             if chosen not in self.tried:
                 self._simulate(chosen)
             if self.tried[chosen].met:
@@ -229,18 +241,18 @@ class _Selector:
         if not all(remaining) or not self.keys:
             return None
         assert self.prediction is not None
-        search = SetSearch(self.costs)
+        sizes = list(map(len, self.kept))
         for key in self.keys:
             form = self.prediction.form_of(key)
             chosen = list(self._stiffest())
-            least = search.predict_squared(form, chosen)
+            least = predict_squared(form, sizes, chosen)
             better = True
             while better:
                 better = False
                 for j, own in enumerate(remaining):
                     for k in own:
                         trial = [*chosen[:j], k, *chosen[j + 1 :]]
-                        value = search.predict_squared(form, trial)
+                        value = predict_squared(form, sizes, trial)
                         if value < least * (1.0 - 1e-9):
                             chosen, least, better = trial, value, True
             if tuple(chosen) not in self.tried:
@@ -302,7 +314,8 @@ class _Selector:
         """Predicted tool error [mm]."""
         assert self.prediction is not None
         form = self.prediction.form_of(key)
-        return float(np.sqrt(SetSearch(self.costs).predict_squared(form, chosen))) / mm
+        sizes = list(map(len, self.kept))
+        return float(np.sqrt(predict_squared(form, sizes, chosen))) / mm
 
     def _learn(self, chosen: Places, one: SimulatedSet) -> None:
         """Drop drives that miss a limit of their joint; correct the prediction."""
@@ -348,34 +361,6 @@ class _Selector:
             if reasons := self.tried[trial].reasons:
                 self.dropped[name][drive] = reasons[0]
         return ""
-
-    def _why_no_drive(self, name: str) -> str:
-        """Why no drive carries the loads of a joint."""
-        over = {one.option.drive: one.excess for one in self.drives[name]}
-        return f"{name}: no drive carries the task; {describe_nearest(over)}"
-
-    def _why_none(self) -> str:
-        """Why no set meets the specification after the simulations."""
-        for name, own in zip(self.joints, self._remaining(), strict=True):
-            if not own:
-                why = describe_nearest(self.dropped[name])
-                return f"{name}: no drive meets the spec in a simulation; {why}"
-        runs = [one for one in self.tried.values() if one.missed]
-        if not runs:
-            failed = next(iter(self.tried.values()))
-            return f"no set could be simulated; the first: {failed.reasons[0]}"
-        best = min(runs, key=lambda one: max(miss.check.use for miss in one.missed))
-        miss = max(best.missed, key=lambda miss: miss.check.use)
-        text = f"the nearest set has {miss.check.text}"
-        if miss.joint is not None:
-            return f"{miss.joint}: {text}"
-        assert best.run is not None
-        shares = tool_shares(best.run)
-        name = max(shares, key=lambda name: shares[name])
-        return (
-            f"{name}: {text}, to which this joint with {best.drives[name]} contributes"
-            f" most, {100.0 * shares[name]:.0f} % of the mean square"
-        )
 
     def _result(self, winner: SimulatedSet | None, failure: str) -> DriveSelection:
         run = None if winner is None else winner.run
