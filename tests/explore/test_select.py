@@ -6,7 +6,7 @@ import itertools
 import json
 from decimal import Decimal
 from functools import cache
-from math import inf, sqrt
+from math import inf, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from swgjoint.explore.select.search import QuadraticBound, SetSearch, predict_sq
 from swgjoint.explore.select.select import select_drives
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.scene import scene_of_arm
+from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm, rpm
 from swgjoint.view.run import run_scene
@@ -238,9 +239,37 @@ SPECS = [
     ({"torsion_arcmin": 3.2, "K1_Nm_rad": 1e4}, ("20", "17")),
     ({"ripple_rms_percent": 0.8}, ("20", "17")),
     ({"transmission_error_arcmin": 2.0, "tool_path_rms_mm": 2.0}, ("20", "17")),
+    ({"resonance_Hz": 19.0}, ("20", "14")),
     ({"torsion_arcmin": 2.5}, ()),
     ({"tool_path_rms_mm": 0.1}, ()),
 ]
+
+
+def test_the_resonance_of_two_links_is_the_closed_form():
+    """det(K - w² M) = 0 at the pose of the run's motion that gives the least w."""
+    stiffness = np.array([3e4, 8e3])
+    soft = [linear_option(f"{k:g}", k, 1) for k in stiffness]
+    arm = rigid_tasks(scene())[0].arm
+    changed = scene_of_set(scene(), arm.joints, soft)
+    known = {one.drive: one.map for one in soft}
+    run = run_scene(changed, drives=known)
+    lowest = inf
+    for q in run.assembly.trajectory.position[::50]:
+        # columns of the inertia matrix from inverse dynamics
+        rest = arm.gravity(q[None])[0]
+        units = [
+            arm.torques(q[None], 0 * q[None], a[None])[0] - rest for a in np.eye(2)
+        ]
+        (a, b), (_, d) = units
+        p, r = a * d - b * b, stiffness.prod()
+        q1 = stiffness[0] * d + stiffness[1] * a
+        lowest = min(lowest, sqrt((q1 - sqrt(q1**2 - 4 * p * r)) / (2 * p)) / (2 * pi))
+    frequency, shares = lowest_resonance(run)
+    assert frequency == pytest.approx(lowest, rel=1e-3)
+    assert sum(shares.values()) == pytest.approx(1.0) and min(shares.values()) > 0.0
+    assert (
+        lowest_resonance(run_scene(changed.with_level("rigid"), drives=known)) is None
+    )
 
 
 @pytest.mark.parametrize(("spec", "sizes"), SPECS, ids=str)
@@ -350,6 +379,7 @@ def test_the_winner_meets_the_spec_on_its_own(tmp_path, capsys):
             ["--limit", "tool_path_rms_mm=0.01"],
             ("tool_path_rms_mm", "limit 0.01", "contributes", "%"),
         ),
+        (["--limit", "resonance_Hz=99"], ("resonance_Hz", "limit 99", "energy")),
         (["--limit", "torsion_arcmin=0.001"], ("torsion_arcmin", "limit 0.001")),
     ],
 )

@@ -24,6 +24,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
+from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.run import run_scene
@@ -34,6 +35,8 @@ SLOW = "fatigue_safety_factor"
 """Figure that is computed only if a spec or the sorting needs it, because its 3D model
 takes minutes."""
 STIFFNESS = "K1_Nm_rad"
+OF_SPRINGS = (STIFFNESS, "resonance_Hz")
+"""Figures that a level without compliance does not have and whose limits it meets."""
 UNYIELDING = ("rigid", "kinematic")
 """Levels without compliance, which have no stiffness to compare."""
 
@@ -82,6 +85,9 @@ class Compared:
     """Largest pose repeatability RP after ISO 9283 [mm]."""
     K1_Nm_rad: float | None
     """Torsional stiffness K1 of the drive, at low torque [N·m/rad]."""
+    resonance_Hz: float | None
+    """Lowest natural frequency of the arm on its drives over the motion, with held
+    motors [Hz]; None without compliance."""
     von_mises_MPa: float | None
     """Largest von Mises stress of the flexspline at rated torque, averaged over one
     pitch [MPa]; None without a design."""
@@ -196,7 +202,7 @@ def _is_design(reference: str) -> bool:
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """Limits that a row does not meet; a figure without a valid value meets none.
 
-    A level without compliance meets every lower limit of the stiffness.
+    A level without compliance meets every lower limit of stiffness and resonance.
 
     Args:
         row: Results of one argument.
@@ -205,7 +211,7 @@ def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     found = []
     for key, limit in spec.items():
         value = row.figure(key)
-        if key == STIFFNESS and value is None and row.level in UNYIELDING:
+        if key in OF_SPRINGS and value is None and row.level in UNYIELDING:
             continue
         valid = key not in RIPPLE or row.ripple_valid is not False
         kept = (
@@ -245,6 +251,7 @@ def row_of(
         drive = min(drives, key=lambda d: d.mean_stiffness)
     worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
     ratings = [joint["ratings"] for joint in joints.values()]
+    resonance = lowest_resonance(run)
     errors = [joint["transmission_error_arcmin"] for joint in joints.values()]
 
     def largest(key: str) -> float:
@@ -272,6 +279,7 @@ def row_of(
         K1_Nm_rad=None
         if level in UNYIELDING
         else drive.spec_sheet((STIFFNESS,))[STIFFNESS],
+        resonance_Hz=None if resonance is None else resonance[0],
         von_mises_MPa=None,
         fatigue_safety_factor=None,
         peak_torque_of_rating=max(

@@ -20,7 +20,8 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 
 GOODMAN = "goodman_safety"
-OF_TOOL = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm")
+RESONANCE = "resonance_Hz"
+OF_ARM = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm", RESONANCE)
 """Figures of the whole arm; all others are figures of single joints."""
 _OF_BEARING = {"L50_h", "L10_h", "rated_speed_rpm"}
 
@@ -30,7 +31,7 @@ class MissedLimit:
     """A limit that a simulated set misses."""
 
     joint: str | None
-    """Joint; None for a figure of the tool."""
+    """Joint; None for a figure of the whole arm."""
     check: LimitCheck
     """Figure and limit."""
 
@@ -46,7 +47,7 @@ class SimulatedSet:
     predicted: dict[str, float]
     """Predicted tool errors by key [mm]."""
     figures: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Figures by joint and, under an empty name, of the tool; by key."""
+    """Figures by joint and, under an empty name, of the whole arm; by key."""
     missed: tuple[MissedLimit, ...] = ()
     """Missed limits."""
     reasons: tuple[str, ...] = ()
@@ -127,7 +128,7 @@ def evaluate_set(
     figures: dict[str, dict[str, Any]] = {}
     missed = []
     for name in ("", *run.joints):
-        keys = [key for key in spec if (key in OF_TOOL) == (not name)]
+        keys = [key for key in spec if (key in OF_ARM) == (not name)]
         row = row_of(run.name, run, None, level=None, of=[name] if name else [])
         if name:
             row = _with_cycle(row, metrics["joints"][name])

@@ -13,7 +13,7 @@ simulations show the difference.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -25,6 +25,7 @@ from swgjoint.joint.prescribed import error_of_motor
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.assembly_steps import load_torque
+from swgjoint.sim.figures.resonance import InertiaFactors
 from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.run import Run
 from swgjoint.typing import Array
@@ -136,6 +137,34 @@ def _deviations(
                 one = one - _torsion(drive, torque[:, j] + load)
             off.append(one)
     return np.array(off)
+
+
+def resonance_test(
+    factors: InertiaFactors,
+    soft: Array,
+    stiffness: Sequence[Sequence[float]],
+    limit: float,
+) -> Callable[[dict[int, int]], bool]:
+    """Function that tells whether drives of some joints keep the resonance high enough.
+
+    The other joints get their stiffest drives. As no natural frequency falls with a
+    stiffness, no set that meets the limit is lost.
+
+    Args:
+        factors: Inertia of the arm.
+        soft: Which joints are compliant. Shape (n_joints,).
+        stiffness: Mean stiffness of the options by joint [N·m/rad].
+        limit: Smallest accepted frequency [Hz].
+    """
+    most = np.array([max(own) for own in stiffness])
+
+    def is_possible(options: dict[int, int]) -> bool:
+        springs = most.copy()
+        for j, k in options.items():
+            springs[j] = stiffness[j][k]
+        return factors.lowest(springs[soft])[0] >= limit
+
+    return is_possible
 
 
 def tool_jacobian(arm: RigidArm, position: Array) -> Array:

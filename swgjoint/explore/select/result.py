@@ -6,9 +6,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from swgjoint.explore.select.evaluation import SimulatedSet, tool_shares
+from swgjoint.explore.select.evaluation import RESONANCE, SimulatedSet, tool_shares
 from swgjoint.explore.select.loads import LimitCheck
 from swgjoint.explore.select.options import DriveOption
+from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.scene.scene import Scene
 
 CAREFUL = 100
@@ -118,7 +119,7 @@ def explain_failure(
 ) -> str:
     """Joint and limit that leave no set after the simulations, as text.
 
-    If a figure of the tool leaves none, the joint is the one that contributes most.
+    If a figure of the whole arm leaves none, the joint is that with the largest share.
 
     Args:
         dropped: Reasons why drives were dropped, by joint and drive.
@@ -139,9 +140,14 @@ def explain_failure(
     if miss.joint is not None:
         return f"{miss.joint}: {text}"
     assert best.run is not None
-    shares = tool_shares(best.run)
+    if miss.check.key == RESONANCE:
+        resonance = lowest_resonance(best.run)
+        assert resonance is not None
+        shares, what = resonance[1], "elastic energy"
+    else:
+        shares, what = tool_shares(best.run), "mean square"
     name = max(shares, key=lambda name: shares[name])
     return (
         f"{name}: {text}, to which this joint with {best.drives[name]} contributes"
-        f" most, {100.0 * shares[name]:.0f} % of the mean square"
+        f" most, {100.0 * shares[name]:.0f} % of the {what}"
     )

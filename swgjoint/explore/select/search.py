@@ -12,7 +12,7 @@ every pair that is still open exceeds a bound, so no set that keeps the bounds i
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import count, pairwise
@@ -77,12 +77,16 @@ class SetSearch:
         ]
 
     def find_cheapest(
-        self, skipped: Collection[tuple[int, ...]] = ()
+        self,
+        skipped: Collection[tuple[int, ...]] = (),
+        is_possible: Callable[[dict[int, int]], bool] = lambda options: True,
     ) -> tuple[int, ...] | None:
         """Index of the chosen option by joint; None if no set keeps the bounds.
 
         Args:
             skipped: Sets that are not accepted.
+            is_possible: Function of the options of some joints that returns whether a
+                set with them can be accepted.
 
         Raises:
             ComputationError: If the search is longer than :data:`MOST_NODES`.
@@ -99,6 +103,8 @@ class SetSearch:
         while heap:
             cost, _, _, chosen, values, before = heapq.heappop(heap)
             depth = len(chosen)
+            if depth and not is_possible(dict(zip(self._order, chosen, strict=False))):
+                continue
             if depth == len(self._costs):
                 found = tuple(chosen[self._order.index(j)] for j in joints)
                 if found not in skipped:
@@ -167,6 +173,33 @@ def predict_squared(form: Array, sizes: Sequence[int], chosen: Sequence[int]) ->
     """
     rows = np.cumsum([0, *sizes])[:-1] + np.array(chosen)
     return float(form[np.ix_(rows, rows)].sum())
+
+
+def descend(
+    form: Array,
+    sizes: Sequence[int],
+    allowed: Sequence[Sequence[int]],
+    start: Sequence[int],
+) -> tuple[int, ...]:
+    """Set with a small value of a form, changed joint by joint until nothing helps.
+
+    Args:
+        form: Matrix of the form, see :class:`QuadraticBound`.
+        sizes: Number of options by joint.
+        allowed: Options that a joint may get.
+        start: Set to start from.
+    """
+    chosen = list(start)
+    least, better = predict_squared(form, sizes, chosen), True
+    while better:
+        better = False
+        for j, own in enumerate(allowed):
+            for k in own:
+                trial = [*chosen[:j], k, *chosen[j + 1 :]]
+                value = predict_squared(form, sizes, trial)
+                if value < least * (1.0 - 1e-9):
+                    chosen, least, better = trial, value, True
+    return tuple(chosen)
 
 
 def _slices(costs: Sequence[Sequence[Cost]]) -> list[slice]:

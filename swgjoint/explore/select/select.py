@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from decimal import Decimal
@@ -24,6 +24,7 @@ import numpy as np
 from swgjoint.drives.references import given_drives
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.select.evaluation import (
+    RESONANCE,
     SimulatedSet,
     evaluate_set,
     scene_of_set,
@@ -36,7 +37,11 @@ from swgjoint.explore.select.loads import (
     rigid_tasks,
 )
 from swgjoint.explore.select.options import DriveOption, check_options
-from swgjoint.explore.select.prediction import TRUST_SIMULATED, ToolPrediction
+from swgjoint.explore.select.prediction import (
+    TRUST_SIMULATED,
+    ToolPrediction,
+    resonance_test,
+)
 from swgjoint.explore.select.result import (
     CAREFUL,
     DriveSelection,
@@ -48,10 +53,12 @@ from swgjoint.explore.select.search import (
     Cost,
     QuadraticBound,
     SetSearch,
+    descend,
     predict_squared,
 )
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.figures.keys import LOWER, UPPER
+from swgjoint.sim.figures.resonance import LOCKED, inertia_factors
 from swgjoint.sim.scene.cycle_section import CycleTask
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
@@ -65,6 +72,9 @@ CLEAR = 1.05
 OFTEN = 3
 """Number of sets in which a drive misses a limit of its joint, after which it is not
 tried again."""
+ALMOST = 0.99
+"""Share of the limit of the resonance below which a set is not simulated. The
+resonance of a set is that of its simulation, apart from the choice of poses."""
 MOST = 300
 """Largest number of simulated sets."""
 _STAGE = "simulated sets"
@@ -152,6 +162,9 @@ class _Selector:
                 own, [[one.option for one in kept] for kept in self.kept]
             )
             self.keys = tuple(key for key in self.prediction.keys if key in spec)
+        levels = [scene.joint_settings(name).level for name in self.joints]
+        self.soft = np.array([level not in LOCKED for level in levels])
+        self.factors = inertia_factors(own.arm, own.trajectory.position, self.soft)
         self.ratio = dict.fromkeys(self.keys, 1.0)
         self.dropped: dict[str, dict[str, LimitCheck | str]] = {
             name: {} for name in self.joints
@@ -227,37 +240,42 @@ class _Selector:
             [own[k] for k in indices]
             for own, indices in zip(self.costs, remaining, strict=True)
         ]
-        found = SetSearch(costs, bounds).find_cheapest(skipped)
+        found = SetSearch(costs, bounds).find_cheapest(
+            skipped, self._resonance_test(remaining)
+        )
         if found is None:
             return None
         return tuple(own[k] for own, k in zip(remaining, found, strict=True))
 
+    def _resonance_test(
+        self, remaining: Sequence[Sequence[int]]
+    ) -> Callable[[dict[int, int]], bool]:
+        """Whether some drives leave the resonance above its limit."""
+        if RESONANCE not in self.spec or not self.soft.any():
+            return lambda options: True
+        stiffness = [
+            [kept[k].option.map.mean_stiffness for k in own]
+            for kept, own in zip(self.kept, remaining, strict=True)
+        ]
+        return resonance_test(
+            self.factors, self.soft, stiffness, ALMOST * self.spec[RESONANCE]
+        )
+
     def _most_accurate(self) -> Places | None:
-        """The set of the least predicted tool error, unless it was simulated.
+        """The set of the least tool error or highest resonance, unless simulated.
 
         Its simulation proves that no set meets the limit, or corrects the prediction.
         """
         remaining = self._remaining()
-        if not all(remaining) or not self.keys:
+        if not all(remaining):
             return None
-        assert self.prediction is not None
-        sizes = list(map(len, self.kept))
+        stiffest, sizes = self._stiffest(), list(map(len, self.kept))
+        sets = [stiffest] if RESONANCE in self.spec else []
         for key in self.keys:
+            assert self.prediction is not None
             form = self.prediction.form_of(key)
-            chosen = list(self._stiffest())
-            least = predict_squared(form, sizes, chosen)
-            better = True
-            while better:
-                better = False
-                for j, own in enumerate(remaining):
-                    for k in own:
-                        trial = [*chosen[:j], k, *chosen[j + 1 :]]
-                        value = predict_squared(form, sizes, trial)
-                        if value < least * (1.0 - 1e-9):
-                            chosen, least, better = trial, value, True
-            if tuple(chosen) not in self.tried:
-                return tuple(chosen)
-        return None
+            sets.append(descend(form, sizes, remaining, stiffest))
+        return next((one for one in sets if one not in self.tried), None)
 
     def _stiffest(self) -> Places:
         """The stiffest remaining drive of every joint, the cheaper one of equals."""

@@ -19,6 +19,7 @@ UPPER = (
 """Figures that a specification bounds from above."""
 LOWER = (
     "K1_Nm_rad",
+    "resonance_Hz",
     "fatigue_safety_factor",
     "L10_h",
     "goodman_safety",

@@ -24,6 +24,7 @@ HEADER = {
     "torsion_arcmin": ("torsion", "arcmin, mean"),
     "tool_path_rms_mm": ("tool path error", "mm, rms"),
     "K1_Nm_rad": ("K1", "N·m/rad"),
+    "resonance_Hz": ("lowest resonance", "Hz"),
     "von_mises_MPa": ("von Mises stress", "MPa"),
     "fatigue_safety_factor": ("fatigue safety factor", ""),
     "peak_torque_of_rating": ("peak torque", "of repeated peak"),
