@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -66,7 +67,7 @@ def read_options(
     """Read the drives to select from.
 
     A row of the user's table replaces the row of the catalogue with the same name, and
-    takes its empty cells from it.
+    takes its empty cells from it. A warning counts drives without a cost.
 
     Args:
         table: CSV file with a column ``drive`` (design, map or catalogue name; paths
@@ -96,7 +97,12 @@ def read_options(
         raise InputError(
             f"--by {by}: no such column; {hint}accepted: {', '.join(accepted)}"
         )
-    options = []
+    options, free = [], [name for name, row in rows.items() if row.get(by) is None]
+    if free:
+        warnings.warn(
+            f"{len(free)} drives have no {by} and are not selected, such as {free[0]}",
+            stacklevel=2,
+        )
     for name, row in rows.items():
         cost = row.get(by)
         if cost is None:
