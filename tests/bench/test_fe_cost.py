@@ -20,7 +20,7 @@ from swgjoint.bench.fe.rows import cheapest
 from swgjoint.bench.fe.setting import POSITIONS, RIM, FeSetting, Found, rim_shape
 from swgjoint.bench.fe.solve import SettingTask, solve_in_process, solve_setting
 from swgjoint.bench.fe.stored import FILE, LONG, WITNESS, load_stored, to_store
-from swgjoint.cli.shared import bench_fe
+from swgjoint.cli.bench import fe_text
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design.design import Design
@@ -187,7 +187,7 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     told = result["stored"]
     assert told["drift"] == pytest.approx(0.01) and not told["of_this_code"]
     assert told["pace"] == pytest.approx(1.5)
-    assert "times measured on a machine 1.5 times as fast" in bench_fe.report(result)
+    assert "times measured on a machine 1.5 times as fast" in fe_text.report(result)
 
 
 def test_what_is_long_and_not_stored_is_left_out(solve):
@@ -209,7 +209,7 @@ def test_what_is_long_and_not_stored_is_left_out(solve):
     row = rows["refinement 0.5", stiffness]
     assert row["reference"] == "3d, refinement 1"
     assert row["error"] == pytest.approx(10.0)
-    assert f"{row['reference']}" in bench_fe.report(result).splitlines()[0]
+    assert f"{row['reference']}" in fe_text.report(result).splitlines()[0]
 
 
 def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
@@ -290,7 +290,7 @@ def test_the_kinematic_error_says_at_how_many_positions(solve):
     solve({setting.key: found(0.0)})
     result = run_fe_cost(design=CUP, settings=[setting])
     assert result["kinematic_error_positions"] == POSITIONS == 4
-    text = bench_fe.report(result)
+    text = fe_text.report(result)
     assert "kinematic error at 4 positions of a pitch, first harmonic" in text
     assert text.count("first harmonic") == 1
 

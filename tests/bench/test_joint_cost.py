@@ -18,8 +18,8 @@ from swgjoint.bench.joint.scenes import exact
 from swgjoint.bench.joint.splits import SPLITS, split
 from swgjoint.bench.stability.joint import Start, hardening_drive, make_joint
 from swgjoint.bench.stability.reference import reference
+from swgjoint.cli.bench import joint_text
 from swgjoint.cli.main import main
-from swgjoint.cli.shared import bench_joint
 from swgjoint.joint.step_damping import restore_damping
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.provenance import provenance
@@ -258,7 +258,7 @@ def test_bench_joint(monkeypatch, capsys, tmp_path, bench):
     }
     with (tmp_path / "bench-joint.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(result["rows"])
-    text = bench_joint.report(result)
+    text = joint_text.report(result)
     assert "full, DOP853" in text and "refused" in text
 
 

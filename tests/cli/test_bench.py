@@ -13,8 +13,8 @@ from swgjoint.bench.fe import cost as fe_cost
 from swgjoint.bench.fe.setting import FeSetting
 from swgjoint.bench.scaling import scaling
 from swgjoint.cli import bench
+from swgjoint.cli.bench import fe_text, scaling_text
 from swgjoint.cli.main import main
-from swgjoint.cli.shared import bench_fe, bench_scaling
 
 SMALL = small_cup()
 
@@ -46,7 +46,7 @@ def test_bench_fe(monkeypatch, capsys, tmp_path):
     names = {path.name for path in out.iterdir()}
     table = {f"bench-fe.{suffix}" for suffix in ("json", "csv", "png")}
     assert names == table | {"bench-fe-reference.json"}
-    text = bench_fe.report(result)
+    text = fe_text.report(result)
     assert "refinement 0.5" in text
     assert "torsional_stiffness_Nm_rad" in text
     assert "cheapest within" in text and "15 %" in text
@@ -105,4 +105,4 @@ def test_bench_scaling(monkeypatch, capsys, tmp_path):
     assert all(keys | {"outcome"} <= set(row) for row in result["rows"])
     assert {fit["sweep"] for fit in result["fits"]} == {"joints", "batch"}
     assert len(list(tmp_path.iterdir())) == 3
-    assert "size^" in bench_scaling.report(result)
+    assert "size^" in scaling_text.report(result)

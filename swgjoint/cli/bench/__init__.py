@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from swgjoint.cli.shared import bench_fe, bench_joint, bench_scaling
+from swgjoint.cli.bench import fe_text, joint_text, scaling_text
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
@@ -146,9 +146,9 @@ def report(result: dict[str, Any]) -> str:
 
 def _report_part(name: str, result: dict[str, Any]) -> str:
     if name == "fe":
-        return bench_fe.report(result)
+        return fe_text.report(result)
     if name == "joint":
-        return bench_joint.report(result)
+        return joint_text.report(result)
     if name == "scaling":
-        return bench_scaling.report(result)
+        return scaling_text.report(result)
     raise ValueError(f"part {name!r} has no report")
