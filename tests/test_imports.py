@@ -27,6 +27,7 @@ LEVELS = (
     ("view", "control"),
     ("envs",),
     ("explore", "bench", "validation"),
+    ("studio",),
     ("cli",),
 )
 """A part imports parts of earlier levels only, not those beside it."""
@@ -143,16 +144,17 @@ def test_scikit_fem_lives_in_fe_only():
 def test_heavy_parts_are_imported_when_used():
     """rerun, matplotlib and optional packages are imported inside functions only.
 
-    The environments are the one part that is made of such a package.
+    The environments and the studio are the parts that are made of such a package.
     """
     heavy = {"rerun", "matplotlib", "pyvista", "pinocchio", "casadi", "jinja2", "dask"}
-    heavy |= {"gymnasium", "cma", "optuna", "joblib", "distributed"}
+    heavy |= {"gymnasium", "cma", "optuna", "joblib", "distributed", "nicegui"}
     found = [
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in modules()
         for name, at_import in imports(path)
         if at_import and (package := name.split(".")[0]) in heavy
-        if (part_of(path), package) != ("envs", "gymnasium")
+        if (part_of(path), package)
+        not in {("envs", "gymnasium"), ("studio", "nicegui")}
     ]
     assert found == []
 

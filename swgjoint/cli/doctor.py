@@ -24,6 +24,7 @@ EXTRAS = {
     "cluster": ("dask", "distributed", "dask_jobqueue"),
     "tune": ("cma", "optuna"),
     "mkl": ("pypardiso",),
+    "studio": ("nicegui",),
 }
 """Modules that each optional extra needs, by name of the extra."""
 

@@ -51,6 +51,7 @@ COMMANDS = {
     "stability": "test the numerical stability of stiff and extreme joints",
     "list": "list the bundled drives, designs, arms and scenes",
     "schema": "list the keys of an input file with unit, range and default",
+    "studio": "design a drive and run an arm on a local web page",
     "view": "open a recording in the viewer",
     "doctor": "check versions, the MuJoCo plugin, the cache and optional parts",
 }

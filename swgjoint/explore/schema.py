@@ -192,7 +192,9 @@ def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
         ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of
         a list), ``of_kind`` (value of ``kind`` in the table of the key; None if the
         table has no kinds), ``type``, ``unit``, ``range``, ``default`` (None if there
-        is none), ``required``, ``meaning``, ``forms`` (schemas of the accepted types).
+        is none), ``required``, ``removable`` (whether the file may omit the key or
+        table without a default taking its place), ``meaning``, ``forms`` (schemas of
+        the accepted types).
     """
     return list(_keys(schema, schema, "", None))
 
@@ -214,6 +216,7 @@ def _keys(
             "range": " or ".join(dict.fromkeys(filter(None, map(_range, values)))),
             "default": default if not isinstance(default, Mapping) else None,
             "required": name in required,
+            "removable": len(values) < len(forms),
             "meaning": _meaning(name, entry, values, table),
             "forms": values,
         }

@@ -26,6 +26,25 @@ standard deviation of 0.07; the peak to peak of the samples was 0.77 times it.
 """
 
 
+def fit_orders(theta: Array, error: Array, design: Design) -> dict[float, float]:
+    """Amplitudes of the low orders, fitted by least squares as in :func:`peaks` [rad].
+
+    Args:
+        theta: Random input angles over one output turn [rad]. Shape (n,).
+        error: Transmission error at these angles [rad]. Shape (n,).
+        design: The drive.
+
+    Returns:
+        Amplitude by order [cycles per input turn].
+    """
+    n = np.array(ORDERS) @ np.array(angle_coefficients(design.drive.layout))
+    order = n @ np.array([1.0, 1.0 / design.ratio])
+    phases = np.outer(theta, order)
+    waves = np.hstack([np.ones((theta.size, 1)), np.cos(phases), np.sin(phases)])
+    weights = np.linalg.lstsq(waves, error, rcond=None)[0][1:].reshape(2, -1)
+    return dict(zip(np.abs(order).tolist(), np.hypot(*weights).tolist(), strict=True))
+
+
 def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
     """Peak to peak of the low orders over an output turn, and rms of the rest [rad].
 

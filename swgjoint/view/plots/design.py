@@ -49,6 +49,20 @@ def design_picture(design: Design) -> bytes:
     return png(figure, dpi=110)
 
 
+def teeth_picture(design: Design) -> bytes:
+    """Draw the teeth at a lobe, as in :func:`design_picture`, as PNG."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 3.2), layout="constrained")
+    ax = figure.subplots()
+    _mesh(ax, design)
+    ax.set_aspect("equal")
+    ax.set_xlabel("x [mm]")
+    ax.set_ylabel("y [mm]")
+    ax.set_title(_summary(design), fontsize="medium")
+    return png(figure, dpi=110)
+
+
 def _summary(design: Design) -> str:
     drive = design.drive
     profiles = [m.profile.kind for m in (design.flexspline, design.circular_spline)]

@@ -1,0 +1,1 @@
+"""Local web page on which a drive is designed and an arm is run."""

@@ -1,0 +1,125 @@
+"""Computations of the studio in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+
+from swgjoint.errors import ComputationError
+from swgjoint.studio.jobs import Job
+from swgjoint.studio.session import Session
+
+
+def add(a, b, *, progress):
+    progress("sum", 0, 1)
+    return a + b
+
+
+def fail(*, progress):
+    raise ComputationError("no equilibrium")
+
+
+def err(*, progress):
+    raise KeyError("oops")
+
+
+def die(*, progress):
+    os._exit(3)
+
+
+def hold(*, progress):
+    progress("hold", 0, 1)
+    time.sleep(600)
+
+
+def end(job, limit=60.0):
+    until = time.monotonic() + limit
+    while job.running:
+        job.poll()
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    return job
+
+
+def is_there(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.fixture(autouse=True)
+def reachable(monkeypatch):
+    """Processes find the functions of this file."""
+    import sys
+
+    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+
+
+def test_a_result_arrives():
+    """The result of the function, with its progress."""
+    assert end(Job(add, 1, 2)).result == 3
+
+
+@pytest.mark.parametrize(
+    ("function", "text"),
+    [(fail, "no equilibrium"), (err, "KeyError"), (die, "without a result")],
+)
+def test_a_failure_is_told(function, text):
+    """A failure, a bug and a killed process each leave a message and no result."""
+    job = end(Job(function))
+    assert text in job.fault and job.result is None
+
+
+def test_a_stopped_computation_ends():
+    """Its process is gone as soon as it is stopped."""
+    job = Job(hold)
+    assert is_there(job.pid)
+    job.cancel()
+    assert not is_there(job.pid) and not job.running
+
+
+@pytest.fixture
+def sessions():
+    found = Session(), Session()
+    yield found
+    for one in found:
+        one.close()
+
+
+def test_sessions_do_not_mix(sessions):
+    """Edits and folders belong to one session; closing one ends its work only."""
+    one, other = sessions
+    for session in sessions:
+        session.pages = 1
+    one.edit("flexspline.rim_mm", 1.5)
+    other.edit("flexspline.rim_mm", 0.8)
+    mine, others = ([job.pid for job in s.jobs.values()] for s in sessions)
+    assert mine and others and one.folder != other.folder
+    one.leave()
+    assert not any(map(is_there, mine)) and all(map(is_there, others))
+    assert one.current.draft["flexspline"]["rim_mm"] == 1.5
+    assert other.current.draft["flexspline"]["rim_mm"] == 0.8
+
+
+def test_a_new_edit_replaces_running_work(sessions):
+    """Only the last of several edits is computed."""
+    one, _ = sessions
+    one.edit("flexspline.rim_mm", 1.5)
+    first = [job.pid for job in one.jobs.values()]
+    one.edit("flexspline.rim_mm", 1.2)
+    assert not any(map(is_there, first)) and one.jobs
+
+
+def test_a_reload_keeps_the_work(sessions):
+    """While a page is built anew, the old one may leave without ending anything."""
+    one, _ = sessions
+    one.pages = 1
+    one.edit("flexspline.rim_mm", 1.5)
+    running = [job.pid for job in one.jobs.values()]
+    one.pages += 1
+    one.leave()
+    assert all(map(is_there, running))
