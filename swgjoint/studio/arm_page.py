@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 from typing import Any, get_args
+from urllib.parse import quote
 
 from nicegui import ui
 
 from swgjoint.drives.sections import Level
 from swgjoint.maps.from_catalogue import catalogue_names
 from swgjoint.models_path import bundled_names
-from swgjoint.studio.parts import Downloads, progress_bar, show_progress
+from swgjoint.studio.parts import Downloads, progress_bar, show_frame, show_progress
 from swgjoint.studio.session import THIS_DESIGN, Session
 from swgjoint.view.report.tables import ripple_cell
 from swgjoint.view.words import format_figure
@@ -34,10 +35,12 @@ class ArmPage:
     Args:
         session: State of the tab.
         tab: Identifier of the tab.
+        address: Address of the studio, which ends with a slash.
     """
 
-    def __init__(self, session: Session, tab: str) -> None:
+    def __init__(self, session: Session, tab: str, address: str) -> None:
         self._session = session
+        self._recording = f"{address}files/{tab}/run.rrd"
         self._choice: dict[str, str] = dict(session.chosen)
         self._drives: dict[str, str] | None = None
         self._metrics: dict[str, Any] | None = None
@@ -65,7 +68,7 @@ class ArmPage:
                 ui.label("drives").classes("text-weight-medium")
                 self._joints = ui.column().classes("w-full gap-1")
                 with ui.row().classes("items-center gap-2"):
-                    ui.button("run", on_click=self._run).props(
+                    ui.button("run", on_click=session.run).props(
                         "dense no-caps data-key=run"
                     )
                     ui.button("stop", on_click=lambda: session.stop("arm")).props(
@@ -103,6 +106,9 @@ class ArmPage:
                         .props("dense flat data-key=joints")
                         .classes("w-full")
                     )
+                self._play = ui.button("play the recording", on_click=self._show_viewer)
+                self._play.props("dense no-caps outline data-key=play")
+                self._viewer = ui.column().classes("w-full")
                 self._files = Downloads(tab)
 
     def update(self) -> None:
@@ -113,9 +119,10 @@ class ArmPage:
             self._build_joints()
         show_progress(self._bar, session.jobs, ("arm", "joints"))
         self._fault.text = session.arm_fault
-        self._card.visible = session.metrics is not None
+        self._card.visible = self._play.visible = session.metrics is not None
         if session.metrics is not self._metrics:
             self._metrics = session.metrics
+            self._viewer.clear()
             if self._metrics is not None:
                 self._show(self._metrics)
         self._files.show(session.arm_files, session.version)
@@ -141,8 +148,12 @@ class ArmPage:
         if event.value:
             self._session.chosen[joint] = event.value
 
-    def _run(self) -> None:
-        self._session.run()
+    def _show_viewer(self) -> None:
+        """Show the recording of the last run in the rerun viewer."""
+        self._viewer.clear()
+        url = quote(f"{self._recording}?v={self._session.version}", safe="")
+        with self._viewer:
+            show_frame(f"/viewer/?url={url}")
 
     def _show(self, metrics: dict[str, Any]) -> None:
         self._verdict.text = "\n".join([metrics["verdict"], *metrics["reasons"]])

@@ -56,6 +56,13 @@ def show_progress(
     label.text = f"⏳ {running[0].stage or 'computing'}" if running else ""
 
 
+def show_frame(address: str) -> None:
+    """Show another page inside this one."""
+    ui.element("iframe").props(f'src="{address}"').style(
+        "width:100%; height:75vh; border:1px solid #ddd; background:white"
+    )
+
+
 class Downloads:
     """Links to result files, and the first of them, a page, in a frame.
 
@@ -88,6 +95,4 @@ class Downloads:
                         f"download={name}"
                     )
             address = f"/files/{self._tab}/{files[0]}?v={version}"
-            ui.element("iframe").props(f'src="{address}"').style(
-                "width:100%; height:75vh; border:1px solid #ddd; background:white"
-            )
+            show_frame(address)

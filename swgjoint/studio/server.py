@@ -12,6 +12,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from swgjoint.studio.arm_page import ArmPage
 from swgjoint.studio.drive_page import DrivePage
+from swgjoint.studio.recording import end_viewer, viewer_file
 from swgjoint.studio.session import Session
 from swgjoint.view.recording.viewer import LOOPBACK
 
@@ -45,6 +46,8 @@ def serve_studio(port: int, *, show: bool) -> None:
     """
     ui.page("/", title="swgjoint studio")(_page)
     app.get("/files/{tab}/{name}")(_file)
+    app.get("/viewer/")(viewer_file)
+    app.get("/viewer/{name}")(viewer_file)
     app.on_shutdown(_end)
     # a name that resolves to this machine must not open the page to other sites
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[LOOPBACK, "localhost"])
@@ -90,7 +93,7 @@ async def _page() -> None:
         with ui.tab_panel("Drive").classes("q-pa-none"):
             drive_page = DrivePage(session, tab)
         with ui.tab_panel("Arm").classes("q-pa-none"):
-            arm_page = ArmPage(session, tab)
+            arm_page = ArmPage(session, tab, str(client.request.base_url))
     seen = -1
 
     def poll() -> None:
@@ -117,3 +120,4 @@ def _file(tab: str, name: str) -> FileResponse:
 def _end(*_: Any) -> None:
     for session in SESSIONS.values():
         session.close()
+    end_viewer()

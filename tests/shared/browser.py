@@ -66,7 +66,7 @@ class Page:
         self._socket = self._open.enter_context(
             connect(tab["webSocketDebuggerUrl"], max_size=None, ping_interval=None)
         )
-        self.requests, self.errors = [], []
+        self._urls, self.errors = {}, []
         for part in ("Network", "Page", "Runtime"):
             self.command(f"{part}.enable")
         self.command("Page.navigate", url=url)
@@ -85,11 +85,21 @@ class Page:
     def _receive(self):
         """Next message, a reply or an event."""
         message = json.loads(self._socket.recv(timeout=60))
-        if message.get("method") == "Network.requestWillBeSent":
-            self.requests.append(message["params"]["request"]["url"])
-        if message.get("method") == "Runtime.exceptionThrown":
-            self.errors.append(message["params"]["exceptionDetails"])
+        content = message.get("params", {})
+        match message.get("method"):
+            case "Network.requestWillBeSent":
+                self._urls[content["requestId"]] = content["request"]["url"]
+            case "Network.loadingFailed" if content.get("blockedReason"):
+                self._urls.pop(content["requestId"], None)
+            case "Runtime.exceptionThrown":
+                self.errors.append(content["exceptionDetails"])
         return message
+
+    @property
+    def requests(self):
+        """Addresses that the page has asked for, without those that it must not ask."""
+        self.value("0")  # takes in what has happened
+        return list(self._urls.values())
 
     def reload(self):
         """Load the page again."""
