@@ -66,7 +66,7 @@ class Page:
         self._socket = self._open.enter_context(
             connect(tab["webSocketDebuggerUrl"], max_size=None, ping_interval=None)
         )
-        self._urls, self.errors = {}, []
+        self._urls, self._loads, self.errors = {}, 0, []
         for part in ("Network", "Page", "Runtime"):
             self.command(f"{part}.enable")
         self.command("Page.navigate", url=url)
@@ -91,6 +91,8 @@ class Page:
                 self._urls[content["requestId"]] = content["request"]["url"]
             case "Network.loadingFailed" if content.get("blockedReason"):
                 self._urls.pop(content["requestId"], None)
+            case "Page.loadEventFired":
+                self._loads += 1
             case "Runtime.exceptionThrown":
                 self.errors.append(content["exceptionDetails"])
         return message
@@ -104,9 +106,10 @@ class Page:
     def reload(self):
         """Load the page again."""
         self.command("Page.bringToFront")  # a page in the back has slow timers
+        before = self._loads
         self.command("Page.reload")
-        while self._receive().get("method") != "Page.loadEventFired":
-            pass
+        while self._loads == before:  # the event may come before the reply
+            self._receive()
 
     def value(self, script):
         """Value of a JavaScript expression."""

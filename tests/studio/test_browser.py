@@ -86,11 +86,13 @@ def open_page(server, chromium):
         return opened[-1]
 
     yield open_one
+    urls = [url for page in opened for url in page.requests]
+    errors = [error for page in opened for error in page.errors]
     for page in opened:
-        hosts = {url.split("/")[2] for url in page.requests if url.startswith("http")}
-        assert hosts == {server[0].split("/")[2]}  # nothing leaves the machine
-        assert page.errors == []
         page.close()
+    hosts = {url.split("/")[2] for url in urls if url.startswith("http")}
+    assert hosts == {server[0].split("/")[2]}  # nothing leaves the machine
+    assert errors == []
 
 
 @pytest.fixture
@@ -340,7 +342,7 @@ def test_fifty_random_edits_without_an_exception(page):
     assert figures(page)["K1 [N·m/rad]"] == ["903,500"]
 
 
-def test_closing_the_page_ends_its_work(server, open_page, chromium):
+def test_closing_the_page_ends_its_work(server, chromium):
     """The processes that compute for a tab end soon after it is closed."""
     _, process = server
     page = chromium.open(server[0])
