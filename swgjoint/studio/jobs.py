@@ -80,6 +80,20 @@ class Job:
         self._process.join()
 
 
+def start_server() -> None:
+    """Load the computations once, so that the first one need not wait for it.
+
+    The first start of a process waits for that, in which time a page gets no answer.
+    """
+    process = _context().Process(target=_do_nothing)
+    process.start()
+    process.join()
+
+
+def _do_nothing() -> None:
+    pass
+
+
 def _work(
     pipe: Connection, function: Callable[..., Any], args: tuple[Any, ...]
 ) -> None:

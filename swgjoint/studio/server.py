@@ -12,6 +12,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from swgjoint.studio.arm_page import ArmPage
 from swgjoint.studio.drive_page import DrivePage
+from swgjoint.studio.jobs import start_server
 from swgjoint.studio.recording import end_viewer, viewer_file
 from swgjoint.studio.session import Session
 from swgjoint.view.recording.viewer import LOOPBACK
@@ -44,6 +45,7 @@ def serve_studio(port: int, *, show: bool) -> None:
         port: Port on the loopback interface.
         show: Whether to open the page in the browser.
     """
+    start_server()
     ui.page("/", title="swgjoint studio")(_page)
     app.get("/files/{tab}/{name}")(_file)
     app.get("/viewer/")(viewer_file)
