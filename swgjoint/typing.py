@@ -11,3 +11,5 @@ Mask = NDArray[np.bool_]
 """Array of bools."""
 Index = NDArray[np.int64]
 """Array of int64 indices."""
+Complex = NDArray[np.complex128]
+"""Array of complex128 numbers."""

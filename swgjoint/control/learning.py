@@ -50,15 +50,11 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.sim.controller import Controller, Measured, Task
-from swgjoint.typing import Array
-
-Complex = NDArray[np.complex128]
-"""Array of complex coefficients."""
+from swgjoint.typing import Array, Complex
 
 LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))
 """Default orders (p, q): 2 and 4 cycles per turn of the wave generator relative to

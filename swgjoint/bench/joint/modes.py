@@ -24,9 +24,7 @@ from swgjoint.joint.step_damping import restore_damping
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.equilibrium import set_start
-from swgjoint.typing import Array
-
-Complex = NDArray[np.complex128]
+from swgjoint.typing import Array, Complex
 
 EXACT_STEP = 1e-5
 """Time step at which RK4 gives the modes of the model without numerical damping [s].

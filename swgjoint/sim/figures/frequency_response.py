@@ -16,15 +16,12 @@ from math import pi, sqrt
 import mujoco
 import mujoco.rollout
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.typing import Array
-
-Complex = NDArray[np.complex128]
+from swgjoint.typing import Array, Complex
 
 JOINT = "joint"
 """Name of the link joint in the model."""
