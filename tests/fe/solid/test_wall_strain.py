@@ -1,0 +1,99 @@
+"""Strain of cups and rings by finite elements, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.solid.figures.wall_strain import (
+    HarmonicResponse,
+    finite_element_strain,
+)
+from swgjoint.fe.solid.strip.mesh import flexspline_strip
+from swgjoint.fe.solid.strip.smooth_strip import smooth_strip
+from swgjoint.fe.solid.strip.strip import flexspline
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.gauges import FlexsplineWall, GaugeRing
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
+
+pytestmark = pytest.mark.fe
+DESIGN = Design.load("reference-3d").with_changes({"mesh.refinement": 0.5})
+MIDDLE = 0.0245
+"""Between the boundary layers at the diaphragm and at the teeth [m]."""
+
+
+def condensed(design, mesh):
+    """One sector, with teeth or without."""
+    return flexspline(design, tooth_profile(design, "flexspline"), mesh)
+
+
+@pytest.fixture(scope="module")
+def wall():
+    """Closed form."""
+    return FlexsplineWall.from_design(DESIGN)
+
+
+@pytest.fixture(scope="module")
+def toothed():
+    """The strip of a cup with teeth."""
+    mesh = flexspline_strip(DESIGN, tooth_profile(DESIGN, "flexspline"))
+    return condensed(DESIGN, mesh)
+
+
+def solved(strip, wall, place, count=1):
+    """The first orders of the strain."""
+    return finite_element_strain(
+        strip,
+        DESIGN.material_of("flexspline"),
+        place,
+        orders=wall.orders[:count],
+        deflection=wall.deflection[:count],
+    )
+
+
+def test_pure_torsion_is_that_of_a_round_tube(wall):
+    """The cup without teeth, all along its wall: within 0.3 % of r_o/(G J)."""
+    strip = condensed(DESIGN, smooth_strip(DESIGN))
+    for place in np.linspace(0.006, 0.038, 5):
+        found = solved(strip, wall, place)
+        assert found.torsion == pytest.approx(wall.torsion_strain(), rel=3e-3)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_ovalised_ring_bends_as_an_inextensional_one(order):
+    """A narrow ring without teeth: hoop strain (n^2 - 1) t w/(2 r^2) within 2 %."""
+    ring = DESIGN.with_changes({"cup": None, "drive.face_width_mm": 2.0})
+    strip = condensed(ring, smooth_strip(ring))
+    response = HarmonicResponse(strip, ring.material_of("flexspline"))
+    hoop, axial, shear = response.deflect(order, 0.001)
+    rim, poisson = 1e-3, 0.29
+    radius = ring.flexspline_inner_radius + 0.5 * rim
+    theory = (order**2 - 1) * 0.5 * rim / radius**2
+    assert hoop == pytest.approx(theory, rel=0.02)
+    assert axial == pytest.approx(-poisson * theory, rel=0.03)
+    assert abs(shear) < 1e-3 * theory
+
+
+def test_wall_of_a_toothed_cup_reads_the_closed_form(toothed, wall):
+    """Mid-wall: torsion 0.2 %, shear of two lobes 2 % and of four 5 %, hoop 6 %.
+
+    The closed form has no teeth, which stiffen the rim, and no bending of the
+    diaphragm. Nearer to both, the shear of two lobes differs by up to 5 %.
+    """
+    found, theory = solved(toothed, wall, MIDDLE, 2), wall.strain(MIDDLE)
+    assert found.torsion == pytest.approx(theory.torsion, rel=2e-3)
+    assert found.shear[0] == pytest.approx(theory.shear[0], rel=0.02)
+    assert found.shear[1] == pytest.approx(theory.shear[1], rel=0.05)
+    assert found.hoop == pytest.approx(theory.hoop[:2], rel=0.06)
+    assert np.abs(found.axial).max() < 0.06 * np.abs(theory.hoop).max()
+    for place in (0.01, 0.035):
+        near = solved(toothed, wall, place, 1).shear
+        assert near == pytest.approx(wall.strain(place).shear[:1], rel=0.05)
+
+
+def test_bridges_read_the_finite_elements_alike(toothed, wall):
+    """One bridge with turned gauges: gain 0.2 %, ripple of two lobes 2 %."""
+    ring = GaugeRing(place=MIDDLE, turns=(0.05,))
+    found, theory = solved(toothed, wall, MIDDLE), wall.strain(MIDDLE)
+    assert ring.gain(found) == pytest.approx(ring.gain(theory), rel=2e-3)
+    assert ring.ripple(found)[0] == pytest.approx(ring.ripple(theory)[0], rel=0.02)
