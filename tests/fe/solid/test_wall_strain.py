@@ -91,6 +91,23 @@ def test_wall_of_a_toothed_cup_reads_the_closed_form(toothed, wall):
         assert near == pytest.approx(wall.strain(place).shear[:1], rel=0.05)
 
 
+def test_tooth_forces_that_follow_the_lobes_fade_in_the_wall(toothed, wall):
+    """Mid-wall, orders 2 to 6 leave 4 % of the shear that they have at the teeth.
+
+    Order zero is the torque itself. At the last place before the teeth more is left.
+    """
+    response = HarmonicResponse(toothed, DESIGN.material_of("flexspline"))
+    torsion = wall.torsion_strain()
+    assert response.twist(MIDDLE, 0)[2] == pytest.approx(torsion, rel=2e-3)
+    for order in (2, 4, 6):
+        left, near = (
+            np.abs(response.twist(place, order)[2]) / torsion
+            for place in (MIDDLE, 0.0385)
+        )
+        assert 0.02 < left < 0.04
+        assert near > 1.5 * left
+
+
 def test_bridges_read_the_finite_elements_alike(toothed, wall):
     """One bridge with turned gauges: gain 0.2 %, ripple of two lobes 2 %."""
     ring = GaugeRing(place=MIDDLE, turns=(0.05,))

@@ -51,7 +51,7 @@ def finite_element_strain(
         deflection: Complex amplitudes w_n (m,) [m].
     """
     response = HarmonicResponse(strip, material)
-    torsion = response.twist(place)[2]
+    torsion = response.twist(place)[2].real
     columns = np.array([response.deflect(int(n), place) for n in orders])
     hoop, axial, shear = columns.T * deflection
     return WallStrain(
@@ -91,18 +91,24 @@ class HarmonicResponse:
         self.radius = float(np.hypot(x, y).max())
         self.out = away / self.radius
 
-    def twist(self, place: float) -> Array:
-        """Circumferential, axial and shear strain per torque (3,) [1/(N·m)].
+    def twist(self, place: float, order: int = 0) -> Complex:
+        """Complex amplitudes of the three strains per torque (3,) [1/(N·m)].
+
+        The tangential forces of an order n vary as cos n phi around the flexspline, as
+        tooth forces do that follow the lobes, with the amplitude of the forces of the
+        torque. The wave generator holds the radial deflection of this order.
 
         Args:
             place: Distance of the section from the outside of the closed end [m].
+            order: Order n around the flexspline; 0 for a torque.
         """
-        out = self.share[:, None] * self.out
-        side = np.stack([-out[:, 1], out[:, 0], out[:, 2]], axis=-1)
-        force = side.ravel()
-        moved, _ = self._solve(0, force)
-        torque = self.strip.sectors * self.radius
-        return np.asarray(self._strain(moved, 0, place, force).real / torque)
+        out, side = self._forces(order)
+        around, moved_by_side = self._solve(order, side)
+        away, moved_by_out = self._solve(order, out)
+        hold = self._deflection(order, moved_by_side)
+        hold /= self._deflection(order, moved_by_out)
+        strain = self._strain(around - hold * away, order, place, side - hold * out)
+        return np.asarray(strain / (self.strip.sectors * self.radius))
 
     def deflect(self, order: int, place: float) -> Complex:
         """Complex amplitudes of the three strains per deflection (3,) [1/m].
@@ -111,13 +117,24 @@ class HarmonicResponse:
             order: Order n around the flexspline.
             place: Distance of the section from the outside of the closed end [m].
         """
-        phase = np.exp(1j * order * self.angle)
-        force = ((self.share * phase)[:, None] * self.out).ravel()
-        moved, bore = self._solve(order, force)
-        radial = np.sum(bore.reshape(-1, 3) * self.out, axis=1) @ (self.share / phase)
-        return np.asarray(self._strain(moved, order, place, force) / radial)
+        out, _ = self._forces(order)
+        away, bore = self._solve(order, out)
+        strain = self._strain(away, order, place, out)
+        return np.asarray(strain / self._deflection(order, bore))
 
-    def _solve(self, order: int, force: Array | Complex) -> tuple[Complex, Complex]:
+    def _forces(self, order: int) -> tuple[Complex, Complex]:
+        """Radial and tangential forces on the bore of a sector that sum to one."""
+        phase = self.share * np.exp(1j * order * self.angle)
+        out = phase[:, None] * self.out
+        side = np.stack([-out[:, 1], out[:, 0], out[:, 2]], axis=-1)
+        return out.ravel(), side.ravel()
+
+    def _deflection(self, order: int, bore: Complex) -> complex:
+        """Radial deflection of the loaded bore, referred to the angle zero."""
+        radial = np.sum(bore.reshape(-1, 3) * self.out, axis=1)
+        return complex(radial @ (self.share * np.exp(-1j * order * self.angle)))
+
+    def _solve(self, order: int, force: Complex) -> tuple[Complex, Complex]:
         """Displacements of masters and bore nodes under forces on the bore [m]."""
         strip, teeth = self.strip, self.strip.teeth
         face = 3 * strip.masters.face_size
@@ -139,9 +156,7 @@ class HarmonicResponse:
         bore = teeth.loaded_from_masters[flank:] @ u[_dofs(teeth.masters)]
         return u, bore + teeth.compliance[flank:, flank:] @ force
 
-    def _strain(
-        self, u: Complex, order: int, place: float, force: Array | Complex
-    ) -> Complex:
+    def _strain(self, u: Complex, order: int, place: float, force: Complex) -> Complex:
         """Hoop, axial and shear strain at the outside, referred to the angle zero."""
         segments = self.strip.segments
         closed = max(float(s.mesh.mesh.p[2].max()) for s in segments)
