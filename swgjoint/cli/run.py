@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from swgjoint.cli.shared.arm_arguments import add_arm_arguments, choice_lines, scene_of
-from swgjoint.cli.shared.life_text import bearing_lines, life_lines
+from swgjoint.cli.shared.life_text import bearing_lines, gauge_lines, life_lines
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
@@ -172,6 +172,7 @@ def report(result: dict[str, Any]) -> str:
         tool_line(result["tool"], random="sensors" in contains),
         *life_lines(result),
         *bearing_lines(result),
+        *gauge_lines(result),
         *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
         f"model: degrees of freedom: {contains['degrees_of_freedom']}, tendons:"
         f" {contains['tendons']}, plugin instances: {contains['plugin_instances']};"

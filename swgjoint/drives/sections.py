@@ -11,8 +11,9 @@ from pydantic import Field, model_validator
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, shorten
 from swgjoint.gear.bearing.output_bearing import OutputBearing, catalogue_bearing
+from swgjoint.gear.gauges import GaugeRing
 from swgjoint.maps.fit.error_spectrum import LARGEST
-from swgjoint.units import arcmin, mm
+from swgjoint.units import arcmin, deg, mm
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
@@ -233,6 +234,63 @@ class OutputBearingSection(Section):
         )
 
 
+class GaugesSection(Section):
+    """Full bridges of strain gauges around the wall behind the teeth of a flexspline.
+
+    They read the torque, and the shear of the wall that turns with the wave generator.
+    """
+
+    flexspline: str | None = None
+    """Design with a cup that states the geometry (path or bundled name); by default
+    ``drive``, which must then be such a design. Its ratio and layout must be those of
+    the drive."""
+    position_mm: Positive
+    """Distance of the gauges from the outside of the closed end [mm]."""
+    bridges: Annotated[int, Field(ge=1, le=100)] = 1
+    """Number of bridges, whose mean is the reading."""
+    spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    """Angle between neighbouring bridges [deg]; by default they are distributed around
+    the full turn. The first one is below a lobe at input and output angle zero."""
+    gauge_angle_deg: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    """Angle of the gauges to the generator of the wall [deg]; two are at plus, two at
+    minus this angle."""
+    gauge_factor: Annotated[float, Field(gt=0, le=1000)] = 2.0
+    """Relative change of resistance per strain [-]."""
+    place_errors_deg: list[Annotated[float, Field(ge=-180, le=180)]] = Field(
+        default_factory=list
+    )
+    """Errors of the bridges' angles around the flexspline [deg], one per bridge; by
+    default none."""
+    turn_errors_deg: list[Annotated[float, Field(ge=-45, le=45)]] = Field(
+        default_factory=list
+    )
+    """Angles by which the bridges are turned on the wall [deg], one per bridge; by
+    default none."""
+
+    @model_validator(mode="after")
+    def _one_error_each(self) -> Self:
+        faults = [
+            (key, f"{len(errors)} values; accepted: {self.bridges}, one per bridge")
+            for key in ("place_errors_deg", "turn_errors_deg")
+            if (errors := getattr(self, key)) and len(errors) != self.bridges
+        ]
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    def ring(self) -> GaugeRing:
+        """The bridges in SI units."""
+        return GaugeRing(
+            place=self.position_mm * mm,
+            bridges=self.bridges,
+            spacing=None if self.spacing_deg is None else self.spacing_deg * deg,
+            angle=self.gauge_angle_deg * deg,
+            gauge_factor=self.gauge_factor,
+            shifts=tuple(error * deg for error in self.place_errors_deg),
+            turns=tuple(error * deg for error in self.turn_errors_deg),
+        )
+
+
 class JointSection(Section):
     """Drive of one joint; absent keys take their values from ``[defaults]``."""
 
@@ -286,6 +344,9 @@ class JointSection(Section):
     """Rated life and fatigue strength, for the life over the duty cycle."""
     output_bearing: OutputBearingSection | None = None
     """Bearing that lets the link tilt; by default the joint is a rigid hinge."""
+    gauges: GaugesSection | None = None
+    """Strain gauges on the flexspline, whose reading of the torque is recorded; by
+    default there are none. They do not affect the motion."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

@@ -348,8 +348,9 @@ def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
     if scene.disturbance:
         raise InputError(f"{where} has disturbances; accepted: none")
     sections = [scene.joint_settings(name) for name in arm.joints]
-    if any(section.output_bearing is not None for section in sections):
-        raise InputError(f"{where} has an output_bearing; accepted: none")
+    for key in ("output_bearing", "gauges"):
+        if any(getattr(section, key) is not None for section in sections):
+            raise InputError(f"{where} has {key}; accepted: none")
     if arm.tool < 0:
         raise InputError(
             f"{where}: the arm has no tool site; accepted: an arm with a tool site,"

@@ -39,6 +39,7 @@ from swgjoint.sim.assembly_steps import (
 )
 from swgjoint.sim.control import feedforward
 from swgjoint.sim.figures.transmission import Transmission, transmission_of
+from swgjoint.sim.gauges import JointGauges, joint_gauges
 from swgjoint.sim.motion.commanded import check_motion, trajectory_of
 from swgjoint.sim.motion.start_check import check_link, check_ranges
 from swgjoint.sim.motion.trajectory import Trajectory
@@ -102,6 +103,8 @@ class Assembly:
     """Addresses of the motor speeds in qvel, -1 without a rotor. Shape (n_joints,)."""
     bearings: dict[str, OutputBearing]
     """Output bearings that tilt, by joint."""
+    gauges: dict[str, JointGauges]
+    """Strain gauges on the flexsplines, by joint."""
     tilt_position: NDArray[np.intp]
     """Addresses of the tilt angles in qpos, two for each bearing. Shape (n_tilts,)."""
     tilt_velocity: NDArray[np.intp]
@@ -251,6 +254,7 @@ def assemble(
         prescribed_rate=prescribed_rate,
         controlled_by=controlled_by,
         bearings=bearings,
+        gauges=joint_gauges(scene.where, sections, transmissions),
         **engine_addresses(model, arm.joints, transmissions, tuple(bearings)),
     )
 

@@ -99,6 +99,22 @@ class Run:
         """Loads of the duty cycle or, without one, of the motion of this run."""
         return self.cycle or (motion_loads(self),)
 
+    def gauge_torque(self, j: int) -> Array | None:
+        """Torque that the strain gauges of a joint read [N·m]; None without gauges.
+
+        Args:
+            j: Index of the joint.
+
+        Returns:
+            Readings. Shape (n,).
+        """
+        gauges = self.assembly.gauges.get(self.joints[j])
+        if gauges is None:
+            return None
+        return gauges.read_torque(
+            self.output_torque[:, j], self.motor_position[:, j], self.position[:, j]
+        )
+
     def tool_error(self, other: Run | None = None) -> Array:
         """Distance between the tool and a reference at every instant [m]. Shape (n,).
 

@@ -1,4 +1,4 @@
-"""Life over the duty cycle and output bearings in terminal output."""
+"""Life over the duty cycle, output bearings and strain gauges in terminal output."""
 
 from __future__ import annotations
 
@@ -21,6 +21,22 @@ def bearing_lines(result: dict[str, Any]) -> list[str]:
     names, units = zip(*BEARING_COLUMNS, strict=True)
     rows = bearing_grid(joints)
     return [table([units, *rows], header=names), *bearing_notes(joints)]
+
+
+def gauge_lines(result: dict[str, Any]) -> list[str]:
+    """Format the readings of all strain gauges; empty without any.
+
+    Args:
+        result: Figures of a run.
+    """
+    joints = result["joints"]
+    if not any("gauges" in joint for joint in joints.values()):
+        return []
+    from swgjoint.view.gauges import GAUGE_COLUMNS, gauge_grid, gauge_notes
+
+    names, units = zip(*GAUGE_COLUMNS, strict=True)
+    rows = gauge_grid(joints)
+    return [table([units, *rows], header=names), *gauge_notes(joints)]
 
 
 def life_lines(result: dict[str, Any]) -> list[str]:

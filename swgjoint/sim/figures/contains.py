@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 
 OFF_DAMPING = 0.02
 """Increase of the damping ratio by the time steps from which it is reported [-]."""
+GAUGES_LEFT_OUT = (
+    "toothed rim, bending of the diaphragm, shear of the tooth forces that follows the"
+    " lobes, length and noise of the gauges"
+)
+"""Effects that readings of strain gauges do not contain."""
 _LOSSY = ("native", "full")
 _ERRING = ("kinematic", "full")
 _LEFT_OUT = {
@@ -86,6 +91,15 @@ def _features(assembly: Assembly) -> dict[str, Any]:
                 "source": one.source,
             }
             for name, one in assembly.bearings.items()
+        }
+    if assembly.gauges:
+        features["gauges"] = {
+            name: {
+                "flexspline": one.design,
+                "bridges": one.ring.bridges,
+                "left_out": GAUGES_LEFT_OUT,
+            }
+            for name, one in assembly.gauges.items()
         }
     if scene.payload is not None:
         features["payload"] = scene.payload.model_dump()

@@ -29,6 +29,7 @@ from swgjoint.sim.figures.ripple_validity import (
 )
 from swgjoint.sim.figures.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.figures.verdict import PHASE_STEP, judge_run
+from swgjoint.sim.gauges import gauge_figures
 from swgjoint.sim.life.figures import cycle_figures, life_figures
 from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg, mm
@@ -132,7 +133,24 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
             if run.joints[j] in run.assembly.bearings
             else {}
         ),
+        **_gauges(run, j, rated),
         **({} if untold is None else {"missing": {"orders": untold}}),
+    }
+
+
+def _gauges(run: Run, j: int, rated: float) -> dict[str, Any]:
+    """Figures of the strain gauges of one joint; empty without any."""
+    reading = run.gauge_torque(j)
+    if reading is None:
+        return {}
+    torque = run.output_torque[run.steady, j]
+    return {
+        "gauges": gauge_figures(
+            run.assembly.gauges[run.joints[j]],
+            torque=torque,
+            reading=reading[run.steady],
+            rated=rated,
+        )
     }
 
 

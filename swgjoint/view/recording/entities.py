@@ -15,6 +15,7 @@ If a recording contains several runs, ``<run>/`` precedes these entity paths:
   ``transmission_error_arcmin``        output minus ideal output
   ``position_deg``                     link angle
   ``reference_deg``                    commanded link angle
+  ``gauge_torque_Nm``                  torque that strain gauges read, if there are any
 ``joint/<joint>/ripple_orders``        ripple amplitude over order per input turn,
                                        static
 ``tool/error_mm``                      distance from the commanded path, or from the
@@ -85,6 +86,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
     Returns:
         Arrays of shape (n_samples,).
     """
+    reading = run.gauge_torque(j)
     return {
         "output_torque_Nm": run.output_torque[part, j],
         "torque_deviation_Nm": torque_deviation(run, j, part),
@@ -93,6 +95,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
         "transmission_error_arcmin": run.transmission_error[part, j] / arcmin,
         "position_deg": run.position[part, j] / deg,
         "reference_deg": run.reference[part, j] / deg,
+        **({} if reading is None else {"gauge_torque_Nm": reading[part]}),
     }
 
 

@@ -12,6 +12,7 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
 from swgjoint.toml_text import toml_text
+from swgjoint.view.gauges import gauge_picture, gauge_tables
 from swgjoint.view.life.picture import life_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
 from swgjoint.view.report.life import bearing_tables, life_tables
@@ -102,13 +103,18 @@ def write_report(
         description=scene.description,
         alerts=alerts(runs),
         summary=summary or summary_table(runs),
-        tables=[*life_tables(runs), *bearing_tables(runs)],
+        tables=[*life_tables(runs), *bearing_tables(runs), *gauge_tables(runs)],
         pictures={
             **(pictures or {}),
             **{
                 f"Duty cycle of {label}": life_picture(run)
                 for label, run in runs.items()
                 if run.cycle
+            },
+            **{
+                f"Strain gauges of {label}": gauge_picture(run)
+                for label, run in runs.items()
+                if run.assembly.gauges
             },
         },
         labels=labels,

@@ -1,0 +1,213 @@
+"""Strain gauges of a scene's joints: what they read of a recorded or simulated motion.
+
+The reading needs the geometry of the flexspline. It comes from a design with a cup:
+that of the drive, or one that the scene names. A catalogue drive does not state it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swgjoint.drives.references import names_catalogue
+from swgjoint.drives.sections import GaugesSection, JointSection
+from swgjoint.errors import InputError
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.gauges import FlexsplineWall, GaugeRing, WallStrain, torque_in_wall
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.figures.transmission import Transmission
+from swgjoint.typing import Array
+from swgjoint.units import mm
+
+COMPARED = (1, 2, 3, 5)
+"""Numbers of bridges of which the figures state what they would leave."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointGauges:
+    """Gauges on the flexspline of one drive, with the strain that they see."""
+
+    ring: GaugeRing
+    """The bridges."""
+    strain: WallStrain
+    """Strain in their section."""
+    layout: str
+    """Which member of the drive is fixed."""
+    ratio: float
+    """Signed ratio i [-]."""
+    design: str
+    """Name of the design that provides the geometry."""
+
+    @property
+    def share(self) -> float:
+        """Torque in the wall per output torque [-]."""
+        return torque_in_wall(self.layout, self.ratio)
+
+    @property
+    def gain(self) -> float:
+        """Signal per supply voltage and output torque [1/(N·m)]."""
+        return self.share * self.ring.gain(self.strain)
+
+    @property
+    def nominal_gain(self) -> float:
+        """The same of gauges without errors, by which readings are scaled [1/(N·m)]."""
+        return self.share * self.ring.nominal_gain(self.strain)
+
+    @property
+    def orders(self) -> Array:
+        """Orders of the ripple per input turn while the torsion is constant (m,)."""
+        theta, psi = angle_coefficients(self.layout)[1]
+        return np.asarray(self.strain.orders * abs(theta + psi / self.ratio))
+
+    @property
+    def ripple(self) -> Array:
+        """Amplitudes of the ripple by order, as output torque (m,) [N·m]."""
+        return np.asarray(np.abs(self.ring.ripple(self.strain) / self.nominal_gain))
+
+    def read_torque(self, torque: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
+        """Output torque that the gauges read (n,) [N·m].
+
+        Args:
+            torque: Output torque (n,) [N·m].
+            theta: Input angle (n,) [rad].
+            psi: Output angle (n,) [rad].
+        """
+        a, b = angle_coefficients(self.layout)[1]
+        beta = a * np.asarray(theta) + b * np.asarray(psi)
+        in_wall = self.share * np.asarray(torque)
+        return self.ring.signal(self.strain, in_wall, beta) / self.nominal_gain
+
+
+def with_bridges(gauges: JointGauges, count: int) -> JointGauges:
+    """Other gauges in the same place: exact bridges at equal distances.
+
+    Args:
+        gauges: The gauges.
+        count: Number of bridges.
+    """
+    ring = replace(gauges.ring, bridges=count, spacing=None, shifts=(), turns=())
+    return replace(gauges, ring=ring)
+
+
+def joint_gauges(
+    where: str,
+    sections: Sequence[JointSection],
+    transmissions: Sequence[Transmission],
+) -> dict[str, JointGauges]:
+    """Gauges by joint, for the joints that have any.
+
+    Args:
+        where: File name for messages.
+        sections: Joint settings, one per joint.
+        transmissions: Compiled drives, one per joint.
+
+    Raises:
+        InputError: If the geometry of a flexspline is not known or does not fit.
+    """
+    return {
+        t.joint: _checked_gauges(
+            section, section.gauges, t.drive, where=f"{where}: joints.{t.joint}.gauges"
+        )
+        for section, t in zip(sections, transmissions, strict=True)
+        if section.gauges is not None
+    }
+
+
+def _checked_gauges(
+    joint: JointSection, section: GaugesSection, drive: DriveMap, *, where: str
+) -> JointGauges:
+    design = _flexspline_design(joint, section, where=where)
+    if (design.ratio, design.drive.layout) != (drive.ratio, drive.layout):
+        raise InputError(
+            f"{where}.flexspline: {design.drive.name!r} has the ratio"
+            f" {design.ratio:g} ({design.drive.layout}), the drive {drive.ratio:g}"
+            f" ({drive.layout}); accepted: a design of the same ratio and layout"
+        )
+    try:
+        wall = FlexsplineWall.from_design(design)
+    except InputError as error:
+        raise InputError(f"{where}.flexspline: {error}") from None
+    low, high = wall.smooth
+    ring = section.ring()
+    if not low <= ring.place <= high:
+        raise InputError(
+            f"{where}.position_mm = {section.position_mm:g} mm; accepted:"
+            f" {low / mm:.4g} to {high / mm:.4g} mm, the smooth wall of"
+            f" {design.drive.name!r}"
+        )
+    return JointGauges(
+        ring=ring,
+        strain=wall.strain(ring.place),
+        layout=drive.layout,
+        ratio=drive.ratio,
+        design=design.drive.name,
+    )
+
+
+def _flexspline_design(
+    joint: JointSection, section: GaugesSection, *, where: str
+) -> Design:
+    """The design that states the geometry of the flexspline."""
+    reference = section.flexspline or joint.drive
+    if section.flexspline is None and (
+        reference is None or reference.endswith(".swg") or names_catalogue(reference)
+    ):
+        name = "the drive" if reference is None else f"drive {reference!r}"
+        raise InputError(
+            f"{where}.flexspline: missing; {name} does not state the geometry of its"
+            " flexspline; accepted: a design with a [cup]"
+        )
+    try:
+        return Design.load(str(reference))
+    except InputError as error:
+        raise InputError(f"{where}.flexspline: {error}") from None
+
+
+def gauge_figures(
+    gauges: JointGauges, *, torque: Array, reading: Array, rated: float
+) -> dict[str, Any]:
+    """Gain, ripple and error of the gauges of one joint, with keys of the JSON output.
+
+    Args:
+        gauges: The gauges.
+        torque: Output torque (n,) [N·m].
+        reading: Torque that the gauges read (n,) [N·m].
+        rated: Rated torque [N·m].
+    """
+    error = reading - torque
+    return {
+        "flexspline": gauges.design,
+        "bridges": gauges.ring.bridges,
+        "gain_uV_V_Nm": 1e6 * gauges.gain,
+        "gain_error_percent": 100.0 * (gauges.gain / gauges.nominal_gain - 1.0),
+        "ripple": [
+            {
+                "order": float(order),
+                "amplitude_Nm": float(amplitude),
+                "amplitude_percent": float(100.0 * amplitude / rated),
+            }
+            for order, amplitude in zip(gauges.orders, gauges.ripple, strict=True)
+        ],
+        "error_Nm": {
+            "mean": float(error.mean()),
+            "rms": float(np.sqrt(np.mean(error**2))),
+            "pp": float(np.ptp(error)),
+        },
+        "compensation": [
+            {
+                "bridges": count,
+                "ripple_rms_percent": float(
+                    100.0
+                    * np.linalg.norm(with_bridges(gauges, count).ripple)
+                    / (np.sqrt(2.0) * rated)
+                ),
+            }
+            for count in COMPARED
+        ],
+        "error_rms_percent": float(100.0 * np.sqrt(np.mean(error**2)) / rated),
+    }
