@@ -246,6 +246,10 @@ class GaugesSection(Section):
     the drive."""
     position_mm: Positive
     """Distance of the gauges from the outside of the closed end [mm]."""
+    strain: Literal["3d", "outline"] = "3d"
+    """Strain of the wall on the wave generator: ``3d`` solves the contact with finite
+    elements once per design (up to minutes), ``outline`` is the closed form of a wall
+    that follows the outline everywhere."""
     bridges: Annotated[int, Field(ge=1, le=100)] = 1
     """Number of bridges, whose mean is the reading."""
     spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None

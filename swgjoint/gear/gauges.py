@@ -28,9 +28,10 @@ where delta is the angle by which the whole rosette is turned. Without this erro
 reads shear only, including the shear that turns with the wave generator. The mean of n
 bridges at equal distances cancels all orders of theta that are no multiples of n.
 
-The model omits the toothed rim, the bending of the diaphragm, gauges of finite length,
-and the non-uniform shear of the tooth forces, which follows the lobes and is
-proportional to the torque.
+The wall follows the outline of the wave generator here; contact with it is in
+:mod:`swgjoint.fe.solid.figures.deflected_wall`. The model omits the toothed rim, the
+bending of the diaphragm, gauges of finite length, and the non-uniform shear of the
+tooth forces, which follows the lobes and is proportional to the torque.
 
 Source:
     Timoshenko and Woinowsky-Krieger, "Theory of Plates and Shells", article 123,

@@ -42,6 +42,8 @@ class JointGauges:
     """Signed ratio i [-]."""
     design: str
     """Name of the design that provides the geometry."""
+    model: str
+    """Model of the strain: ``3d`` or ``outline``."""
 
     @property
     def share(self) -> float:
@@ -142,11 +144,23 @@ def _checked_gauges(
         )
     return JointGauges(
         ring=ring,
-        strain=wall.strain(ring.place),
+        strain=wall.strain(ring.place)
+        if section.strain == "outline"
+        else _contact_strain(design, ring.place, where=where),
+        model=section.strain,
         layout=drive.layout,
         ratio=drive.ratio,
         design=design.drive.name,
     )
+
+
+def _contact_strain(design: Design, place: float, *, where: str) -> WallStrain:
+    from swgjoint.fe.solid.figures.deflected_wall import deflected_strain
+
+    try:
+        return deflected_strain(design, place)
+    except InputError as error:
+        raise InputError(f"{where}.flexspline: {error}") from None
 
 
 def _flexspline_design(
@@ -182,6 +196,7 @@ def gauge_figures(
     error = reading - torque
     return {
         "flexspline": gauges.design,
+        "strain": gauges.model,
         "bridges": gauges.ring.bridges,
         "gain_uV_V_Nm": 1e6 * gauges.gain,
         "gain_error_percent": 100.0 * (gauges.gain / gauges.nominal_gain - 1.0),

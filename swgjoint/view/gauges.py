@@ -26,6 +26,8 @@ GAUGE_COLUMNS = (
 """Name and unit of every column of the table of strain gauges."""
 SHOWN = 3
 """Number of orders in the table."""
+DRAWN = 10
+"""Number of orders in the picture."""
 
 
 def gauge_grid(joints: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
@@ -66,7 +68,8 @@ def gauge_notes(joints: Mapping[str, Mapping[str, Any]]) -> list[str]:
         joints: Figures of the joints.
     """
     return [
-        f"gauges of {short(name)}: flexspline of design {joint['gauges']['flexspline']}"
+        f"gauges of {short(name)}: flexspline of design"
+        f" {joint['gauges']['flexspline']}, strain: {joint['gauges']['strain']}"
         for name, joint in joints.items()
         if "gauges" in joint
     ]
@@ -114,6 +117,7 @@ def gauge_picture(run: Run) -> bytes:
     theta, psi = run.motor_position[part, j], run.position[part, j]
     torque = run.output_torque[part, j]
     turns = np.abs(theta - theta[0]) / (2.0 * np.pi)
+    drawn = slice(0, DRAWN)
     figure = Figure(figsize=(13.0, 7.0), layout="constrained")
     axes = figure.subplots(2, 2)
     reading = run.gauge_torque(j)
@@ -122,6 +126,7 @@ def gauge_picture(run: Run) -> bytes:
     axes[0, 0].plot(turns, torque / rated, "0.6", lw=1.1, label="torque")
     axes[0, 0].set_title(f"{short(joint)}, bridges of the scene: {gauges.ring.bridges}")
     width = 0.8 / len(COMPARED)
+    places = np.arange(len(gauges.orders[drawn]))
     for k, count in enumerate(COMPARED):
         exact = with_bridges(gauges, count)
         style: dict[str, Any] = {"color": f"C{k}", "label": f"{count}"}
@@ -129,11 +134,16 @@ def gauge_picture(run: Run) -> bytes:
         # one and two bridges read the same and are drawn on top of each other
         line = {"lw": 2.2, "alpha": 0.5} if count == 1 else {"lw": 0.9}
         axes[1, 0].plot(turns, np.abs(error), **style, **line)
-        place = np.arange(len(exact.ripple)) + (k - 0.5 * len(COMPARED) + 0.5) * width
-        axes[0, 1].bar(place, 100.0 * exact.ripple / rated, width, **style)
-    axes[1, 1].bar(np.arange(len(gauges.ripple)), 100.0 * gauges.ripple / rated, 0.8)
+        place = (
+            np.arange(len(gauges.orders[drawn]))
+            + (k - 0.5 * len(COMPARED) + 0.5) * width
+        )
+        ripple = 100.0 * exact.ripple[drawn] / rated
+        axes[0, 1].bar(place, ripple, width, **style)
+    ripple = 100.0 * gauges.ripple[drawn] / rated
+    axes[1, 1].bar(places, ripple, 0.8)
     axes[1, 0].set_yscale("log")
-    axes[1, 0].set_ylim(1e-6, 1e4)
+    axes[1, 0].set_ylim(1e-4, 1e4)
     axes[1, 0].set_title("1, 2, 3 or 5 exact bridges: reading minus torque, magnitude")
     axes[0, 1].set_title("1, 2, 3 or 5 exact bridges: ripple by order")
     axes[1, 1].set_title("bridges of the scene: ripple by order")
@@ -144,10 +154,10 @@ def gauge_picture(run: Run) -> bytes:
         axis.set_ylabel("torque / rated torque")
         axis.margins(x=0)
     for axis in axes[:, 1]:
-        names = [f"{order:.4g}" for order in gauges.orders]
-        axis.set_xticks(np.arange(len(names)), names)
+        names = [f"{order:.4g}" for order in gauges.orders[drawn]]
+        axis.set_xticks(places, names)
         axis.set_yscale("log")
-        axis.set_ylim(bottom=1e-4)
+        axis.set_ylim(bottom=1e-2)
         axis.set_xlabel("order [cycles per input turn]")
         axis.set_ylabel("amplitude [% of rated torque]")
     for axis in (axes[0, 0], axes[1, 0], axes[0, 1]):

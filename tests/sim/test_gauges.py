@@ -26,7 +26,11 @@ SHORT = {
     "defaults.level": "linear",
     "simulation.duration_s": 4.5,
 }
-GAUGES = {KEY + "flexspline": "reference-3d", KEY + "position_mm": 24.0}
+GAUGES = {
+    KEY + "strain": "outline",
+    KEY + "flexspline": "reference-3d",
+    KEY + "position_mm": 24.0,
+}
 
 
 def run(**gauges):
@@ -98,6 +102,27 @@ def test_a_fixed_flexspline_takes_the_reaction(tmp_path, figures):
     reading, torque = fixed.gauge_torque(0), fixed.output_torque[:, 0]
     assert np.abs(torque).max() > 50.0
     assert np.abs(reading - torque).max() < 1e-3
+
+
+def test_contact_is_solved_by_default(tmp_path, figures):
+    """Coarse elements: less shear of two lobes than the outline has, more of four."""
+    design = Design.load("reference-3d").with_changes({"mesh.refinement": 0.5})
+    path = tmp_path / "coarse.toml"
+    path.write_text(design.to_toml())
+    changes = SHORT | {KEY + "flexspline": str(path), KEY + "position_mm": 18.0}
+    contact = run_scene("bench", overrides=changes, drives={"map": LINEAR})
+    found = contact.metrics()["joints"]["joint"]["gauges"]
+    assert (found["strain"], figures["strain"]) == ("3d", "outline")
+    assert found["gain_uV_V_Nm"] == pytest.approx(figures["gain_uV_V_Nm"])
+    ratios = [
+        line["amplitude_Nm"] / other["amplitude_Nm"]
+        for line, other in zip(found["ripple"], figures["ripple"], strict=False)
+    ]
+    assert 0.65 < ratios[0] < 0.75
+    assert 2.9 < ratios[1] < 3.5
+    reading, torque = contact.gauge_torque(0), contact.output_torque[:, 0]
+    most = sum(line["amplitude_Nm"] for line in found["ripple"])
+    assert 0.5 * most < np.abs(reading - torque).max() < 1.001 * most
 
 
 def test_without_gauges_nothing_changes(one):
@@ -185,7 +210,8 @@ def test_place_is_kept_in_millimetres():
     scene = Scene.from_toml(
         'name = "x"\narm = "bench"\n[defaults]\ndrive = "map"\nlevel = "linear"\n'
         "rotor_inertia_kgm2 = 1e-4\n"
-        '[defaults.gauges]\nflexspline = "reference-3d"\nposition_mm = 20.0\n'
+        '[defaults.gauges]\nstrain = "outline"\nflexspline = "reference-3d"\n'
+        "position_mm = 20.0\n"
         "bridges = 2\nspacing_deg = 90.0\nturn_errors_deg = [1.0, 0.0]\n"
         '[trajectory]\nkind = "constant_speed"\n'
         "[trajectory.start_deg]\njoint = 0.0\n"

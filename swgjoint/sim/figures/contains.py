@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 OFF_DAMPING = 0.02
 """Increase of the damping ratio by the time steps from which it is reported [-]."""
 GAUGES_LEFT_OUT = (
-    "toothed rim, bending of the diaphragm, shear of the tooth forces that follows the"
-    " lobes, length and noise of the gauges"
+    "shear of the tooth forces that follows the lobes, clearance of the wave-generator"
+    " bearing, length and noise of the gauges"
 )
 """Effects that readings of strain gauges do not contain."""
 _LOSSY = ("native", "full")
@@ -96,6 +96,7 @@ def _features(assembly: Assembly) -> dict[str, Any]:
         features["gauges"] = {
             name: {
                 "flexspline": one.design,
+                "strain": one.model,
                 "bridges": one.ring.bridges,
                 "left_out": GAUGES_LEFT_OUT,
             }

@@ -195,7 +195,7 @@ def _outside_strains(
     stress = stress.reshape(-1, 6)[outside]
     points = points[outside]
     phi = np.arctan2(-points[:, 0], points[:, 1])
-    strain = _cylindrical_strain(stress, phi, material)
+    strain = cylindrical_strain(stress, phi, material)
     strain = strain * np.exp(-1j * order * phi)[:, None]
     rows = np.unique(np.round(points[:, 2], 9))
     if len(rows) < 2:
@@ -205,11 +205,19 @@ def _outside_strains(
     ]
 
 
-def _cylindrical_strain(stress: Complex, phi: Array, material: Material) -> Complex:
+def cylindrical_strain(stress: Complex, phi: Array, material: Material) -> Complex:
     """Circumferential, axial and shear strain from stress (n, 3) [-].
 
     The shear is positive for a circumferential displacement that grows towards the
     open end, which is against z.
+
+    Args:
+        stress: Stress xx, yy, zz, xy, yz, zx in the frame of a tooth (n, 6) [Pa].
+        phi: Angles around the flexspline in this frame (n,) [rad].
+        material: Material of the flexspline.
+
+    Returns:
+        Circumferential, axial and shear strain (n, 3) [-].
     """
     tensor = np.empty((len(stress), 3, 3), complex)
     for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
