@@ -213,16 +213,15 @@ def unknown(line):
         return [extra for extra in asked if extra not in extras]
     if words[0] in ("git", "cd"):
         return []
-    if words[0] in ("python", "python3") and words[1] == "-m":
-        known = {"sphinx", *project["project"]["dependencies"]}
-        known = {re.split(r"[\[>=]", name)[0] for name in known}
-        return [] if words[2].split(".")[0] in known else [words[2]]
+    needed = [project["project"]["dependencies"], *extras.values()]
+    programs = {re.split(r"[\[>=]", name)[0] for names in needed for name in names}
+    files = [word for word in words if word.startswith(("tests/", "notebooks/", "."))]
+    files += [word for word in words if word.endswith(".py")]
+    missing = [name for name in dict.fromkeys(files) if not (ROOT / name).exists()]
     if words[0] in ("python", "python3"):
-        return [] if (ROOT / words[1]).is_file() else [words[1]]
-    if words[0].startswith("."):
-        return [] if (ROOT / words[0]).is_file() else [words[0]]
-    programs = {re.split(r"[\[>=]", one)[0] for name in extras for one in extras[name]}
-    return [] if words[0] in programs else [words[0]]
+        module = words[2].split(".")[0] if words[1] == "-m" else None
+        return missing + [module] * (module not in (None, *programs))
+    return missing + [words[0]] * (words[0] not in (*programs, *files))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
