@@ -26,6 +26,10 @@ GAUGE_COLUMNS = (
 """Name and unit of every column of the table of strain gauges."""
 SHOWN = 3
 """Number of orders in the table."""
+CONVERGED = {
+    "3d": "; orders of two and four lobes converged to 5 %, those above to a third only"
+}
+"""How far the finite elements of the contact are converged, by the kind of strain."""
 DRAWN = 10
 """Number of orders in the picture."""
 
@@ -62,17 +66,20 @@ def gauge_grid(joints: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
 
 
 def gauge_notes(joints: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Where the geometry of the gauges' flexsplines comes from.
+    """Where the strain under the gauges comes from, and how far it is converged.
 
     Args:
         joints: Figures of the joints.
     """
-    return [
-        f"gauges of {short(name)}: flexspline of design"
-        f" {joint['gauges']['flexspline']}, strain: {joint['gauges']['strain']}"
-        for name, joint in joints.items()
-        if "gauges" in joint
-    ]
+    lines = []
+    for name, joint in joints.items():
+        if "gauges" in joint:
+            found = joint["gauges"]
+            lines.append(
+                f"gauges of {short(name)}: flexspline of design {found['flexspline']},"
+                f" strain: {found['strain']}{CONVERGED.get(found['strain'], '')}"
+            )
+    return lines
 
 
 def gauge_tables(runs: Mapping[str, Run]) -> list[Table]:

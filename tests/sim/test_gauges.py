@@ -15,7 +15,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
-from swgjoint.view.gauges import gauge_picture, gauge_tables
+from swgjoint.view.gauges import gauge_notes, gauge_picture, gauge_tables
 from swgjoint.view.recording.entities import signals_of
 from swgjoint.view.run import run_scene
 
@@ -156,7 +156,11 @@ def test_table_and_picture(one):
     }
     text = report(json.loads(json.dumps(metrics)))
     assert "µV/V per N·m" in text
-    assert "flexspline of design reference-3d" in text
+    assert "flexspline of design reference-3d, strain: outline\n" in text
+    contact = {"joint": {"gauges": metrics["joints"]["joint"]["gauges"]}}
+    contact["joint"]["gauges"] |= {"strain": "3d"}
+    (note,) = gauge_notes(contact)
+    assert note.endswith("above to a third only")
     (table,) = gauge_tables({"one": one})
     assert len(table.rows) == 1
     assert len(table.rows[0]) == len(table.header)
