@@ -13,7 +13,7 @@ import swgjoint
 
 def fresh(program: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True
+        [sys.executable, "-P", "-c", program], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

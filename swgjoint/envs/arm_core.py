@@ -317,6 +317,10 @@ def _scene(settings: ArmSettings) -> Scene:
         scene = scene_of_arm(name).with_changes({"controller.kind": "pd"})
     else:
         scene = Scene.load_file(name)
+    for section in (scene.defaults, *scene.joints.values()):
+        for key in ("output_bearing", "gauges"):
+            if getattr(section, key) is not None:
+                raise InputError(f"scene {scene.name!r} has {key}; accepted: none")
     scene = scene.with_level(settings.level)  # type: ignore[arg-type]
     scene = scene.with_friction(bool(settings.friction))
     return scene.with_kinematic_error(settings.kinematic_error_arcmin)
@@ -347,10 +351,6 @@ def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
     where = f"scene {scene.name!r}"
     if scene.disturbance:
         raise InputError(f"{where} has disturbances; accepted: none")
-    sections = [scene.joint_settings(name) for name in arm.joints]
-    for key in ("output_bearing", "gauges"):
-        if any(getattr(section, key) is not None for section in sections):
-            raise InputError(f"{where} has {key}; accepted: none")
     if arm.tool < 0:
         raise InputError(
             f"{where}: the arm has no tool site; accepted: an arm with a tool site,"

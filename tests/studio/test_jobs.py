@@ -6,32 +6,10 @@ import os
 import time
 
 import pytest
+from job_functions import add, die, err, fail, hold
 
-from swgjoint.errors import ComputationError
 from swgjoint.studio.jobs import Job
 from swgjoint.studio.session import Session
-
-
-def add(a, b, *, progress):
-    progress("sum", 0, 1)
-    return a + b
-
-
-def fail(*, progress):
-    raise ComputationError("no equilibrium")
-
-
-def err(*, progress):
-    raise KeyError("oops")
-
-
-def die(*, progress):
-    os._exit(3)
-
-
-def hold(*, progress):
-    progress("hold", 0, 1)
-    time.sleep(600)
 
 
 def end(job, limit=60.0):
@@ -49,14 +27,6 @@ def is_there(pid):
     except ProcessLookupError:
         return False
     return True
-
-
-@pytest.fixture(autouse=True)
-def reachable(monkeypatch):
-    """Processes find the functions of this file."""
-    import sys
-
-    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
 
 
 def test_a_result_arrives():
