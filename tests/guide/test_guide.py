@@ -311,6 +311,15 @@ def test_linear_control_page(tmp_path, monkeypatch, capsys):
     assert len(table) == 2 and out[-2:] == table
 
 
+def test_optimal_control_page(tmp_path, monkeypatch, capsys):
+    """The motions and the arms are found, and print what the page shows."""
+    for name in ("casadi", "pinocchio"):
+        pytest.importorskip(name)
+    page = GUIDE / "how-to" / "optimal-control.md"
+    out = follow(page, tmp_path, monkeypatch, capsys)
+    assert out == "".join(blocks(page, "text"))
+
+
 def test_own_environment_page(capsys):
     """The environment passes the checker, pays as told, and its batch is as alone."""
     check_env = pytest.importorskip("gymnasium.utils.env_checker").check_env
