@@ -34,7 +34,7 @@ class ThinRingSolver:
     max_iterations: int = 80
     """Largest number of iterations."""
     shortest: float = 1e-3
-    """Smallest fraction of a first trial; steps are halved while the potential rises
+    """Smallest fraction of a Newton step; steps are halved while the potential rises
     [-]."""
     full: int = 8
     """Number of first iterations in which the potential may rise if teeth carry load in
@@ -45,9 +45,6 @@ class ThinRingSolver:
     stride: float = 0.1
     """Largest displacement increment of an iteration, as a fraction of the lobe height
     [-]."""
-    growth: float = 4.0
-    """Factor by which the largest increment grows per iteration after a step had to be
-    halved [-]; the next step would otherwise have to be halved as often."""
     anchor: float = 1e-11
     """Addition to the diagonal of the tangent, relative to its largest entry [-]. It
     keeps the tangent regular if no tooth holds the output, and it does not shift an
@@ -84,18 +81,15 @@ class ThinRingSolver:
         state, history = start, list[float]()
         load = start.torque if torque is None else torque
         full = self.full if start.loaded_teeth else 0
-        step, part, least, last = np.zeros(model.size), 0.0, 0.0, np.inf
-        size, largest = 0.0, self.stride * model.lobe_height
-        moved = largest
+        step, part, last = np.zeros(model.size), 0.0, np.inf
         for _ in range(self.max_iterations):
             tried = replace(state, q=state.q + part * step)
             tried, total, held = linearise(model, tried, teeth=teeth)
             psi, turn = rim_rotation(model, tried.q, start.rotation)
             potential = tried.energy + load * psi
             rises = potential - last > 1e-12 * abs(last) and len(history) > full
-            if torque is not None and rises and part > least:
+            if torque is not None and rises and part > self.shortest:
                 part *= 0.5
-                moved = part * size
                 continue
             state, last = tried, potential
             right = np.stack([-total.gradient - load * turn, turn], axis=1)
@@ -104,13 +98,11 @@ class ThinRingSolver:
             if rotation is not None:
                 change = (psi + float(turn @ base) - rotation) / compliance
             step = base - change * reach
-            moved = min(largest, self.growth * moved)
             size = _moved(step)
             history.append(size)
             if not np.isfinite(size):
                 return replace(state, outcome=Outcome.DIVERGED, history=tuple(history))
-            part = min(1.0, moved / max(size, 1e-300))
-            least = self.shortest * part
+            part = min(1.0, self.stride * model.lobe_height / max(size, 1e-300))
             load += part * change
             state = replace(state, torque=load, compliance=compliance)
             if size < self.step_tolerance * model.rim.radius:
