@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.shared.arm_arguments import add_arm_arguments, scene_of
+from swgjoint.cli.shared.arm_arguments import add_arm_arguments, add_overrides, scene_of
 from swgjoint.cli.shared.text import table
 
 
@@ -21,13 +21,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="largest accepted rms error, with unit: of the link angle of the worst"
         " joint (0.1arcmin, 5arcsec, 2e-5rad) or of the tool position (0.05mm)",
     )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a key of the scene; repeatable",
-    )
+    add_overrides(parser)
     add_arm_arguments(parser)
 
 
@@ -41,7 +35,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.explore.advise.bound import parse_bound
 
     bound = parse_bound(args.error)
-    scene, _ = scene_of(args, args.set)
+    scene, _ = scene_of(args, args.overrides)
     return advise(scene, bound, progress=args.progress)
 
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from swgjoint.cli.shared.arm_arguments import add_overrides
 from swgjoint.cli.shared.limits import add_limits, limits_of
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
@@ -38,14 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="compare drives only in these joints, such as shoulder_lift or"
         " 'wrist_*'; the other joints keep the drives of the scene; repeatable",
     )
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="overrides",
-        help="change a key of the scene; repeatable",
-    )
+    add_overrides(parser)
     parser.add_argument(
         "--model",
         choices=("ring", "2d", "3d"),

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.shared.arm_arguments import add_overrides
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import DesignError, InputError
 from swgjoint.files import Outputs, check_output_file, output_folder, write_whole
@@ -56,14 +57,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     new.add_argument(
         "--name", help="name of the new design; default: the name of the output file"
     )
-    new.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="overrides",
-        help="set a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
-    )
+    add_overrides(new, "set a value after scaling, e.g. flexspline.rim_mm=0.5")
     new.add_argument(
         "-o", "--output", metavar="FILE.toml", help="file of the new design"
     )

@@ -5,7 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.shared.arm_arguments import add_arm_arguments, choice_lines, scene_of
+from swgjoint.cli.shared.arm_arguments import (
+    add_arm_arguments,
+    add_overrides,
+    choice_lines,
+    scene_of,
+)
 from swgjoint.cli.shared.life_text import bearing_lines, gauge_lines, life_lines
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
@@ -41,14 +46,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="design, map or catalogue drive for all joints; for a single joint use"
         " --set joints.JOINT.drive=NAME",
     )
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="overrides",
-        help="change a key of the scene, e.g. simulation.step_s=0.0005; repeatable",
-    )
+    add_overrides(parser, "change a key of the scene, e.g. simulation.step_s=0.0005")
     parser.add_argument(
         "--out",
         metavar="DIR",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from swgjoint.cli.shared.arm_arguments import add_overrides
 from swgjoint.cli.shared.text import table
 from swgjoint.files import output_folder
 
@@ -40,14 +41,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="S", help="random seed; default: 0"
     )
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="overrides",
-        help="set an argument of the environment, e.g. drive=CSG-20-100 or"
-        " randomise=false; repeatable",
+    add_overrides(
+        parser,
+        "set an argument of the environment, e.g. drive=CSG-20-100 or randomise=false",
     )
     parser.add_argument(
         "--out",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.select.text import selection_lines
-from swgjoint.cli.shared.arm_arguments import add_arm_arguments, scene_of
+from swgjoint.cli.shared.arm_arguments import add_arm_arguments, add_overrides, scene_of
 from swgjoint.cli.shared.limits import add_limits, limits_of
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
@@ -58,14 +58,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="column of the cost, summed over the joints; drives without a value are"
         " not selected; default: mass",
     )
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="overrides",
-        help="change a key of the scene; repeatable",
-    )
+    add_overrides(parser)
     parser.add_argument(
         "--out",
         metavar="DIR",

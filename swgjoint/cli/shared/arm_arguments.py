@@ -1,4 +1,4 @@
-"""Command-line options for an arm without a scene, shared by ``run`` and ``advise``."""
+"""Command-line options for changed keys and for an arm without a scene."""
 
 from __future__ import annotations
 
@@ -53,6 +53,25 @@ def add_arm_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="set all three principal moments of a physically impossible inertia in the"
         " file to their mean",
+    )
+
+
+def add_overrides(
+    parser: argparse._ActionsContainer, text: str = "change a key of the scene"
+) -> None:
+    """Add the repeatable option ``--set KEY=VALUE``, stored as ``overrides``.
+
+    Args:
+        parser: Parser of the command.
+        text: Help text of the option.
+    """
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="overrides",
+        help=f"{text}; repeatable",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from swgjoint.cli.shared.text import table
@@ -18,9 +19,7 @@ def bearing_lines(result: dict[str, Any]) -> list[str]:
         return []
     from swgjoint.view.life.rows import BEARING_COLUMNS, bearing_grid, bearing_notes
 
-    names, units = zip(*BEARING_COLUMNS, strict=True)
-    rows = bearing_grid(joints)
-    return [table([units, *rows], header=names), *bearing_notes(joints)]
+    return [_grid(BEARING_COLUMNS, bearing_grid(joints)), *bearing_notes(joints)]
 
 
 def gauge_lines(result: dict[str, Any]) -> list[str]:
@@ -34,9 +33,7 @@ def gauge_lines(result: dict[str, Any]) -> list[str]:
         return []
     from swgjoint.view.gauges import GAUGE_COLUMNS, gauge_grid, gauge_notes
 
-    names, units = zip(*GAUGE_COLUMNS, strict=True)
-    rows = gauge_grid(joints)
-    return [table([units, *rows], header=names), *gauge_notes(joints)]
+    return [_grid(GAUGE_COLUMNS, gauge_grid(joints)), *gauge_notes(joints)]
 
 
 def life_lines(result: dict[str, Any]) -> list[str]:
@@ -51,9 +48,14 @@ def life_lines(result: dict[str, Any]) -> list[str]:
 
     lives = {name: joint["life"] for name, joint in result["joints"].items()}
     columns, rows = life_grid(lives)
-    names, units = zip(*columns, strict=True)
     return [
         describe_cycle(result["cycle"]),
-        table([units, *rows], header=names),
+        _grid(columns, rows),
         *missing_lines(lives),
     ]
+
+
+def _grid(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[str]]) -> str:
+    """Table with the names of the columns and, below them, their units."""
+    names, units = zip(*columns, strict=True)
+    return table([units, *rows], header=names)
