@@ -139,8 +139,9 @@ def test_contact_twists_the_wall_less_than_the_outline(wall):
     found, theory = deflected_strain(DESIGN, 0.018), wall.strain(0.018)
     assert found.torsion == theory.torsion
     assert (found.orders[:2] == [2.0, 4.0]).all()
-    assert 0.65 < abs(found.shear[0] / theory.shear[0]) < 0.75
-    assert 2.9 < abs(found.shear[1] / theory.shear[1]) < 3.5
+    # in the same direction, seen from the same lobe
+    assert 0.65 < (found.shear[0] / theory.shear[0]).real < 0.75
+    assert 2.9 < (found.shear[1] / theory.shear[1]).real < 3.5
     # symmetric about the lobe: only sines
     assert np.abs(found.shear.real).max() < 1e-3 * np.abs(found.shear).max()
 
