@@ -16,9 +16,8 @@ def selection_lines(result: dict[str, Any]) -> list[str]:
     from swgjoint.view.selection import limit_lines, selection_tables
 
     count = len(result["simulated"])
-    lines = [
-        f"scene {result['scene']}: {count} sets simulated in {result['wall_s']:.0f} s"
-    ]
+    sets = "1 set" if count == 1 else f"{count} sets"
+    lines = [f"scene {result['scene']}: {sets} simulated in {result['wall_s']:.0f} s"]
     for one in selection_tables(result)[: 1 + bool(count)]:
         cells = [[cell.text for cell in row] for row in one.rows]
         names = [f"{name} [{unit}]" if unit else name for name, unit in one.header]
