@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from swgjoint.drives.sections import GaugesSection
 from swgjoint.envs.arguments import check_flag, check_number, format_value
 from swgjoint.envs.core import Core, EpisodeLimits
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
@@ -21,6 +22,7 @@ from swgjoint.envs.specimen import (
     tolerances_of,
 )
 from swgjoint.errors import InputError
+from swgjoint.faults import validate
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
@@ -29,6 +31,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.controller import KnownJoints
 from swgjoint.sim.figures.transmission import transmission_of
+from swgjoint.sim.gauges import JointGauges, gauges_of_drive
 from swgjoint.typing import Array
 
 LEVELS = ("full", "linear")
@@ -78,6 +81,8 @@ class BenchSettings:
     """Largest load torque relative to rated torque [-]."""
     sensors: Mapping[str, float] | Sensors | None = None
     """Sensors of every joint; None: the default sensors."""
+    gauges: Mapping[str, Any] | None = None
+    """Strain gauges on the flexspline, with the keys of a scene; None: no gauges."""
     randomise: bool | Mapping[str, float] | SpecimenTolerances = False
     """Whether, or with which tolerances, drives and loads vary."""
 
@@ -228,6 +233,7 @@ class BenchCore(Core):
             tolerances=tolerances,
             period=s.period_s,
             steps=s.steps,
+            gauges=_gauges(s, drive),
         )
 
     def vary_load(self, index: int, shares: Array) -> None:
@@ -270,7 +276,7 @@ class BenchCore(Core):
         )
 
     def sensor_entries(self) -> tuple[Entry, ...]:
-        """Entries of the link encoder and the torque sensor, if present."""
+        """Entries of link encoder, torque sensor and strain gauges, if present."""
         limits, entries = self.limits, []
         if self.sensors.link_encoder:
             angle = ceiling(1.01 * float(limits.angle[0]))
@@ -282,7 +288,27 @@ class BenchCore(Core):
             entries.append(
                 Entry(meaning="measured output torque", unit="N·m", low=-top, high=top)
             )
+        if self.gauges is not None:
+            ripple = self.gauges.largest_ripple
+            top = ceiling(1.1 * (float(limits.momentary_peak[0]) + ripple))
+            what = "output torque that strain gauges read"
+            entries.append(Entry(meaning=what, unit="N·m", low=-top, high=top))
         return tuple(entries)
+
+
+def _gauges(settings: BenchSettings, drive: DriveMap) -> JointGauges | None:
+    """Strain gauges of the settings on the nominal drive."""
+    stated = settings.gauges
+    if stated is None:
+        return None
+    if not isinstance(stated, Mapping):
+        raise InputError(
+            f"gauges {format_value(stated)}; accepted: None or a mapping with"
+            f" {', '.join(GaugesSection.model_fields)}"
+        )
+    section = validate(GaugesSection, stated, where="gauges")
+    reference = settings.drive if isinstance(settings.drive, str) else None
+    return gauges_of_drive(section, drive, reference, where="gauges")
 
 
 def _bench(

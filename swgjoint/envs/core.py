@@ -23,6 +23,7 @@ from swgjoint.envs.specimen import SpecimenTolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import SIZE, Variation
 from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
+from swgjoint.sim.gauges import JointGauges
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -64,6 +65,7 @@ class Core(ABC):
         tolerances: SpecimenTolerances | None,
         period: float,
         steps: int,
+        gauges: JointGauges | None = None,
         shared: bool = False,
     ) -> None:
         """Prepare episodes.
@@ -77,11 +79,12 @@ class Core(ABC):
             tolerances: Tolerances of the drives; None: all drives are nominal.
             period: Control period [s].
             steps: Number of control periods of an episode.
+            gauges: Strain gauges on the flexspline of the only joint, if any.
             shared: Whether all episodes follow the same plan.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
-        self.period, self.steps = period, steps
+        self.period, self.steps, self.gauges = period, steps, gauges
         if sensors.delay_periods > steps:
             raise InputError(
                 f"sensor delay_periods {sensors.delay_periods}; accepted: at most the"
@@ -89,7 +92,7 @@ class Core(ABC):
             )
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
-        self.readout = Readout(sensors, count, rated, period)
+        self.readout = Readout(sensors, count, rated, period, gauges=gauges is not None)
         self.instant = np.zeros(count, dtype=np.intp)
         """Number of control periods since the start. Shape (n,)."""
         size = PlanSize(
@@ -255,6 +258,9 @@ class Core(ABC):
             parts.append(self.link_angle)
         if self.sensors.torque_sensor:
             parts.append(self.output_torque)
+        if self.gauges is not None:
+            angles = self.motor_angle, self.link_angle
+            parts.append(self.gauges.read_torque(self.output_torque, *angles))
         return np.concatenate(parts, axis=1)
 
     def observation(self) -> Array:
@@ -262,7 +268,7 @@ class Core(ABC):
         return np.clip(np.concatenate(self.columns(), axis=1), self._low, self._high)
 
     def readings(self) -> list[Array]:
-        """Readings of link encoder and torque sensor that exist. (n, n_joints)."""
+        """Readings of link encoder, torque sensor and gauges, if any. (n, n_joints)."""
         n, value = len(self.joints.names), self.readout.value
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
@@ -322,6 +328,7 @@ class Core(ABC):
     def read_measurements(self, observation: Array) -> Measured:
         """Sensor readings in observations with any leading axes, for controllers."""
         n, last = len(self.joints.names), observation.shape[-1]
+        last -= n if self.gauges is not None else 0
         torque = last - n if self.sensors.torque_sensor else None
         link = (torque or last) - n if self.sensors.link_encoder else None
 

@@ -232,24 +232,26 @@ class JointTrackingEnv(SingleEnv):
     0      motor torque relative to its limit  1     -1 to 1
     =====  ==================================  ====  =======
 
-    Observation with the default arguments; the last two entries exist only with
-    ``sensors={"link_encoder": True, "torque_sensor": True}``:
+    Observation with the default arguments; entries 9 and 10 exist only with
+    ``sensors={"link_encoder": True, "torque_sensor": True}``, the last one only with
+    ``gauges={"flexspline": "size-25-100", "position_mm": 13.0, "strain": "outline"}``:
 
-    =====  ==================================  =======  ===========
-    index  meaning                             unit     range
-    =====  ==================================  =======  ===========
-    0      measured motor angle                rad      -310 to 310
-    1      measured motor speed                rad/s    -180 to 180
-    2      motor angle error                   rad      -1.6 to 1.6
-    3      motor speed error                   rad/s    -23 to 23
-    4      reference angle of the link         rad      -1 to 1
-    5      reference speed of the link         rad/s    -0.6 to 0.6
-    6      reference acceleration of the link  rad/s^2  -50 to 50
-    7      load torque against the link        N·m      -44 to 44
-    8      last action                         1        -1 to 1
-    9      measured link angle                 rad      -3.1 to 3.1
-    10     measured output torque              N·m      -410 to 410
-    =====  ==================================  =======  ===========
+    =====  =====================================  =======  ===========
+    index  meaning                                unit     range
+    =====  =====================================  =======  ===========
+    0      measured motor angle                   rad      -310 to 310
+    1      measured motor speed                   rad/s    -180 to 180
+    2      motor angle error                      rad      -1.6 to 1.6
+    3      motor speed error                      rad/s    -23 to 23
+    4      reference angle of the link            rad      -1 to 1
+    5      reference speed of the link            rad/s    -0.6 to 0.6
+    6      reference acceleration of the link     rad/s^2  -50 to 50
+    7      load torque against the link           N·m      -44 to 44
+    8      last action                            1        -1 to 1
+    9      measured link angle                    rad      -3.1 to 3.1
+    10     measured output torque                 N·m      -410 to 410
+    11     output torque that strain gauges read  N·m      -510 to 510
+    =====  =====================================  =======  ===========
 
     The measured speed is the change of the angle reading over the last control period
     divided by that period. The errors 2 and 3 are ratio times reference of the link
@@ -300,6 +302,10 @@ class JointTrackingEnv(SingleEnv):
         load_of_rated: Largest load torque relative to rated torque [-]. Default: 0.5.
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
             Default: None, which uses the defaults of these fields.
+        gauges: Mapping with keys of ``[joints.NAME.gauges]`` of a scene: strain gauges
+            on the flexspline of the nominal drive, which read the output torque and the
+            ripple of the wave generator (:mod:`swgjoint.gear.gauges`). The noise is
+            that of the torque sensor. Default: None, no gauges.
         randomise: True, or a mapping with fields of
             :class:`~swgjoint.envs.specimen.SpecimenTolerances`, draws a new drive and
             load inertia for every episode, while ``task`` keeps the nominal ones. With

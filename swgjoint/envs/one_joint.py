@@ -54,7 +54,7 @@ class JointEpisode(ABC):
         ]
         low, high = bounds(core.observation_entries)
         self._bounds = list(zip(low.tolist(), high.tolist(), strict=True))
-        self._sensors = core.sensors
+        self._sensors, self._gauges = core.sensors, core.gauges
         self._channels = core.readout.channel_errors()
         self._advance = core.plant.step_one
 
@@ -76,7 +76,7 @@ class JointEpisode(ABC):
 
     @abstractmethod
     def columns(self) -> list[float]:
-        """Parts of the observation but for link encoder and torque sensor."""
+        """Parts of the observation without link encoder, torque sensor and gauges."""
 
     def judge(self) -> None:  # noqa: B027  (most need no further quantities)
         """Set further quantities of reward and info after a step."""
@@ -129,6 +129,9 @@ class JointEpisode(ABC):
             true.append(self.link_angle)
         if self._sensors.torque_sensor:
             true.append(self.output_torque)
+        if self._gauges is not None:
+            angles = self.motor_angle, self.link_angle
+            true.append(self._gauges.read_torque(self.output_torque, *angles))
         noise = self._noise[min(self.instant, self.steps)].tolist()
         now = []
         for value, normal, (deviation, count) in zip(

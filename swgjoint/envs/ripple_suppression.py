@@ -319,8 +319,9 @@ class RippleSuppressionEnv(SingleEnv):
     0      added motor torque relative to authority  1     -1 to 1
     =====  ========================================  ====  =======
 
-    Observation with the default arguments; the last two entries exist only with
-    ``sensors={"link_encoder": True, "torque_sensor": True}``:
+    Observation with the default arguments; entries 9 and 10 exist only with
+    ``sensors={"link_encoder": True, "torque_sensor": True}``, the last one only with
+    ``gauges={"flexspline": "size-25-100", "position_mm": 13.0, "strain": "outline"}``:
 
     =====  ===========================================  =====  ===========
     index  meaning                                      unit   range
@@ -336,6 +337,7 @@ class RippleSuppressionEnv(SingleEnv):
     8      last action                                  1      -1 to 1
     9      measured link angle                          rad    -7.1 to 7.1
     10     measured output torque                       N·m    -410 to 410
+    11     output torque that strain gauges read        N·m    -510 to 510
     =====  ===========================================  =====  ===========
 
     Measured speeds, errors and their ranges are defined as in
@@ -360,8 +362,8 @@ class RippleSuppressionEnv(SingleEnv):
     not that of the transmission error, because the motor then moves so as to compensate
     the kinematic error.
 
-    Args (all by keyword): those of ``JointTracking-v0`` for bench, drive, sensors and
-    ``randomise``, and
+    Args (all by keyword): those of ``JointTracking-v0`` for bench, drive, sensors,
+    gauges and ``randomise``, and
         max_angle_rad: Largest link angle of references [rad], at least
             ``max_speed_rad_s`` times ``episode_s``. Default: 3.
         episode_s: Duration of an episode [s]. Default: 4.

@@ -36,7 +36,8 @@ class Sensors:
     torque_sensor: bool = False
     """Whether there is an output torque sensor."""
     torque_noise_of_rated: float = 1e-3
-    """Standard deviation of the torque reading relative to rated torque [-]."""
+    """Standard deviation of a torque reading, that of gauges included, relative to
+    rated torque [-]."""
     delay_periods: int = 1
     """Age of every reading when the controller receives it [control periods], at most
     the length of an episode."""
@@ -85,12 +86,18 @@ class Sensors:
 class Readout:
     """Readings of n simulations over time.
 
-    The channels are the motor angles of all joints, followed by the link angles and the
-    output torques if there are such sensors.
+    The channels are the motor angles of all joints, followed by the link angles, the
+    output torques and the torques that strain gauges read if there are such sensors.
     """
 
     def __init__(
-        self, sensors: Sensors, count: int, rated_torque: Array, period: float
+        self,
+        sensors: Sensors,
+        count: int,
+        rated_torque: Array,
+        period: float,
+        *,
+        gauges: bool = False,
     ) -> None:
         """Prepare the channels of all simulations.
 
@@ -99,6 +106,7 @@ class Readout:
             count: Number of simulations.
             rated_torque: Rated torque of every drive [N·m]. Shape (n_joints,).
             period: Control period [s].
+            gauges: Whether strain gauges read the torque.
         """
         joints, self._period = len(rated_torque), period
         one = np.ones(joints)
@@ -109,8 +117,9 @@ class Readout:
             parts.append(
                 (_count(sensors.link_counts) * one, sensors.link_noise_rad * one)
             )
-        if sensors.torque_sensor:
-            parts.append((0.0 * one, sensors.torque_noise_of_rated * rated_torque))
+        parts += [(0.0 * one, sensors.torque_noise_of_rated * rated_torque)] * (
+            int(sensors.torque_sensor) + int(gauges)
+        )
         self._resolution, self._noise = map(np.concatenate, zip(*parts, strict=True))
         self._coarse = self._resolution > 0.0
         self._rounds = self._resolution[self._coarse]

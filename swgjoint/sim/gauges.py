@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from math import gcd
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from swgjoint.drives.references import names_catalogue
 from swgjoint.drives.sections import GaugesSection, JointSection
@@ -23,6 +24,8 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.typing import Array
 from swgjoint.units import mm
+
+Values = TypeVar("Values", float, Array)
 
 COMPARED = (1, 2, 3, 5)
 """Numbers of bridges of which the figures state what they would leave."""
@@ -71,18 +74,50 @@ class JointGauges:
         """Amplitudes of the ripple by order, as output torque (m,) [N·m]."""
         return np.asarray(np.abs(self.ring.ripple(self.strain) / self.nominal_gain))
 
-    def read_torque(self, torque: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
+    @cached_property
+    def _waves(self) -> tuple[int, list[float], list[float]]:
+        """Common divisor of all orders, and real and imaginary amplitudes [N·m].
+
+        The amplitudes are those of the multiples of the divisor, the highest first.
+        """
+        orders = [round(order) for order in self.strain.orders]
+        step = gcd(*orders)
+        waves = np.zeros(max(orders) // step + 1, complex)
+        ripple = self.ring.ripple(self.strain) / self.nominal_gain
+        waves[np.array(orders) // step] = ripple
+        return step, waves.real[::-1].tolist(), waves.imag[::-1].tolist()
+
+    @cached_property
+    def _scale(self) -> float:
+        """Reading per torque [-]; one without errors of the gauges."""
+        return self.gain / self.nominal_gain
+
+    @property
+    def largest_ripple(self) -> float:
+        """Upper bound of the ripple of the reading [N·m]."""
+        return float(self.ripple.sum())
+
+    def read_torque(self, torque: Values, theta: Values, psi: Values) -> Values:
         """Output torque that the gauges read (n,) [N·m].
 
+        The sum over the orders, Re sum c_n exp(-i n beta), is computed by Horner's rule
+        in real numbers, so that one instant and many give the same bits.
+
         Args:
-            torque: Output torque (n,) [N·m].
+            torque: Output torque (n,) [N·m], or a number, like the others.
             theta: Input angle (n,) [rad].
             psi: Output angle (n,) [rad].
         """
         a, b = angle_coefficients(self.layout)[1]
-        beta = a * np.asarray(theta) + b * np.asarray(psi)
-        in_wall = self.share * np.asarray(torque)
-        return self.ring.signal(self.strain, in_wall, beta) / self.nominal_gain
+        step, real, imaginary = self._waves
+        angle = step * (a * theta + b * psi)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        if isinstance(torque, float):  # python's numbers are faster than numpy's
+            cosine, sine = float(cosine), float(sine)
+        re, im = 0.0 * cosine, 0.0 * sine
+        for x, y in zip(real, imaginary, strict=True):
+            re, im = re * cosine + im * sine + x, im * cosine - re * sine + y
+        return self._scale * torque + re
 
 
 def with_bridges(gauges: JointGauges, count: int) -> JointGauges:
@@ -112,18 +147,32 @@ def joint_gauges(
         InputError: If the geometry of a flexspline is not known or does not fit.
     """
     return {
-        t.joint: _checked_gauges(
-            section, section.gauges, t.drive, where=f"{where}: joints.{t.joint}.gauges"
+        t.joint: gauges_of_drive(
+            section.gauges,
+            t.drive,
+            section.drive,
+            where=f"{where}: joints.{t.joint}.gauges",
         )
         for section, t in zip(sections, transmissions, strict=True)
         if section.gauges is not None
     }
 
 
-def _checked_gauges(
-    joint: JointSection, section: GaugesSection, drive: DriveMap, *, where: str
+def gauges_of_drive(
+    section: GaugesSection, drive: DriveMap, reference: str | None, *, where: str
 ) -> JointGauges:
-    design = _flexspline_design(joint, section, where=where)
+    """Gauges on the flexspline of one drive, with the strain that they see.
+
+    Args:
+        section: The gauges.
+        drive: Map of the drive.
+        reference: Reference of the drive (catalogue name, design or file), if any.
+        where: Path of the section, for messages.
+
+    Raises:
+        InputError: If the geometry of the flexspline is not known or does not fit.
+    """
+    design = _flexspline_design(section, reference, where=where)
     if (design.ratio, design.drive.layout) != (drive.ratio, drive.layout):
         raise InputError(
             f"{where}.flexspline: {design.drive.name!r} has the ratio"
@@ -164,10 +213,10 @@ def _contact_strain(design: Design, place: float, *, where: str) -> WallStrain:
 
 
 def _flexspline_design(
-    joint: JointSection, section: GaugesSection, *, where: str
+    section: GaugesSection, drive: str | None, *, where: str
 ) -> Design:
     """The design that states the geometry of the flexspline."""
-    reference = section.flexspline or joint.drive
+    reference = section.flexspline or drive
     if section.flexspline is None and (
         reference is None or reference.endswith(".swg") or names_catalogue(reference)
     ):

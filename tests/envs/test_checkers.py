@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 from swgjoint.envs import ENVIRONMENTS
 
 BENCH = {
-    "drive": "CSG-20-160",
+    "drive": "CSG-20-100",
     "level": "linear",
     "rotor_inertia_kgm2": 2e-4,
     "load_inertia_kgm2": 2.0,
@@ -28,6 +28,7 @@ BENCH = {
     "period_s": 5e-3,
     "load_of_rated": 0.2,
     "sensors": {"link_encoder": True, "torque_sensor": True, "delay_periods": 2},
+    "gauges": {"flexspline": "size-20-100", "position_mm": 11.0, "strain": "outline"},
     "randomise": {"load_inertia": 0.3},
     "error_scale_arcmin": 2.0,
     "effort_weight": 0.0,

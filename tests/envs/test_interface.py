@@ -16,6 +16,7 @@ from swgjoint.envs.entries import table
 from swgjoint.errors import InputError
 
 ALL = {"link_encoder": True, "torque_sensor": True}
+GAUGES = {"flexspline": "size-25-100", "position_mm": 13.0, "strain": "outline"}
 SHORT = {
     "swgjoint/JointTracking-v0": {"episode_s": 0.5, "load_of_rated": 0.05},
     "swgjoint/RippleSuppression-v0": {"episode_s": 1.6, "period_s": 4e-3},
@@ -59,13 +60,14 @@ def test_check_env(name, randomise):
 @NAMES
 def test_tables_are_those_of_the_code(name):
     """The docstring's tables are made by the code."""
-    env = make(name, sensors=ALL).unwrapped
+    gauges = {} if name.endswith("ArmTracking-v0") else {"gauges": GAUGES}
+    env = make(name, sensors=ALL, **gauges).unwrapped
     blocks = inspect.cleandoc(type(env).__doc__).split("\n\n")
     assert table(env.core.action_entries) in blocks
     assert table(env.core.observation_entries) in blocks
     joints = len(env.core.joints.names)
     plain = make(name).unwrapped.observation_space.shape[0]
-    assert env.observation_space.shape == (plain + 2 * joints,)
+    assert env.observation_space.shape == (plain + 2 * joints + len(gauges),)
 
 
 @NAMES
@@ -102,7 +104,11 @@ def test_batch_equals_single_environments(name, level):
         "randomise": True,
         "sensors": {**ALL, "delay_periods": 2},
     }
-    count = 2 if name.endswith("ArmTracking-v0") else 5
+    count = 5
+    if name.endswith("ArmTracking-v0"):
+        count = 2
+    else:
+        keys["gauges"] = GAUGES
     sync = SyncVectorEnv([lambda: make(name, **keys).unwrapped] * count)
     batch = gymnasium.make_vec(name, num_envs=count, threads=2, **keys)
     assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP

@@ -9,6 +9,14 @@ from swgjoint.envs.joint_tracking import JointTrackingEnv
 from swgjoint.envs.ripple_suppression import RippleSuppressionEnv
 
 ALL = {"link_encoder": True, "torque_sensor": True}
+GAUGES = {
+    "flexspline": "size-25-100",
+    "position_mm": 13.0,
+    "strain": "outline",
+    "bridges": 3,
+    "place_errors_deg": [0.5, -0.3, 0.2],
+    "turn_errors_deg": [1.0, -0.5, 0.2],
+}
 
 
 def run(env, arrays, actions):
@@ -33,6 +41,7 @@ def run(env, arrays, actions):
         {"level": "linear", "randomise": True, "sensors": ALL},
         {"friction": False, "sensors": {**ALL, "delay_periods": 5}, "payload_kg": 3.0},
         {"randomise": True, "sensors": {"motor_counts": 0, "delay_periods": 0}},
+        {"randomise": True, "sensors": ALL, "gauges": GAUGES},
         {"drive": "CSG-14-50", "period_s": 2e-3, "torque_limit_Nm": 0.4},
     ],
 )

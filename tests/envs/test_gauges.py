@@ -1,0 +1,104 @@
+"""Strain gauges of the environments on the bench: what they read, and the refusals."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import swgjoint.envs  # noqa: F401  (registers the environments)
+from swgjoint.errors import InputError
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.gauges import FlexsplineWall, GaugeRing
+
+GAUGES = {"flexspline": "size-25-100", "position_mm": 13.0, "strain": "outline"}
+EXACT = {
+    "motor_counts": 0,
+    "motor_noise_rad": 0.0,
+    "torque_sensor": True,
+    "torque_noise_of_rated": 0.0,
+    "delay_periods": 0,
+}
+NAMES = ["swgjoint/JointTracking-v0", "swgjoint/RippleSuppression-v0"]
+
+
+def turn(name, steps=700, **gauges):
+    """True torque, gear angle, and the readings of torque sensor and gauges."""
+    env = gymnasium.make(name, sensors=EXACT, gauges=GAUGES | gauges).unwrapped
+    env.reset(seed=2)
+    rows = []
+    for k in range(steps):
+        observation, *_, info = env.step(np.array([0.02 * np.sin(0.02 * k)]))
+        angle = info["motor_angle_rad"] - info["link_angle_rad"]
+        rows.append((info["output_torque_Nm"], angle, *observation[-2:]))
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reading_is_the_closed_form_of_torque_and_angle(name):
+    """The drive's circular spline is fixed; the torque sensor reads the torque."""
+    torque, beta, sensor, reading = turn(name)
+    ring = GaugeRing(place=13e-3)
+    strain = FlexsplineWall.from_design(Design.load("size-25-100")).strain(13e-3)
+    want = ring.signal(strain, torque, beta) / ring.gain(strain)
+    np.testing.assert_array_equal(sensor, torque)
+    np.testing.assert_allclose(reading, want, atol=1e-9)
+    assert np.ptp(beta) > 2.0 * np.pi
+    assert np.abs(reading - torque).max() > 50.0  # the ripple of two lobes
+
+
+@pytest.mark.parametrize(
+    ("bridges", "left"),
+    [({"bridges": 3}, [6, 12]), ({"bridges": 2, "spacing_deg": 90.0}, [4, 8, 12])],
+)
+def test_bridges_leave_the_orders_that_theory_says(bridges, left):
+    """Three equally spaced ones multiples of six, two at right angles of four."""
+    torque, beta, _, reading = turn(NAMES[1], **bridges)
+    strain = FlexsplineWall.from_design(Design.load("size-25-100")).strain(13e-3)
+    stays = np.isin(strain.orders, left)
+    assert stays.sum() == len(left)
+    wave = np.exp(-1j * np.multiply.outer(beta, strain.orders[stays]))
+    want = (wave @ strain.shear[stays]).real / strain.torsion
+    np.testing.assert_allclose(reading - torque, want, atol=1e-9)
+    assert np.abs(want).max() > 1e-3
+
+
+def test_gauges_leave_the_motion_as_it_is():
+    """Gauges read; the torque over time has the same bits with and without errors."""
+    one, other = turn(NAMES[1]), turn(NAMES[1], bridges=2, turn_errors_deg=[1.0, 0.0])
+    np.testing.assert_array_equal(one[:3], other[:3])
+    assert np.abs(one[3] - other[3]).max() > 0.5
+
+
+def test_measurements_for_controllers_keep_their_places():
+    """Controllers get the torque sensor and the link encoder, not the gauges."""
+    sensors = {"link_encoder": True, "torque_sensor": True}
+    runs = []
+    for gauges in ({}, {"gauges": GAUGES}):
+        env = gymnasium.make(NAMES[1], sensors=sensors, **gauges).unwrapped
+        observation, _ = env.reset(seed=1)
+        observation, *_ = env.step(np.zeros(1))
+        runs.append(env.read_measurements(observation))
+        # the noise of a further channel comes from the same generator
+        want = observation[9:11]
+        assert runs[-1].link_angle == want[:1]
+        assert runs[-1].output_torque == want[1:]
+
+
+@pytest.mark.parametrize(
+    ("gauges", "match"),
+    [
+        (3, "gauges 3; accepted: None or a mapping with flexspline"),
+        ({"position_mm": 13.0}, "gauges.flexspline: missing; drive 'CSG-25-100'"),
+        (GAUGES | {"place": 1}, "gauges: place: unknown key; did you mean"),
+        (GAUGES | {"position_mm": 40.0}, "gauges.position_mm = 40 mm; accepted: "),
+        (GAUGES | {"bridges": 0}, "gauges: bridges = 0: "),
+        (GAUGES | {"flexspline": "size-25-50"}, "has the ratio -50"),
+        (GAUGES | {"flexspline": "absent"}, "gauges.flexspline: "),
+    ],
+)
+def test_bad_gauges_are_refused_in_one_line(gauges, match):
+    """With the key and what is accepted, before anything is built."""
+    with pytest.raises(InputError, match=match) as caught:
+        gymnasium.make(NAMES[1], gauges=gauges)
+    assert len(str(caught.value).splitlines()) == 1
