@@ -30,6 +30,42 @@ def words(key: str) -> tuple[str, str]:
     return key.replace("_", " "), ""
 
 
+LASTING = 1e6
+"""Longest displayed life [h]: more than a hundred years, where the formulas of bearing
+life and fatigue are not meant to apply."""
+
+
+def format_hours(value: float | None) -> str:
+    """Format a life [h] with three digits; a bound beyond :data:`LASTING`.
+
+    It becomes a dash if it is not known.
+
+    Args:
+        value: Life [h]; None if it is not known.
+
+    >>> format_hours(379812.3), format_hours(1.44e12), format_hours(None)
+    ('380,000', '> 1e6', '-')
+    """
+    if value is None:
+        return "-"
+    return f"{float(f'{value:.3g}'):,.12g}" if value <= LASTING else "> 1e6"
+
+
+def format_named(key: str, value: object) -> str:
+    """Format the value of a figure for display; keys of lives end in ``_h``.
+
+    Args:
+        key: Key of the figure.
+        value: Its value.
+
+    >>> format_named("L10_h", 2e6), format_named("torsion_arcmin", 2e6)
+    ('> 1e6', '2,000,000')
+    """
+    if key.endswith("_h") and isinstance(value, float):
+        return format_hours(value)
+    return format_figure(value)
+
+
 def format_figure(value: object) -> str:
     """Format a value for display.
 

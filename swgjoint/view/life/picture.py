@@ -8,7 +8,7 @@ import numpy as np
 
 from swgjoint.pictures import png
 from swgjoint.units import rpm
-from swgjoint.view.words import short
+from swgjoint.view.words import LASTING, short
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -101,9 +101,10 @@ def _draw_lives(axis: Any, joints: dict[str, Any]) -> None:
     axis.set_xlabel("life [h]")
     lasting = [value for _, values in known for value in values if value]
     if lasting:
-        shortest, longest = min(lasting), max(lasting)
+        shortest, longest = min(*lasting, LASTING), max(lasting)
+        last = min(3.0 * longest, SHOWN * shortest, 3.0 * LASTING)
         axis.set_xscale("log")
-        axis.set_xlim(0.3 * shortest, min(3.0 * longest, SHOWN * shortest))
+        axis.set_xlim(0.3 * shortest, last)
         axis.legend(fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-        if longest > SHOWN * shortest:
+        if longest > last:
             axis.set_xlabel("life [h], the longest bars are cut off")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from swgjoint.view.words import format_figure, short
+from swgjoint.view.words import format_figure, format_hours, short
 
 COLUMNS = (
     ("joint", ""),
@@ -51,11 +51,11 @@ def life_cells(joint: str, life: Mapping[str, Any]) -> list[str]:
         short(joint),
         format_figure(life["cubed_mean_Nm"]),
         format_figure(life["mean_input_speed_rpm"]),
-        _hours(bearing["L50_h"]),
-        _hours(bearing["L10_h"]),
+        format_hours(bearing["L50_h"]),
+        format_hours(bearing["L10_h"]),
         format_figure(flexspline["stress_amplitude_MPa"]),
         format_figure(flexspline["goodman_safety"]),
-        "unlimited" if flexspline["unlimited"] else _hours(flexspline["life_h"]),
+        "unlimited" if flexspline["unlimited"] else format_hours(flexspline["life_h"]),
         *(format_figure(life["margins"][k]) for k in life["margins"]),
     ]
 
@@ -71,17 +71,6 @@ def life_grid(
     rows = [life_cells(joint, life) for joint, life in lives.items()]
     used = [k for k in range(len(COLUMNS)) if any(row[k] != "-" for row in rows)]
     return [COLUMNS[k] for k in used], [[row[k] for k in used] for row in rows]
-
-
-def _hours(value: float | None) -> str:
-    """A life with three digits; a dash if it is not known.
-
-    >>> _hours(6379812.3), _hours(1.44e12), _hours(None)
-    ('6,380,000', '1.44e+12', '-')
-    """
-    if value is None:
-        return "-"
-    return f"{float(f'{value:.3g}'):,.12g}" if value < 1e7 else f"{value:.3g}"
 
 
 BEARING_COLUMNS = (
@@ -119,7 +108,7 @@ def bearing_grid(joints: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
                     "mean_axial_N",
                 )
             ),
-            _hours(one["L10_h"]),
+            format_hours(one["L10_h"]),
         ]
         for name, joint in joints.items()
         if (one := joint.get("output_bearing"))

@@ -11,7 +11,7 @@ from swgjoint.pictures import png
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.tables import Cell, Table
-from swgjoint.view.words import format_figure
+from swgjoint.view.words import format_named
 
 if TYPE_CHECKING:
     from swgjoint.explore.compare.compare import Compared
@@ -72,7 +72,7 @@ def cell(row: Mapping[str, Any], key: str) -> str:
         sign = joint_mark(row, JUDGED_BY[key])
     else:
         sign = error_mark(row, row[key]) if key == _ERROR else ""
-    return f"{sign} {bound}{format_figure(row[key])}".strip()
+    return f"{sign} {bound}{format_named(key, row[key])}".strip()
 
 
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
