@@ -180,7 +180,7 @@ def _command(name: str, arguments: list[str]) -> int:
     incomplete: list[str] = []
     try:
         with warnings.catch_warnings(), _ended(progress):
-            warnings.showwarning = partial(_show_warning, incomplete)
+            warnings.showwarning = partial(_show_warning, set(), incomplete)
             result = _result(module, args)
     except SwgError as exc:
         bad_input = isinstance(exc, InputError)
@@ -238,14 +238,17 @@ def _internal(exc: Exception, *, shown: bool) -> str:
 
 
 def _show_warning(
+    shown: set[str],
     incomplete: list[str],
     message: Warning | str,
     category: type[Warning],
     *_: Any,
     **__: Any,
 ) -> None:
-    """Print a warning; also collect it if it reports a missing output file."""
-    print(_cut(f"swgjoint: warning: {message}"), file=sys.stderr)
+    """Print a warning once; also collect it if it reports a missing output file."""
+    if str(message) not in shown:
+        print(_cut(f"swgjoint: warning: {message}"), file=sys.stderr)
+    shown.add(str(message))
     if issubclass(category, OutputWarning):
         incomplete.append(str(message))
 

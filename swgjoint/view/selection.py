@@ -11,11 +11,13 @@ from swgjoint.pictures import png
 from swgjoint.sim.figures.keys import LOWER
 from swgjoint.view.plots.compare import HEADER
 from swgjoint.view.report.tables import Cell, Table
-from swgjoint.view.words import format_figure, short, words
+from swgjoint.view.words import format_figure, format_named, short, words
 
 SHOWN = 12
 """Largest number of simulated sets in the table: the last ones that are not dearer than
 the selected set."""
+MASS = "mass_kg"
+"""Column of the mass of drives."""
 _USES = {
     "peak_torque_of_rating": "peak torque",
     "cubed_mean_torque_of_rating": "mean torque",
@@ -87,7 +89,7 @@ def _selected(result: Result) -> Table:
                 Cell(short(name), "text"),
                 Cell(chosen["drive"], "text"),
                 Cell(format_figure(chosen["cost"])),
-                *(Cell(format_figure(figures[key]), "good") for key in keys),
+                *(Cell(format_named(key, figures[key]), "good") for key in keys),
                 Cell(_cheaper(drives, chosen), "text"),
             ]
         )
@@ -104,8 +106,23 @@ def _selected(result: Result) -> Table:
             ("next cheaper drive", ""),
         ],
         rows=rows,
-        notes=[f"limits: {', '.join(limits)}"],
+        notes=[f"limits: {', '.join(limits)}", *_remarks(result)],
     )
+
+
+def _remarks(result: Result) -> list[str]:
+    """What the selection assumes about encoders and masses."""
+    remarks = []
+    if result["motor_feedback_failure"] is not None:
+        remarks.append(
+            "the controller holds the link angles, which needs an encoder at every link"
+        )
+    if result["by"] == MASS:
+        remarks.append(
+            "the mass of the drives is a cost and does not load the arm, whose file"
+            " includes the drives of its maker"
+        )
+    return remarks
 
 
 def _cheaper(drives: Sequence[Mapping[str, Any]], chosen: Mapping[str, Any]) -> str:

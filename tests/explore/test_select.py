@@ -416,6 +416,34 @@ def test_an_impossible_spec_names_joint_and_limit(argv, message, tmp_path, capsy
     assert not out.exists()
 
 
+def test_an_arm_gets_feedback_of_the_links_if_motors_do_not_suffice(tmp_path, capsys):
+    """Unless the controller is stated; the winner meets the limit on its own."""
+    limit = ["--limit", "tool_path_rms_mm=0.6"]
+    table = tmp_path / "drives.csv"
+    table.write_text("drive\nCSG-20-100\nCSG-25-100\n")
+    few = ["--table", str(table), "--without-catalogue", *limit]
+    out = tmp_path / "out"
+    status, found = run(capsys, *TWO_LINKS, *few, "--out", str(out))
+    assert status == 0 and found["feedback"] == "link"
+    assert "the nearest set has tool_path_rms_mm" in found["motor_feedback_failure"]
+    alone = run_scene(Scene.load_file(out / "scene.toml"))
+    assert alone.assembly.scene.controller.feedback == "link"
+    assert alone.metrics()["tool"]["path_rms_mm"] < 0.6
+    # a stated controller stays as it is, and so does one that meets the limit
+    stated = ["--set", "controller.feedback=motor"]
+    status, found = run(capsys, *TWO_LINKS, *few, *stated)
+    assert status == 1 and found["feedback"] == "motor"
+    assert found["motor_feedback_failure"] is None
+    few[-1] = "tool_path_rms_mm=20"
+    status, found = run(capsys, *TWO_LINKS, *few)
+    assert status == 0 and found["feedback"] == "motor"
+    assert found["motor_feedback_failure"] is None
+    # a limit of a joint is not one that feedback helps to meet
+    few[-1] = "torsion_arcmin=0.001"
+    status, found = run(capsys, *TWO_LINKS, *few)
+    assert status == 1 and found["feedback"] == "motor"
+
+
 @pytest.mark.filterwarnings("default:.*are not selected")
 def test_a_table_adds_drives_and_another_cost(tmp_path, capsys):
     """A map beside the table; drives of the catalogue without a price do not count."""
@@ -497,7 +525,7 @@ def test_options_have_different_names():
 @pytest.mark.parametrize(
     ("arm", "payload", "feedback", "limit"),
     [
-        ("ur5e", 5, "link", 0.3),
+        ("ur5e", 5, "", 0.3),  # as a user types it: motors first, then links
         ("ur5e", 5, "motor", 2.0),
         ("kuka_iiwa/iiwa.xml", 3, "link", 0.3),
         ("universal_robots_ur10/ur10_robot.urdf", 3, "motor", 4.0),
@@ -509,7 +537,8 @@ def test_drives_of_whole_arms_meet_the_spec(
     """Bundled, MJCF and URDF: the winner meets the spec on its own."""
     out = tmp_path / "out"
     path = str(ROBOTS / arm) if "/" in arm else arm
-    argv = [path, "--payload", str(payload), "--set", f"controller.feedback={feedback}"]
+    argv = [path, "--payload", str(payload)]
+    argv += ["--set", f"controller.feedback={feedback}"] if feedback else []
     limits = {"tool_path_rms_mm": limit, "L10_h": 1e4}
     for key, value in limits.items():
         argv += ["--limit", f"{key}={value}"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "arm",
         metavar="ARM|SCENE",
         help="MJCF or URDF file of an arm, scene file, or bundled name; without a task,"
-        " an arm is moved through the slow sweep of swgjoint run",
+        " an arm is moved through the slow sweep of swgjoint run, and if no set meets a"
+        " limit of the tool, the controller gets feedback of the link angles",
     )
     parser.add_argument(
         "--task",
@@ -77,7 +79,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         a predicted tool error close to its limit), ``cost``, ``drives`` (by joint;
         null without a set), ``joints`` (every drive at every joint, with its checks and
         why it was dropped), ``simulated`` (sets in the order of their simulation),
-        ``files`` and ``wall_s``.
+        ``feedback`` (side whose angles the controller holds),
+        ``motor_feedback_failure`` (why no set meets the limits with feedback of the
+        motor angles; null if that was not tried first), ``files`` and ``wall_s``.
     """
     folder, begin = output_folder(args.out) if args.out else None, time.perf_counter()
     from swgjoint.explore.select.options import MASS, read_options
@@ -91,18 +95,37 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         catalogue=not args.without_catalogue,
         progress=args.progress,
     )
-    selection = select_drives(
-        _scene_of(args, options), options, spec=spec, progress=args.progress
-    )
-    result = {**selection.to_json(), "by": by, "files": []}
+    scene, free = _scene_of(args, options)
+
+    def select(scene: Scene) -> DriveSelection:
+        return select_drives(scene, options, spec=spec, progress=args.progress)
+
+    selection, motor_failure = select(scene), None
+    if free and selection.misses_tool_error:
+        motor_failure = selection.failure
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the first selection has shown them
+            selection = select(scene.with_changes({"controller.feedback": "link"}))
+    result = {
+        **selection.to_json(),
+        "feedback": scene.controller.feedback if motor_failure is None else "link",
+        "motor_feedback_failure": motor_failure,
+        "by": by,
+        "files": [],
+    }
     result["wall_s"] = time.perf_counter() - begin
     if folder is not None and selection.winner is not None:
         _write(folder, result, selection)
     return result
 
 
-def _scene_of(args: argparse.Namespace, options: tuple[DriveOption, ...]) -> Scene:
-    """Scene of the arm and its task, with a step that resolves every drive."""
+def _scene_of(
+    args: argparse.Namespace, options: tuple[DriveOption, ...]
+) -> tuple[Scene, bool]:
+    """Scene of the arm and its task, with a step that resolves every drive.
+
+    The second value is whether the user has left the controller open.
+    """
     from swgjoint.explore.compare.scene import resolve_step
     from swgjoint.sim.arm.scene import is_arm
 
@@ -126,7 +149,8 @@ def _scene_of(args: argparse.Namespace, options: tuple[DriveOption, ...]) -> Sce
     stepped = any(text.startswith("simulation.step_s") for text in changes)
     if is_arm(args.scene) and not stepped:
         scene = resolve_step(scene, [option.drive for option in options])
-    return scene
+    stated = any(text.startswith("controller.") for text in changes)
+    return scene, is_arm(args.scene) and not stated
 
 
 def _write(folder: Path, result: dict[str, Any], selection: DriveSelection) -> None:

@@ -15,9 +15,17 @@ def selection_lines(result: dict[str, Any]) -> list[str]:
     """
     from swgjoint.view.selection import limit_lines, selection_tables
 
+    tried = result["motor_feedback_failure"]
     count = len(result["simulated"])
     sets = "1 set" if count == 1 else f"{count} sets"
-    lines = [f"scene {result['scene']}: {sets} simulated in {result['wall_s']:.0f} s"]
+    lines = []
+    if tried is not None:
+        lines.append(f"with feedback of the motor angles, no set of drives: {tried}")
+        lines.append(
+            "with feedback of the link angles (controller.feedback = link), which needs"
+            " an encoder at every link:"
+        )
+    lines += [f"scene {result['scene']}: {sets} simulated in {result['wall_s']:.0f} s"]
     for one in selection_tables(result)[: 1 + bool(count)]:
         cells = [[cell.text for cell in row] for row in one.rows]
         names = [f"{name} [{unit}]" if unit else name for name, unit in one.header]

@@ -21,7 +21,9 @@ from swgjoint.sim.scene.scene import Scene
 
 GOODMAN = "goodman_safety"
 RESONANCE = "resonance_Hz"
-OF_ARM = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm", RESONANCE)
+TOOL = ("tool_path_rms_mm", "tool_ap_mm", "tool_rp_mm")
+"""Figures of the tool."""
+OF_ARM = (*TOOL, RESONANCE)
 """Figures of the whole arm; all others are figures of single joints."""
 _OF_BEARING = {"L50_h", "L10_h", "rated_speed_rpm"}
 

@@ -6,7 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from swgjoint.explore.select.evaluation import RESONANCE, SimulatedSet, tool_shares
+from swgjoint.explore.select.evaluation import (
+    RESONANCE,
+    TOOL,
+    SimulatedSet,
+    tool_shares,
+)
 from swgjoint.explore.select.loads import LimitCheck
 from swgjoint.explore.select.options import DriveOption
 from swgjoint.sim.figures.resonance import lowest_resonance
@@ -50,6 +55,12 @@ class DriveSelection:
     """Scene with the drives of the winner."""
     failure: str
     """Joint and limit that leave no set; empty with a winner."""
+
+    @property
+    def misses_tool_error(self) -> bool:
+        """Whether there is no set, and a simulated one misses a limit of the tool."""
+        missed = (miss.check.key for one in self.simulated for miss in one.missed)
+        return self.winner is None and any(key in TOOL for key in missed)
 
     @property
     def careful(self) -> bool:
