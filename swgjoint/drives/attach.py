@@ -279,7 +279,7 @@ def _rotor(joint: str, drive: DriveMap, rotor_inertia: float | None) -> float:
     if assumed is None:
         raise InputError(
             f"joint {joint!r}: the rotor inertia of drive {drive.name!r} is unknown;"
-            " set rotor_inertia=... [kg·m²], the inertia of rotor and wave generator"
-            " about their axis"
+            " set rotor_inertia=... (on the command line --rotor-inertia) [kg·m²], the"
+            " inertia of rotor and wave generator about their axis"
         )
     return assumed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -152,14 +153,22 @@ def read_log(path: str | Path) -> BenchLog:
 
     The columns are ``time_s``, ``motor_angle_deg`` (or ``_rad``), ``link_angle_deg``
     (or ``_rad``, ``_arcmin``), and ``output_torque_Nm``, ``motor_torque_Nm`` or both.
-    Other columns are ignored.
+    A warning names other columns, which are ignored.
 
     Raises:
         InputError: If the file cannot be used; the message names file, line and column.
     """
-    has = {*header_of(path)}
+    header = header_of(path)
+    has = {*header}
     torques = {key: names for key, names in TORQUES.items() if has & set(names)}
     data = read_columns(path, {**NEEDED, **torques})
+    known = {name for names in (NEEDED | TORQUES).values() for name in names}
+    if unused := [name for name in header if name not in known]:
+        warnings.warn(
+            f"{path}: columns that are not used: {', '.join(unused)[:200]}; accepted:"
+            f" {', '.join(sorted(known))}",
+            stacklevel=2,
+        )
     return BenchLog(**data, where=str(path))
 
 

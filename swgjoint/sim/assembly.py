@@ -155,7 +155,7 @@ def assemble(
             torques only; None if the scene's own controller runs.
         variable: Whether drives at level ``full`` can deviate from their maps, see
             :mod:`swgjoint.joint.variation`.
-        progress: Called while maps are built.
+        progress: Called while maps are built and strains under gauges are solved.
 
     Returns:
         The compiled scene with its commanded motion.
@@ -254,7 +254,7 @@ def assemble(
         prescribed_rate=prescribed_rate,
         controlled_by=controlled_by,
         bearings=bearings,
-        gauges=joint_gauges(scene.where, sections, transmissions),
+        gauges=joint_gauges(scene.where, sections, transmissions, progress),
         **engine_addresses(model, arm.joints, transmissions, tuple(bearings)),
     )
 

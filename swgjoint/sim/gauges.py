@@ -21,6 +21,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.gauges import FlexsplineWall, GaugeRing, WallStrain, torque_in_wall
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.typing import Array
 from swgjoint.units import mm
@@ -135,6 +136,7 @@ def joint_gauges(
     where: str,
     sections: Sequence[JointSection],
     transmissions: Sequence[Transmission],
+    progress: Progress = silent,
 ) -> dict[str, JointGauges]:
     """Gauges by joint, for the joints that have any.
 
@@ -142,6 +144,7 @@ def joint_gauges(
         where: File name for messages.
         sections: Joint settings, one per joint.
         transmissions: Compiled drives, one per joint.
+        progress: Called while the contact of a flexspline is solved.
 
     Raises:
         InputError: If the geometry of a flexspline is not known or does not fit.
@@ -152,6 +155,7 @@ def joint_gauges(
             t.drive,
             section.drive,
             where=f"{where}: joints.{t.joint}.gauges",
+            progress=progress,
         )
         for section, t in zip(sections, transmissions, strict=True)
         if section.gauges is not None
@@ -159,7 +163,12 @@ def joint_gauges(
 
 
 def gauges_of_drive(
-    section: GaugesSection, drive: DriveMap, reference: str | None, *, where: str
+    section: GaugesSection,
+    drive: DriveMap,
+    reference: str | None,
+    *,
+    where: str,
+    progress: Progress = silent,
 ) -> JointGauges:
     """Gauges on the flexspline of one drive, with the strain that they see.
 
@@ -168,6 +177,7 @@ def gauges_of_drive(
         drive: Map of the drive.
         reference: Reference of the drive (catalogue name, design or file), if any.
         where: Path of the section, for messages.
+        progress: Called while the contact of the flexspline is solved.
 
     Raises:
         InputError: If the geometry of the flexspline is not known or does not fit.
@@ -195,7 +205,7 @@ def gauges_of_drive(
         ring=ring,
         strain=wall.strain(ring.place)
         if section.strain == "outline"
-        else _contact_strain(design, ring.place, where=where),
+        else _contact_strain(design, ring.place, where, progress),
         model=section.strain,
         layout=drive.layout,
         ratio=drive.ratio,
@@ -203,11 +213,13 @@ def gauges_of_drive(
     )
 
 
-def _contact_strain(design: Design, place: float, *, where: str) -> WallStrain:
+def _contact_strain(
+    design: Design, place: float, where: str, progress: Progress
+) -> WallStrain:
     from swgjoint.fe.solid.figures.deflected_wall import deflected_strain
 
     try:
-        return deflected_strain(design, place)
+        return deflected_strain(design, place, progress=progress)
     except InputError as error:
         raise InputError(f"{where}.flexspline: {error}") from None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import mujoco
 import numpy as np
 import pytest
 from messages import names, naming
@@ -14,8 +15,10 @@ from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
+from swgjoint.explore.compare import compare
 from swgjoint.explore.compare.scene import joints_named, resolve_step, with_drive
 from swgjoint.gear.design.design import Design
+from swgjoint.joint import plugin
 from swgjoint.models_path import models_path
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
@@ -55,6 +58,26 @@ def test_levels_keep_the_drives_of_the_scene(capsys):
     assert rigid["transmission_error_arcmin"] == 0.0
     assert rigid["transmission_error_ripple_arcmin"] == rigid["torsion_arcmin"] == 0.0
     assert full["torsion_arcmin"] > 0.1
+
+
+def test_another_mujoco_is_reported_before_maps_are_built(monkeypatch, capsys):
+    """Unless no joint of any row needs the plugin."""
+
+    def refuse(*args, **keys):
+        raise AssertionError("a map is built")
+
+    plugin.load.cache_clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(mujoco, "__version__", "0.0.1")
+        patch.setattr(compare, "load_drive", refuse)
+        assert main(["compare", SOFT, "rigid", *SHORT]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "mujoco 0.0.1 is installed" in line
+        patch.undo()
+        patch.setattr(mujoco, "__version__", "0.0.1")
+        drive = ["--set", f"defaults.drive={STIFF}", "--quiet"]
+        assert main(["compare", "rigid", "kinematic", *SHORT, *drive]) == 0
+    plugin.load.cache_clear()
 
 
 @pytest.mark.parametrize("level", ["rigid", "kinematic"])

@@ -552,6 +552,18 @@ def test_constant_channels_are_one_line(bench, columns, line):
         identify(log_of(rows), **settings(drive))
 
 
+def test_unknown_columns_are_named(tmp_path):
+    """A misspelled torque beside a known one is not ignored in silence."""
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time_s,motor_angle_deg,link_angle_deg,motor_torque_Nm,ouput_torque_Nm\n"
+        "0,1,2,3,4\n1,1,2,3,4\n"
+    )
+    with pytest.warns(UserWarning, match=naming("log.csv", "ouput_torque_Nm")):
+        log = read_log(path)
+    assert log.output_torque is None
+
+
 def test_bad_logs_are_one_line(tmp_path):
     """Missing columns, no torque, times that go back, gaps."""
     path = tmp_path / "log.csv"

@@ -104,13 +104,22 @@ def test_a_fixed_flexspline_takes_the_reaction(tmp_path, figures):
     assert np.abs(reading - torque).max() < 1e-3
 
 
-def test_contact_is_solved_by_default(tmp_path, figures):
+def test_contact_is_solved_by_default(tmp_path, figures, monkeypatch):
     """Coarse elements: less shear of two lobes than the outline has, more of four."""
     design = Design.load("reference-3d").with_changes({"mesh.refinement": 0.5})
     path = tmp_path / "coarse.toml"
     path.write_text(design.to_toml())
     changes = SHORT | {KEY + "flexspline": str(path), KEY + "position_mm": 18.0}
-    contact = run_scene("bench", overrides=changes, drives={"map": LINEAR})
+    stages = []
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path / "cache"))
+    contact = run_scene(
+        "bench",
+        overrides=changes,
+        drives={"map": LINEAR},
+        progress=lambda *stage: stages.append(stage),
+    )
+    strain = [done for name, done, of in stages if "wall strain" in name and of == 2]
+    assert strain == [0, 1, 2]
     found = contact.metrics()["joints"]["joint"]["gauges"]
     assert (found["strain"], figures["strain"]) == ("3d", "outline")
     assert found["gain_uV_V_Nm"] == pytest.approx(figures["gain_uV_V_Nm"])

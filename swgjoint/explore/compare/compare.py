@@ -18,6 +18,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.explore.compare.limits import require_cycle
 from swgjoint.explore.compare.scene import drives_of, source_of, with_drive, with_level
 from swgjoint.gear.design.design import Design
+from swgjoint.joint import plugin
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.progress import Progress, silent
@@ -160,11 +161,20 @@ def compare(
     """
     require_cycle(scene, spec or ())
     sources = {name: source_of(name) for name in arguments}
+    scenes = [
+        with_level(scene, name, joints)
+        if sources[name] is None
+        else with_drive(scene, name, joints)
+        for name in arguments
+    ]
+    driven = rigid_arm_of(scene).joints
+    if any(s.joint_settings(j).level == "full" for s in scenes for j in driven):
+        plugin.load()  # reports another MuJoCo before maps are built
     kept: dict[str, DriveMap] = {}  # drives that the scene keeps
 
     def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
         if model is not None:
-            for reference in drives_of(changed, rigid_arm_of(scene).joints):
+            for reference in drives_of(changed, driven):
                 if reference not in {*kept, *own} and _is_design(reference):
                     kept[reference] = load_drive(
                         reference, model=model, progress=progress
@@ -172,17 +182,16 @@ def compare(
         return {**kept, **own}
 
     rows = []
-    for number, name in enumerate(arguments):
+    for number, (name, changed) in enumerate(zip(arguments, scenes, strict=True)):
         begin = time.perf_counter()
         source = sources[name]
         if source is None:
-            changed = with_level(scene, name, joints)
             run = run_scene(changed, drives=known(changed, {}), name=name)
             drive, stress, safety = None, None, None
         else:
             fidelity = model if isinstance(source, Design) else None
             drive = load_drive(name, model=fidelity, progress=progress)
-            changed, own = with_drive(scene, name, joints), given_drives({name: drive})
+            own = given_drives({name: drive})
             run = run_scene(changed, drives=known(changed, own), name=name)
             stress = _stress(source, drive, model)
             safety = _safety(source, drive, progress) if fatigue else None

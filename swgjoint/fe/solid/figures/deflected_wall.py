@@ -21,6 +21,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.material import Material
 from swgjoint.gear.gauges import FlexsplineWall, WallStrain
 from swgjoint.maps.cache import recall
+from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array, Complex
 
 HIGHEST = 36
@@ -28,7 +29,9 @@ HIGHEST = 36
 of the wave generator has."""
 
 
-def deflected_strain(design: Design, place: float) -> WallStrain:
+def deflected_strain(
+    design: Design, place: float, *, progress: Progress = silent
+) -> WallStrain:
     """Strain at the outside of the wall on a rigid wave generator, without torque.
 
     The shear per torque is that of :meth:`.FlexsplineWall.torsion_strain`. The
@@ -37,13 +40,15 @@ def deflected_strain(design: Design, place: float) -> WallStrain:
     Args:
         design: The drive; it needs a ``[cup]``.
         place: Distance of the section from the outside of the closed end [m].
+        progress: Called before, between and after the condensation of the flexspline
+            and the search for its equilibrium.
 
     Raises:
         DesignError: If the 3D model cannot be built.
         ComputationError: If no equilibrium is found.
     """
     parts = {"figure": "deflected_wall", "design": design.content_hash()}
-    found = recall("figures", parts, dict[str, Any], lambda: _solve(design))
+    found = recall("figures", parts, dict[str, Any], lambda: _solve(design, progress))
     rows = np.array(found["real"]) + 1j * np.array(found["imag"])
     x = np.array(found["place_m"])
     strain = np.array(
@@ -58,9 +63,13 @@ def deflected_strain(design: Design, place: float) -> WallStrain:
     )
 
 
-def _solve(design: Design) -> dict[str, Any]:
+def _solve(design: Design, progress: Progress) -> dict[str, Any]:
+    stage = f"wall strain of {design.drive.name}"
+    progress(stage, 0, 2)
     model = solid_sector_model(design, half="auto")
+    progress(stage, 1, 2)
     state = SolidContinuation(model=model, ratio=design.ratio).deflect()
+    progress(stage, 2, 2)
     orders = np.arange(model.copies, HIGHEST + 1, model.copies, dtype=float)
     x, rows = wall_orders(model, state, design.material_of("flexspline"), orders)
     return {
