@@ -29,6 +29,7 @@ ARGUMENTS = {
     "drive": drive_of_training(),
     "sensors": {"torque_sensor": True},
     "episode_s": 3.0,
+    "normalise": False,
 }
 RATIO, RATED = -100.0, 87.0
 """Ratio and rated torque [N·m] of that drive."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import settings_of
 from swgjoint.envs.core import Core
-from swgjoint.envs.entries import Entry, bounds
+from swgjoint.envs.entries import bounds
 from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
@@ -38,10 +38,10 @@ def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
         )
 
 
-def _box(entries: tuple[Entry, ...]) -> Any:
-    """Space of all values of the entries within their bounds."""
-    low, high = bounds(entries)
-    return Box(low, high, dtype=np.float64)
+def _spaces(core: Core) -> tuple[Any, Any]:
+    """Spaces of all observations and actions within their bounds."""
+    observation, action = core.observation_bounds, bounds(core.action_entries)
+    return Box(*observation, dtype=np.float64), Box(*action, dtype=np.float64)
 
 
 class SingleEnv(gymnasium.Env[Array, Array]):
@@ -80,12 +80,12 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         self.core: Core = core
         self.render_mode = render_mode
         self._episode: JointEpisode | None = None
-        if self.episode_of is not None and self.episode_of.core_of is type(core):
-            self._episode = self.episode_of(core)
+        kind = self.episode_of
+        if kind is not None and kind.core_of is type(core) and not core.needs_arrays:
+            self._episode = kind(core)
         self._picture: Picture | None = None
         self._began = False
-        self.observation_space = _box(core.observation_entries)
-        self.action_space = _box(core.action_entries)
+        self.observation_space, self.action_space = _spaces(core)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -219,8 +219,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         core: Core = self.single.core_of(num_envs, threads, settings)
         self.core, self.num_envs = core, core.plant.batch.nsim
         self.metadata = {"render_modes": [], "autoreset_mode": mode}
-        self.single_observation_space = _box(core.observation_entries)
-        self.single_action_space = _box(core.action_entries)
+        self.single_observation_space, self.single_action_space = _spaces(core)
         self.observation_space = batch_space(
             self.single_observation_space, self.num_envs
         )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.arm_core import ArmCore, ArmSettings
+from swgjoint.envs.arm_core import ArmCore
+from swgjoint.envs.arm_settings import ArmSettings
 
 
 class ArmTrackingEnv(SingleEnv):
@@ -76,6 +77,7 @@ class ArmTrackingEnv(SingleEnv):
         randomise: As in ``JointTracking-v0``, but ``load_inertia`` has no effect
             because the scene sets the payload. With level ``linear``, True therefore
             varies nothing.
+        normalise: As in ``JointTracking-v0``. Default: True.
         error_scale_mm: Error scale of the reward [mm]. Default: 1.
         effort_weight: Effort weight of the reward [-]. Default: 0.1.
 

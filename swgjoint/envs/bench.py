@@ -85,6 +85,8 @@ class BenchSettings:
     """Strain gauges on the flexspline, with the keys of a scene; None: no gauges."""
     randomise: bool | Mapping[str, float] | SpecimenTolerances = False
     """Whether, or with which tolerances, drives and loads vary."""
+    normalise: bool = True
+    """Whether observations lie between -1 and 1, or have SI units."""
 
     def __post_init__(self) -> None:
         for key, unit in (
@@ -103,6 +105,7 @@ class BenchSettings:
         if self.kinematic_error_arcmin is not None:
             self._check("kinematic_error_arcmin", "arcmin", zero=True)
         check_flag("friction", self.friction)
+        check_flag("normalise", self.normalise)
         if not isinstance(self.drive, str | DriveMap):
             raise InputError(
                 f"drive {format_value(self.drive)}; accepted: a catalogue name, a map"
@@ -233,6 +236,7 @@ class BenchCore(Core):
             tolerances=tolerances,
             period=s.period_s,
             steps=s.steps,
+            normalise=bool(s.normalise),
             gauges=_gauges(s, drive),
         )
 

@@ -65,6 +65,7 @@ class Core(ABC):
         tolerances: SpecimenTolerances | None,
         period: float,
         steps: int,
+        normalise: bool,
         gauges: JointGauges | None = None,
         shared: bool = False,
     ) -> None:
@@ -79,6 +80,7 @@ class Core(ABC):
             tolerances: Tolerances of the drives; None: all drives are nominal.
             period: Control period [s].
             steps: Number of control periods of an episode.
+            normalise: Whether observations are divided by :attr:`units`.
             gauges: Strain gauges on the flexspline of the only joint, if any.
             shared: Whether all episodes follow the same plan.
         """
@@ -114,6 +116,15 @@ class Core(ABC):
         self.output_torque = np.zeros((count, n))
         """Output torque of the drives [N·m]. Shape (n, n_joints)."""
         self._low, self._high = bounds(self.observation_entries)
+        self.units = np.ones_like(self._high)
+        """Units of the observation: powers of two, so that no bit is lost."""
+        if normalise:
+            self.units = np.exp2(np.ceil(np.log2(self._high)))
+
+    @property
+    def needs_arrays(self) -> bool:
+        """Whether a single episode is computed with arrays, too."""
+        return False
 
     @abstractmethod
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
@@ -265,7 +276,13 @@ class Core(ABC):
 
     def observation(self) -> Array:
         """Readings and known quantities, clipped to bounds. Shape (n, n_values)."""
-        return np.clip(np.concatenate(self.columns(), axis=1), self._low, self._high)
+        values = np.concatenate(self.columns(), axis=1)
+        return np.clip(values, self._low, self._high) / self.units
+
+    @property
+    def observation_bounds(self) -> tuple[Array, Array]:
+        """Bounds of the observation in its units. Shapes (n_values,)."""
+        return self._low / self.units, self._high / self.units
 
     def readings(self) -> list[Array]:
         """Readings of link encoder, torque sensor and gauges, if any. (n, n_joints)."""
@@ -327,6 +344,7 @@ class Core(ABC):
 
     def read_measurements(self, observation: Array) -> Measured:
         """Sensor readings in observations with any leading axes, for controllers."""
+        observation = observation * self.units
         n, last = len(self.joints.names), observation.shape[-1]
         last -= n if self.gauges is not None else 0
         torque = last - n if self.sensors.torque_sensor else None

@@ -311,6 +311,10 @@ class JointTrackingEnv(SingleEnv):
             load inertia for every episode, while ``task`` keeps the nominal ones. With
             level ``linear``, True varies only the load inertia, and tolerances of the
             drive are rejected. Default: False.
+        normalise: Whether observations are divided by ``env.unwrapped.core.units``, the
+            powers of two next to their bounds, so that they lie between -1 and 1 and
+            lose no bit. ``read_measurements`` gives SI units in any case. With False,
+            observations have the units of the table. Default: True.
         reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
             Default: all three.
         error_scale_arcmin: Error scale of the reward [arcmin]. Default: 3.

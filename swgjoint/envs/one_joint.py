@@ -52,8 +52,8 @@ class JointEpisode(ABC):
                 limits.ratcheting,
             )
         ]
-        low, high = bounds(core.observation_entries)
-        self._bounds = list(zip(low.tolist(), high.tolist(), strict=True))
+        entries = *bounds(core.observation_entries), core.units
+        self._bounds = list(zip(*(one.tolist() for one in entries), strict=True))
         self._sensors, self._gauges = core.sensors, core.gauges
         self._channels = core.readout.channel_errors()
         self._advance = core.plant.step_one
@@ -108,8 +108,8 @@ class JointEpisode(ABC):
         values = self.columns() + self.readings[1:]
         observation = np.array(
             [
-                min(max(one, low), high)
-                for one, (low, high) in zip(values, self._bounds, strict=True)
+                min(max(one, low), high) / unit
+                for one, (low, high, unit) in zip(values, self._bounds, strict=True)
             ]
         )
         broken = self._broken(speed)

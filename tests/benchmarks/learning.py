@@ -32,25 +32,17 @@ IDS = {
     "arm": "swgjoint/ArmTracking-v0",
 }
 CASES = {
-    **{name: (name, {}, "ppo", False) for name in IDS},
-    **{f"{name}, scaled": (name, {}, "ppo", True) for name in IDS},
+    **{name: (name, {}, "ppo") for name in IDS},
+    **{f"{name}, SI": (name, {"normalise": False}, "ppo") for name in IDS},
     **{
-        f"{name}, randomise": (name, {"randomise": True}, "ppo", False)
+        f"{name}, randomise": (name, {"randomise": True}, "ppo")
         for name in ("joint", "ripple")
     },
-    "joint, 10 ms, SAC": ("joint", {"period_s": 0.01}, "sac", True),
+    "joint, 10 ms, SAC": ("joint", {"period_s": 0.01}, "sac"),
 }
-"""Environment, its keywords, algorithm, and whether observations are divided by their
-bounds."""
+"""Environment, its keywords and the algorithm."""
 COUNT, TESTS, TEST_SEED = 16, 32, 10_000
 """Number of environments of a training, of test episodes, and their first seed."""
-
-
-def scaled(env, observations):
-    """Observations between -1 and 1, by the bounds of their space."""
-    space = env.unwrapped.single_observation_space
-    part = (observations - space.low) / (space.high - space.low)
-    return np.clip(2.0 * part - 1.0, -1.0, 1.0)
 
 
 def rewards(env, act):
@@ -73,7 +65,7 @@ def pd(env):
     w = 2.0 * np.pi * 8.0
 
     def act(observation):
-        error, speed = observation[:, 2], observation[:, 3]
+        error, speed = (observation * core.units)[:, 2:4].T
         torque = inertia * (w**2 * error + 2.0 * w * speed)
         return np.clip(torque / limit, -1.0, 1.0)[:, None]
 
@@ -91,25 +83,11 @@ def train(job):
     import torch
     from stable_baselines3 import PPO, SAC
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.vec_env import VecEnvWrapper
 
     from swgjoint.envs.sb3 import BatchVecEnv
 
     torch.set_num_threads(1)
-    name, keywords, algorithm, by_bounds = CASES[case]
-
-    class Scaled(VecEnvWrapper):
-        """Observations divided by their bounds."""
-
-        def reset(self):
-            return scaled(batch, self.venv.reset()).astype(np.float32)
-
-        def step_wait(self):
-            seen, reward, done, infos = self.venv.step_wait()
-            for k in np.flatnonzero(done):
-                last = infos[k]["terminal_observation"]
-                infos[k]["terminal_observation"] = scaled(batch, last)
-            return scaled(batch, seen).astype(np.float32), reward, done, infos
+    name, keywords, algorithm = CASES[case]
 
     class Limit(BaseCallback):
         """End of the CPU time."""
@@ -119,20 +97,12 @@ def train(job):
 
     batch = gymnasium.make_vec(IDS[name], COUNT, autoreset_mode="SameStep", **keywords)
     env = BatchVecEnv(batch)
-    if by_bounds:
-        env = Scaled(
-            env,
-            observation_space=gymnasium.spaces.Box(
-                -1.0, 1.0, env.observation_space.shape, np.float32
-            ),
-        )
     kind = PPO if algorithm == "ppo" else SAC
     model = kind("MlpPolicy", env, seed=seed, device="cpu")
     test = gymnasium.make_vec(IDS[name], TESTS, **keywords)
 
     def act(observation):
-        seen = scaled(test, observation) if by_bounds else observation
-        return model.predict(seen, deterministic=True)[0]
+        return model.predict(observation, deterministic=True)[0]
 
     nothing = np.zeros((TESTS, *test.single_action_space.shape))
     result = {

@@ -30,6 +30,7 @@ BENCH = {
     "sensors": {"link_encoder": True, "torque_sensor": True, "delay_periods": 2},
     "gauges": {"flexspline": "size-20-100", "position_mm": 11.0, "strain": "outline"},
     "randomise": {"load_inertia": 0.3},
+    "normalise": False,
     "error_scale_arcmin": 2.0,
     "effort_weight": 0.0,
 }
@@ -61,6 +62,7 @@ ARGUMENTS = {
         "episode_s": 1.0,
         "sensors": BENCH["sensors"],
         "randomise": True,
+        "normalise": False,
         "error_scale_mm": 2.0,
         "effort_weight": 0.0,
     },

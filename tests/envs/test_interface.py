@@ -275,7 +275,8 @@ def test_tracking_errors_fill_their_range(name, delay):
     period = {} if name.endswith("ArmTracking-v0") else {"period_s": 2e-3}
     env = make(name, sensors={"delay_periods": delay}, **period).unwrapped
     n = len(env.core.joints.names)
-    angle, speed = (env.observation_space.high[k * n : (k + 1) * n] for k in (2, 3))
+    high = env.observation_space.high * env.core.units
+    angle, speed = (high[k * n : (k + 1) * n] for k in (2, 3))
     ratio = np.abs(env.core.joints.ratio)
     fastest = 0.6 if n == 1 else np.abs(env.core._path[:, 1]).max()
     lag = ratio * fastest * delay * env.core.period
@@ -293,3 +294,28 @@ def test_seeds_of_a_batch(name):
     np.testing.assert_array_equal(first, again)
     others, _ = batch.reset()
     assert np.abs(others - first).max() > 0.0
+
+
+@NAMES
+def test_normalised_observations_lose_no_bit(name):
+    """They lie between -1 and 1, are SI values over their units, and pay the same."""
+    keys = {"randomise": True, "sensors": ALL}
+    one, other = make(name, **keys).unwrapped, make(name, normalise=False, **keys)
+    other = other.unwrapped
+    space, units = one.observation_space, one.core.units
+    assert (space.high <= 1.0).all() and (space.high > 0.5).all()
+    assert (space.low == -space.high).all()
+    np.testing.assert_array_equal(space.high * units, other.observation_space.high)
+    assert (other.core.units == 1.0).all()
+    got, want = one.reset(seed=2), other.reset(seed=2)
+    rng, size = np.random.default_rng(0), one.action_space.shape
+    for _ in range(100):
+        np.testing.assert_array_equal(got[0] * units, want[0])
+        read, true = (
+            env.read_measurements(row[0]) for env, row in ((one, got), (other, want))
+        )
+        for key, value in vars(read).items():
+            np.testing.assert_array_equal(value, vars(true)[key])
+        action = rng.uniform(-0.3, 0.3, size)
+        got, want = one.step(action), other.step(action)
+        assert got[1:4] == want[1:4]

@@ -342,6 +342,7 @@ def test_no_reference_is_clipped(episode_s, speed, angle, period_s, kind, load, 
         period_s=period_s,
         reference=kind,
         load_of_rated=load,
+        normalise=False,
     )
     high = env.observation_space.high[4:8]
     for k in range(5):

@@ -183,7 +183,8 @@ def test_attributes_and_methods(adapter):
     assert many.get_attr("num_envs", [0, 2]) == [3, 3]
     assert many.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
     (read,) = many.env_method("read_measurements", first, indices=1)
-    np.testing.assert_array_equal(read.motor_angle, first[:, :1])
+    angle = first[:, :1] * many.batch.core.units[0]
+    np.testing.assert_array_equal(read.motor_angle, angle)
     many.set_attr("label", "a")
     assert many.batch.label == "a"
     with pytest.raises(InputError, match=naming("'label'", "1", "3")):

@@ -338,7 +338,7 @@ def test_own_environment_page(capsys):
         all_of = many.step(np.full((256, 1), 0.05 * np.sin(0.1 * k)))
         info, (observation, reward) = one[4], one[:2]
         assert (observation == all_of[0][0]).all() and reward == all_of[1][0]
-        assert observation[2] == info["output_torque_Nm"]
+        assert observation[2] * env.core.units[2] == info["output_torque_Nm"]
         load, error = info["output_torque_Nm"] / rated, info["link_error_arcmin"] / 3.0
         assert reward == pytest.approx(1.0 / (1.0 + error**2) - 0.2 * load**2)
 
