@@ -38,6 +38,11 @@ CASES = {
         f"{name}, randomise": (name, {"randomise": True}, "ppo")
         for name in ("joint", "ripple")
     },
+    "ripple, randomise, identify": (
+        "ripple",
+        {"randomise": True, "identify": True},
+        "ppo",
+    ),
     "joint, 10 ms, SAC": ("joint", {"period_s": 0.01}, "sac"),
 }
 """Environment, its keywords and the algorithm."""

@@ -50,6 +50,7 @@ ARGUMENTS = {
         "loop_Hz": 5.0,
         "loop_damping_ratio": 0.7,
         "ripple_scale_of_rated": 0.02,
+        "identify": True,
     },
     "swgjoint/ArmTracking-v0": {
         "scene": "two-link",
