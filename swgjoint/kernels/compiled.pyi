@@ -57,6 +57,62 @@ class Search:
         spacing: float,
     ) -> None: ...
 
+class Bore:
+    def __init__(self, weights: Array, stiffness: Array) -> None: ...
+    def gaps(
+        self,
+        nodes: Array,
+        touching: Mask,
+        elliptical: bool,
+        major: float,
+        minor: float,
+        angle: float,
+        offset: Array,
+        far: float,
+        gap: Array,
+        normal: Array,
+        curvature: Array,
+    ) -> None: ...
+    def forces(
+        self,
+        touching: Mask,
+        gap: Array,
+        normal: Array,
+        curvature: Array,
+        into: Index,
+        gradient: Array,
+        tangent: Array,
+    ) -> None: ...
+    def gaps_after(
+        self, gap: Array, normal: Array, into: Index, increment: Array, result: Array
+    ) -> None: ...
+
+class Sector:
+    def __init__(
+        self,
+        skeleton: Array,
+        face: int,
+        stiffness: Array,
+        turning_parts: Array,
+        rim_slopes: Array,
+        elongation: Array,
+        flank_from_skeleton: Array,
+        flank_compliance: Array,
+    ) -> None: ...
+    def tangents(
+        self,
+        place: Array,
+        positions: Array,
+        force: Array,
+        dofs: Index,
+        angle: Array,
+        gyration: Array,
+        kinematics: Array,
+        flank: Array,
+        gradient: Array,
+        tangent: Array,
+    ) -> None: ...
+
 class StripProblems:
     def __init__(
         self,

@@ -7,8 +7,8 @@
 #include <algorithm>
 
 #include "complementarity.h"
-#include "ellipse.h"
 #include "flank_arrays.h"
+#include "outline.h"
 #include "ring_factor.h"
 #include "tangents.h"
 #include "tooth_search.h"
@@ -126,7 +126,7 @@ void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
   require(points.shape(1) == 2 && result.shape(0) == n && result.shape(1) == 4,
           "points: (n, 2), result: (n, 4)");
   const nb::gil_scoped_release release;
-  swgjoint::ellipse_distance(points.data(), n, major, minor, result.data());
+  swgjoint::outline_distance(points.data(), n, {true, major, minor}, result.data());
 }
 
 void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
@@ -299,7 +299,11 @@ class RingFactor {
 
 }  // namespace
 
+// in plane_module.cc
+void bind_plane(nb::module_& m);
+
 NB_MODULE(compiled, m) {
+  bind_plane(m);
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
         nb::arg("result").noconvert());

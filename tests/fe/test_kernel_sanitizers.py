@@ -81,7 +81,7 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     tests = Path(__file__).parents[1]
     files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
-    assert len(files) == 5
+    assert len(files) == 6
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,
@@ -100,7 +100,7 @@ def test_the_loops_are_clean(tmp_path):
 
 def test_an_access_beyond_an_array_is_found(tmp_path):
     """One point too many in a loop of the module ends the tests."""
-    wrong = ("ellipse.cc", "i < n; ++i, points", "i <= n; ++i, points")
+    wrong = ("outline.cc", "i < n; ++i, points", "i <= n; ++i, points")
     ended = run_twins(build(tmp_path, wrong))
     assert ended.returncode != 0
     assert "AddressSanitizer" in ended.stderr

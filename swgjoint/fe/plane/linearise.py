@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.compiled_tangent import CompiledBore, add_sector_tangents
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import (
     Frames,
@@ -20,6 +21,9 @@ from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.plane.tooth_contact import ToothContact
+from swgjoint.gear.wave_generators.ellipse import Elliptical
+from swgjoint.gear.wave_generators.simplified import Simplified
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
@@ -130,9 +134,12 @@ class Linearised:
 
     def gap_after(self, increment: Array) -> Array:
         """Gaps of the stations (N, q) [m] after an increment (N, n) [m]."""
-        moved = (increment * self.sign)[:, self.gap_dofs]
+        seen = increment * self.sign
+        moved = seen[:, self.gap_dofs]
         if self.race_rows is not None:
             return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
+        if (bore := CompiledBore.for_stations(self.stations)) is not None:
+            return bore.gaps_after(self.gap, self.normal, self.gap_dofs, seen)
         shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
 
@@ -181,12 +188,10 @@ class Linearised:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bore:
-    """Contact of the bore; its k degrees of freedom are ``contact_dofs``."""
+    """Gaps of the bore at its stations, see :class:`Linearised`."""
 
     gap: Array
     normal: Array
-    gradient: Array
-    hessian: Array
     fixed: Mask | bool = False
     rows: Array | None = None
 
@@ -200,41 +205,15 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         torque: Torque of the flexspline on its load, whole drive [N·m]; None if the
             rotation of the flexspline is prescribed.
     """
-    element, sign, dofs = model.element, model.signs, model.dofs
-    frames, x = model.frames(state), model.skeleton(state)
-    n_a = len(element.skeleton)
-
-    # elastic forces and tangent: computed in the sector frames, rotated to the global
-    # frame; tooth forces enter only the tangent, because they are unknowns of the step
-    elastic = elastic_force(element, frames)
-    total = elastic - state.flank_force @ element.flank_from_skeleton
-    seen = project_to_frames(frames, elastic).reshape(model.sectors, n_a, 2)
+    sign, dofs, x = model.signs, model.dofs, model.skeleton(state)
+    n_a = x.shape[1]
     gradient, hessian = np.zeros(sign.shape), np.zeros((*sign.shape, sign.shape[1]))
-    gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(model.sectors, -1)
-    hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
-
-    nodes = x[:, model.bore_nodes]
-    if model.race is not None and state.race is not None:
-        race = model.race.forces(
-            state.race, state.wave_generator_angle, nodes, state.touching
-        )
-        bore = _Bore(
-            gap=race.gap,
-            normal=race.normal,
-            rows=race.rows,
-            gradient=race.gradient,
-            hessian=race.hessian,
-            fixed=race.fixed,
-        )
-    else:
-        bore = _on_surface(model, state)
-    into = model.contact_dofs
-    gradient[:, into] += bore.gradient
-    hessian[:, into[:, None], into] += bore.hessian
+    frames, flank = _add_sectors(model, state, x, gradient, hessian)
+    bore = _add_bore(model, state, x, gradient, hessian)
     fixed = np.zeros(sign.shape, dtype=bool)
-    fixed[:, into] = bore.fixed
+    fixed[:, model.contact_dofs] = bore.fixed
 
-    rotation, slope = model.best_fit_rotation(nodes)
+    rotation, slope = model.best_fit_rotation(x[:, model.bore_nodes])
     by_node = np.zeros((model.sectors, n_a, 2))
     by_node[:, model.bore_nodes] = slope
     rotation_gradient = np.zeros(sign.shape)
@@ -249,10 +228,8 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
     angle = frames.angle - state.circular_spline_rotation
     circular_spline_elastic = model.circular_spline_displacement(state)
-    flank = frames.displacement @ element.flank_from_skeleton.T
-    flank += state.flank_force @ element.flank_compliance
     return Linearised(
-        element=element,
+        element=model.element,
         frames=frames,
         dofs=dofs,
         face_dofs=model.face_dofs,
@@ -260,7 +237,7 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         gradient=sign * gradient,
         hessian=hessian,
         gap=bore.gap,
-        gap_dofs=into,
+        gap_dofs=model.contact_dofs,
         stations=model.stations,
         normal=bore.normal,
         race_rows=bore.rows,
@@ -268,12 +245,12 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         rotation=rotation,
         rotation_gradient=sign * rotation_gradient,
         anchor=anchor,
-        anchor_stiffness=float(np.mean(np.diag(element.stiffness))),
+        anchor_stiffness=float(np.mean(np.diag(model.element.stiffness))),
         flank=model.shift_flank(flank, model.tooth_shift),
         circular_spline_elastic=circular_spline_elastic,
         search=ToothContact(
             rubs=model.friction is not None,
-            element=element,
+            element=model.element,
             circular_spline=model.circular_spline,
             circular_spline_flank=model.shift_flank(
                 circular_spline_elastic, model.circular_spline_tooth_shift
@@ -284,23 +261,72 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     )
 
 
-def _on_surface(model: SectorModel, state: State) -> _Bore:
-    """Contact of the bore with a rigid wave generator, through the compliant layer."""
-    stations = model.stations
+def _add_sectors(
+    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array
+) -> tuple[Frames, Array]:
+    """Add the elastic forces and tangents of the sectors.
+
+    They are computed in the sector frames and rotated to the global frame. Tooth forces
+    enter only the tangent, because they are unknowns of the step.
+
+    Args:
+        model: The 2D model.
+        state: State at which to linearise.
+        x: Skeleton nodes (N, n_a, 2) [m].
+        gradient: Gradient to add to (N, n) [N].
+        hessian: Tangent to add to (N, n, n) [N/m].
+
+    Returns:
+        Frames of the sectors, and displacements of the flank nodes in these frames
+        (N, 2 n_b) [m].
+    """
+    element, force, dofs = model.element, state.flank_force, model.dofs
+    if model.nonlinear and kernels() is not None:
+        return add_sector_tangents(
+            element, model.place, x, force, dofs, gradient, hessian
+        )
+    frames = model.frames(state)
+    elastic = elastic_force(element, frames)
+    total = elastic - force @ element.flank_from_skeleton
+    seen = project_to_frames(frames, elastic).reshape(x.shape)
+    gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(len(x), -1)
+    hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
+    flank = frames.displacement @ element.flank_from_skeleton.T
+    return frames, flank + force @ element.flank_compliance
+
+
+def _add_bore(
+    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array
+) -> _Bore:
+    """Add the forces and tangents of the contact of the bore, see `_add_sectors`."""
+    into = model.contact_dofs
+    if model.race is not None and state.race is not None:
+        race = model.race.forces(
+            state.race,
+            state.wave_generator_angle,
+            x[:, model.bore_nodes],
+            state.touching,
+        )
+        gradient[:, into] += race.gradient
+        hessian[:, into[:, None], into] += race.hessian
+        return _Bore(gap=race.gap, normal=race.normal, rows=race.rows, fixed=race.fixed)
+    # a rigid wave generator supports the bore through the compliant layer
+    stations, touching = model.stations, state.touching
     gap, normal, curvature = _gaps(model, state)
+    if (bore := CompiledBore.for_stations(stations)) is not None:
+        bore.add_forces(touching, gap, normal, curvature, into, gradient, hessian)
+        return _Bore(gap=gap, normal=normal)
     # only sectors in contact exert a force
-    on = np.flatnonzero(state.touching.any(axis=1))
-    k = np.where(state.touching[on], stations.stiffness, 0.0)
+    on = np.flatnonzero(touching.any(axis=1))
+    k = np.where(touching[on], stations.stiffness, 0.0)
     # sliding over a curved outline turns the contact force
     bend = k * gap[on] * curvature[on]
-    size = model.contact_dofs.size
-    gradient = np.zeros((model.sectors, size))
-    hessian = np.zeros((model.sectors, size, size))
     push = (k * gap[on])[..., None] * normal[on]
-    gradient[on] = stations.forces_of(push).reshape(on.size, size)
-    hessian[on] = stations.stiffness_of(normal[on], k)
-    hessian[on] += stations.stiffness_of(rotate_right_angle(normal[on]), bend)
-    return _Bore(gap=gap, normal=normal, gradient=gradient, hessian=hessian)
+    springs = stations.stiffness_of(normal[on], k)
+    springs += stations.stiffness_of(rotate_right_angle(normal[on]), bend)
+    gradient[on[:, None], into] += stations.forces_of(push).reshape(on.size, -1)
+    hessian[on[:, None, None], into[:, None], into] += springs
+    return _Bore(gap=gap, normal=normal)
 
 
 def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
@@ -310,11 +336,17 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     :data:`FAR`, all its stations get the values of the middle: none is near contact.
     """
     stations, alpha = model.stations, state.wave_generator_angle
-    points = model.bore_points(state)
+    nodes = model.station_nodes(model.skeleton(state))
+    far = FAR * model.lobe_height
+    bore, outline = CompiledBore.for_stations(stations), model.wave_generator
+    if bore is not None and isinstance(outline, Elliptical | Simplified):
+        centre = model.wave_generator_offset
+        return bore.gaps(nodes, state.touching, outline, alpha, centre, far)
+    points = stations.positions(nodes)
     p = stations.per_interval
     shaped = points.reshape(model.sectors, -1, p, 2)
     middle = model.wave_generator_gap(shaped[:, :, p // 2], alpha)
-    near = middle[0] < FAR * model.lobe_height
+    near = middle[0] < far
     near |= state.touching.reshape(shaped.shape[:3]).any(axis=2)
     if near.all():
         return model.wave_generator_gap(points, alpha)

@@ -1,0 +1,189 @@
+"""Interface to the compiled loops that linearise the 2D model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.corotation import Frames
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.gear.wave_generators.ellipse import Elliptical
+from swgjoint.gear.wave_generators.simplified import Simplified
+from swgjoint.kernels import kernels
+from swgjoint.typing import Array, Index, Mask
+
+if TYPE_CHECKING:
+    from swgjoint.kernels.compiled import Bore
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CompiledBore:
+    """Contact of the bore with a rigid wave generator in compiled loops."""
+
+    bore: Bore
+    """The loops with the stations of a sector."""
+
+    @classmethod
+    def for_stations(cls, stations: BoreStations) -> CompiledBore | None:
+        """Compiled loops for the stations of a sector; None without compiled loops."""
+        if (native := kernels()) is None:
+            return None
+        return cls(bore=native.Bore(stations.weights, stations.stiffness))
+
+    def gaps(
+        self,
+        nodes: Array,
+        touching: Mask,
+        outline: Elliptical | Simplified,
+        angle: float,
+        centre: Array | None,
+        far: float,
+    ) -> tuple[Array, Array, Array]:
+        """Gap, normal and curvature at the stations.
+
+        Args:
+            nodes: Nodes that the stations follow (N, m, 2) [m].
+            touching: Whether each station is in contact (N, q).
+            outline: Outline of the wave generator.
+            angle: Rotation of the outline [rad].
+            centre: Centre of the outline in its frame (2,) [m]; None for zero.
+            far: Gap above which an interval has one value for all its stations [m].
+        """
+        elliptical = isinstance(outline, Elliptical)
+        gap, normal = np.empty(touching.shape), np.empty((*touching.shape, 2))
+        curvature = np.empty(touching.shape)
+        self.bore.gaps(
+            np.ascontiguousarray(nodes),
+            np.ascontiguousarray(touching),
+            elliptical,
+            outline.major,
+            outline.minor if isinstance(outline, Elliptical) else outline.pin_radius,
+            angle,
+            np.zeros(2) if centre is None else np.ascontiguousarray(centre),
+            far,
+            gap,
+            normal,
+            curvature,
+        )
+        return gap, normal, curvature
+
+    def add_forces(
+        self,
+        touching: Mask,
+        gap: Array,
+        normal: Array,
+        curvature: Array,
+        into: Index,
+        gradient: Array,
+        hessian: Array,
+    ) -> None:
+        """Add the forces and tangents of the stations in contact.
+
+        Args:
+            touching: Whether each station is in contact (N, q).
+            gap: Gaps of the stations (N, q) [m].
+            normal: Outward normals of the outline (N, q, 2).
+            curvature: Curvatures of the parallel curves through the stations (N, q)
+                [1/m].
+            into: Degrees of freedom of the nodes that the stations follow (2 m,).
+            gradient: Gradient to add to (N, n) [N].
+            hessian: Tangent to add to (N, n, n) [N/m].
+        """
+        self.bore.forces(
+            np.ascontiguousarray(touching),
+            np.ascontiguousarray(gap),
+            np.ascontiguousarray(normal),
+            np.ascontiguousarray(curvature),
+            into,
+            gradient,
+            hessian,
+        )
+
+    def gaps_after(
+        self, gap: Array, normal: Array, into: Index, increment: Array
+    ) -> Array:
+        """Gaps of the stations (N, q) [m] after an increment.
+
+        Args:
+            gap: Gaps before (N, q) [m].
+            normal: Outward normals of the outline (N, q, 2).
+            into: Degrees of freedom of the nodes that the stations follow (2 m,).
+            increment: Increment of all degrees of freedom (N, n) [m].
+        """
+        result = np.empty(gap.shape)
+        self.bore.gaps_after(
+            np.ascontiguousarray(gap),
+            np.ascontiguousarray(normal),
+            into,
+            np.ascontiguousarray(increment),
+            result,
+        )
+        return result
+
+
+def add_sector_tangents(
+    element: Superelement,
+    place: Array,
+    positions: Array,
+    flank_force: Array,
+    dofs: Index,
+    gradient: Array,
+    hessian: Array,
+) -> tuple[Frames, Array]:
+    """Add elastic forces and tangents of sectors, with compiled loops.
+
+    Args:
+        element: The condensed sector.
+        place: Angle of each sector in the undeformed ring (N,) [rad].
+        positions: Skeleton nodes in the global frame (N, n_a, 2) [m].
+        flank_force: Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N].
+        dofs: Degrees of freedom of the skeleton within a sector (2 n_a,).
+        gradient: Gradient to add to (N, n) [N].
+        hessian: Tangent to add to (N, n, n) [N/m].
+
+    Returns:
+        Frames of the sectors, and displacements of the flank nodes in these frames
+        (N, 2 n_b) [m].
+    """
+    native = kernels()
+    assert native is not None
+    sectors, size = len(place), dofs.size
+    angle, gyration = np.empty(sectors), np.empty(sectors)
+    kinematics = np.empty((5, sectors, size))
+    flank = np.empty(flank_force.shape)
+    sector = native.Sector(
+        np.ascontiguousarray(element.skeleton),
+        element.face_size,
+        np.ascontiguousarray(element.stiffness),
+        element.turning_parts,
+        np.ascontiguousarray(element.rim_slopes),
+        element.elongation,
+        np.ascontiguousarray(element.flank_from_skeleton),
+        np.ascontiguousarray(element.flank_compliance),
+    )
+    sector.tangents(
+        place,
+        np.ascontiguousarray(positions),
+        np.ascontiguousarray(flank_force),
+        dofs,
+        angle,
+        gyration,
+        kinematics,
+        flank,
+        gradient,
+        hessian,
+    )
+    position, displacement, deformation, elongating, spin = kinematics
+    frames = Frames(
+        angle=angle,
+        position=position,
+        displacement=displacement,
+        deformation=deformation,
+        elongating=elongating,
+        spin=spin,
+        gyration=gyration,
+    )
+    return frames, flank

@@ -1,0 +1,125 @@
+#include "bore.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace swgjoint {
+namespace {
+
+// Sum over the nodes of an interval of their coordinates times the weights of a station.
+Vec station_of(const Stations& stations, std::size_t i, const double* window) {
+  const double *x = stations.weights + 2 * stations.width * i, *y = x + stations.width;
+  Vec sum{0.0, 0.0};
+  for (std::size_t j = 0; j < stations.width; ++j) {
+    sum.x += x[j] * window[j];
+    sum.y += y[j] * window[j];
+  }
+  return sum;
+}
+
+}  // namespace
+
+void bore_gaps(const Stations& stations, const Support& support, const double* nodes,
+               const bool* touching, std::size_t count, double* gap, double* normal,
+               double* curvature) {
+  const double cos = std::cos(support.angle), sin = std::sin(support.angle);
+  const std::size_t p = stations.p;
+  for (std::size_t s = 0; s < count; ++s, nodes += 2 * stations.nodes()) {
+    for (std::size_t k = 0; k < stations.intervals; ++k) {
+      const double* window = nodes + 2 * k;
+      const auto measure = [&](std::size_t i) {
+        const Vec at = station_of(stations, i, window);
+        const Vec seen{cos * at.x + sin * at.y - support.offset.x,
+                       cos * at.y - sin * at.x - support.offset.y};
+        const Nearest foot = nearest(support.outline, seen);
+        gap[i] = foot.gap;
+        normal[2 * i] = cos * foot.normal.x - sin * foot.normal.y;
+        normal[2 * i + 1] = sin * foot.normal.x + cos * foot.normal.y;
+        curvature[i] = foot.curvature / (1.0 + foot.curvature * foot.gap);
+      };
+      const std::size_t middle = p / 2;
+      measure(middle);
+      const bool near = gap[middle] < support.far ||
+                        std::any_of(touching, touching + p, [](bool on) { return on; });
+      for (std::size_t i = 0; i < p; ++i) {
+        if (i == middle) continue;
+        if (near) {
+          measure(i);
+          continue;
+        }
+        gap[i] = gap[middle];
+        normal[2 * i] = normal[2 * middle];
+        normal[2 * i + 1] = normal[2 * middle + 1];
+        curvature[i] = curvature[middle];
+      }
+      gap += p;
+      normal += 2 * p;
+      curvature += p;
+      touching += p;
+    }
+  }
+}
+
+void bore_forces(const Stations& stations, const double* stiffness, const bool* touching,
+                 const double* gap, const double* normal, const double* curvature,
+                 const std::int64_t* into, std::size_t count, std::size_t n,
+                 double* gradient, double* tangent) {
+  const std::size_t p = stations.p, width = stations.width, q = stations.count();
+  const std::size_t size = 2 * stations.nodes();
+  std::vector<double> force(size), matrix(size * size), along(width), across(width);
+  for (std::size_t s = 0; s < count; ++s) {
+    if (std::any_of(touching, touching + q, [](bool on) { return on; })) {
+      std::fill(force.begin(), force.end(), 0.0);
+      std::fill(matrix.begin(), matrix.end(), 0.0);
+      for (std::size_t i = 0; i < q; ++i) {
+        if (!touching[i]) continue;
+        const double *x = stations.weights + 2 * width * (i % p), *y = x + width;
+        const Vec to{normal[2 * i], normal[2 * i + 1]};
+        // sliding over a curved outline turns the contact force
+        const double push = stiffness[i] * gap[i], bend = push * curvature[i];
+        for (std::size_t j = 0; j < width; ++j) {
+          along[j] = to.x * x[j] + to.y * y[j];
+          across[j] = to.x * y[j] - to.y * x[j];
+        }
+        const std::size_t first = 2 * (i / p);
+        for (std::size_t j = 0; j < width; ++j) {
+          force[first + j] += push * along[j];
+          const double a = stiffness[i] * along[j], b = bend * across[j];
+          double* row = matrix.data() + (first + j) * size + first;
+          for (std::size_t l = 0; l < width; ++l) row[l] += a * along[l] + b * across[l];
+        }
+      }
+      for (std::size_t i = 0; i < size; ++i) {
+        const auto row = static_cast<std::size_t>(into[i]);
+        gradient[row] += force[i];
+        for (std::size_t j = 0; j < size; ++j) {
+          tangent[row * n + static_cast<std::size_t>(into[j])] += matrix[i * size + j];
+        }
+      }
+    }
+    touching += q;
+    gap += q;
+    normal += 2 * q;
+    curvature += q;
+    gradient += n;
+    tangent += n * n;
+  }
+}
+
+void bore_gaps_after(const Stations& stations, const double* gap, const double* normal,
+                     const std::int64_t* into, const double* increment,
+                     std::size_t count, std::size_t n, double* result) {
+  std::vector<double> moved(2 * stations.nodes());
+  for (std::size_t s = 0; s < count; ++s, increment += n) {
+    for (std::size_t j = 0; j < moved.size(); ++j) moved[j] = increment[into[j]];
+    for (std::size_t k = 0; k < stations.intervals; ++k) {
+      for (std::size_t i = 0; i < stations.p; ++i, ++gap, normal += 2, ++result) {
+        const Vec shift = station_of(stations, i, moved.data() + 2 * k);
+        *result = *gap + shift.x * normal[0] + shift.y * normal[1];
+      }
+    }
+  }
+}
+
+}  // namespace swgjoint

@@ -1,0 +1,194 @@
+// Python interface of the loops that linearise the 2D model, see module.cc.
+
+#include "bore.h"
+#include "corotation.h"
+#include "flank_arrays.h"
+
+namespace {
+
+using Masks = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+void check_dofs(const Index& dofs, std::size_t n) {
+  for (std::size_t i = 0; i < dofs.shape(0); ++i) {
+    require(dofs.data()[i] >= 0 && dofs.data()[i] < static_cast<std::int64_t>(n), "dofs");
+  }
+}
+
+// Contact stations of the bore. It holds references to the arrays that it reads.
+class Bore {
+ public:
+  Bore(In<3> weights, In<1> stiffness) : weights_(weights), stiffness_(stiffness) {
+    const std::size_t p = weights.shape(0), width = weights.shape(2);
+    require(p > 0 && weights.shape(1) == 2 && width > 1 && width % 2 == 0,
+            "weights: (p, 2, 2 s)");
+    require(stiffness.shape(0) > 0 && stiffness.shape(0) % p == 0, "stiffness: (q,)");
+    stations_ = {weights.data(), p, width, stiffness.shape(0) / p};
+  }
+
+  void gaps(In<3> nodes, Masks touching, bool elliptical, double major, double minor,
+            double angle, In<1> offset, double far, Out<2> gap, Out<3> normal,
+            Out<2> curvature) const {
+    const std::size_t count = nodes.shape(0);
+    require(nodes.shape(1) == stations_.nodes() && nodes.shape(2) == 2,
+            "nodes: (n, m, 2)");
+    require(touching.shape(0) == count && touching.shape(1) == stations_.count(),
+            "touching: (n, q)");
+    require(offset.shape(0) == 2, "offset: (2,)");
+    check(count, gap, normal);
+    check(count, curvature, normal);
+    const swgjoint::Support support{
+        {elliptical, major, minor}, angle, {offset.data()[0], offset.data()[1]}, far};
+    const nb::gil_scoped_release release;
+    swgjoint::bore_gaps(stations_, support, nodes.data(), touching.data(), count,
+                        gap.data(), normal.data(), curvature.data());
+  }
+
+  void forces(Masks touching, In<2> gap, In<3> normal, In<2> curvature, Index into,
+              Out<2> gradient, Out<3> tangent) const {
+    const std::size_t count = gap.shape(0), n = gradient.shape(1);
+    check(count, gap, normal);
+    check(count, curvature, normal);
+    require(touching.shape(0) == count && touching.shape(1) == stations_.count(),
+            "touching: (n, q)");
+    require(into.shape(0) == 2 * stations_.nodes(), "into: (2 m,)");
+    require(gradient.shape(0) == count && tangent.shape(0) == count &&
+                tangent.shape(1) == n && tangent.shape(2) == n,
+            "gradient: (n, dofs), tangent: (n, dofs, dofs)");
+    check_dofs(into, n);
+    const nb::gil_scoped_release release;
+    swgjoint::bore_forces(stations_, stiffness_.data(), touching.data(), gap.data(),
+                          normal.data(), curvature.data(), into.data(), count, n,
+                          gradient.data(), tangent.data());
+  }
+
+  void gaps_after(In<2> gap, In<3> normal, Index into, In<2> increment,
+                  Out<2> result) const {
+    const std::size_t count = gap.shape(0), n = increment.shape(1);
+    check(count, gap, normal);
+    check(count, result, normal);
+    require(into.shape(0) == 2 * stations_.nodes(), "into: (2 m,)");
+    require(increment.shape(0) == count, "increment: (n, dofs)");
+    check_dofs(into, n);
+    const nb::gil_scoped_release release;
+    swgjoint::bore_gaps_after(stations_, gap.data(), normal.data(), into.data(),
+                              increment.data(), count, n, result.data());
+  }
+
+ private:
+  template <typename Values, typename Vectors>
+  void check(std::size_t count, const Values& values, const Vectors& vectors) const {
+    const std::size_t q = stations_.count();
+    require(values.shape(0) == count && values.shape(1) == q &&
+                vectors.shape(0) == count && vectors.shape(1) == q &&
+                vectors.shape(2) == 2,
+            "stations: (n, q), their vectors: (n, q, 2)");
+  }
+
+  In<3> weights_;
+  In<1> stiffness_;
+  swgjoint::Stations stations_{};
+};
+
+// The condensed sector. It holds references to the arrays that it reads.
+class Sector {
+ public:
+  Sector(In<2> skeleton, std::size_t face, In<2> stiffness, In<2> turning_parts,
+         In<2> rim_slopes, In<1> elongation, In<2> flank_from_skeleton,
+         In<2> flank_compliance)
+      : arrays_{skeleton,   stiffness,           turning_parts,
+                rim_slopes, flank_from_skeleton, flank_compliance},
+        elongation_(elongation) {
+    const std::size_t nodes = skeleton.shape(0), m = 2 * nodes;
+    const std::size_t flank = flank_from_skeleton.shape(0);
+    require(skeleton.shape(1) == 2 && face > 0 && 2 * face <= nodes, "skeleton: (n, 2)");
+    require(stiffness.shape(0) == m && stiffness.shape(1) == m, "stiffness: (m, m)");
+    require(turning_parts.shape(0) == 6 && turning_parts.shape(1) == m * m,
+            "turning_parts: (6, m m)");
+    require(rim_slopes.shape(1) == m && elongation.shape(0) == m, "rim: (..., m)");
+    require(flank_from_skeleton.shape(1) == m && flank_compliance.shape(0) == flank &&
+                flank_compliance.shape(1) == flank,
+            "flank_from_skeleton: (b, m), flank_compliance: (b, b)");
+    sector_ = {nodes,
+               face,
+               rim_slopes.shape(0),
+               flank,
+               skeleton.data(),
+               stiffness.data(),
+               turning_parts.data(),
+               rim_slopes.data(),
+               elongation.data(),
+               flank_from_skeleton.data(),
+               flank_compliance.data()};
+  }
+
+  // Columns of kinematics: position, displacement, deformation, elongating and spin of
+  // every sector, one after the other.
+  void tangents(In<1> place, In<3> positions, In<2> force, Index dofs, Out<1> angle,
+                Out<1> gyration, Out<3> kinematics, Out<2> flank, Out<2> gradient,
+                Out<3> tangent) const {
+    const std::size_t count = place.shape(0), m = 2 * sector_.nodes;
+    const std::size_t n = gradient.shape(1);
+    require(positions.shape(0) == count && positions.shape(1) == sector_.nodes &&
+                positions.shape(2) == 2,
+            "positions: (n, nodes, 2)");
+    require(force.shape(0) == count && force.shape(1) == sector_.flank &&
+                flank.shape(0) == count && flank.shape(1) == sector_.flank,
+            "force, flank: (n, b)");
+    require(dofs.shape(0) == m && angle.shape(0) == count && gyration.shape(0) == count,
+            "dofs: (m,), angle, gyration: (n,)");
+    require(kinematics.shape(0) == 5 && kinematics.shape(1) == count &&
+                kinematics.shape(2) == m,
+            "kinematics: (5, n, m)");
+    require(gradient.shape(0) == count && tangent.shape(0) == count &&
+                tangent.shape(1) == n && tangent.shape(2) == n,
+            "gradient: (n, dofs), tangent: (n, dofs, dofs)");
+    check_dofs(dofs, n);
+    const std::size_t part = count * m;
+    double* k = kinematics.data();
+    const swgjoint::Kinematics result{angle.data(), gyration.data(), k,
+                                      k + part,     k + 2 * part,    k + 3 * part,
+                                      k + 4 * part, flank.data()};
+    const nb::gil_scoped_release release;
+    swgjoint::sector_tangents(sector_, place.data(), positions.data(), force.data(),
+                              dofs.data(), count, n, result, gradient.data(),
+                              tangent.data());
+  }
+
+ private:
+  In<2> arrays_[6];
+  In<1> elongation_;
+  swgjoint::Sector sector_{};
+};
+
+}  // namespace
+
+void bind_plane(nb::module_& m) {
+  nb::class_<Bore>(m, "Bore")
+      .def(nb::init<In<3>, In<1>>(), nb::arg("weights").noconvert(),
+           nb::arg("stiffness").noconvert())
+      .def("gaps", &Bore::gaps, nb::arg("nodes").noconvert(),
+           nb::arg("touching").noconvert(), nb::arg("elliptical"), nb::arg("major"),
+           nb::arg("minor"), nb::arg("angle"), nb::arg("offset").noconvert(),
+           nb::arg("far"), nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
+           nb::arg("curvature").noconvert())
+      .def("forces", &Bore::forces, nb::arg("touching").noconvert(),
+           nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
+           nb::arg("curvature").noconvert(), nb::arg("into").noconvert(),
+           nb::arg("gradient").noconvert(), nb::arg("tangent").noconvert())
+      .def("gaps_after", &Bore::gaps_after, nb::arg("gap").noconvert(),
+           nb::arg("normal").noconvert(), nb::arg("into").noconvert(),
+           nb::arg("increment").noconvert(), nb::arg("result").noconvert());
+  nb::class_<Sector>(m, "Sector")
+      .def(nb::init<In<2>, std::size_t, In<2>, In<2>, In<2>, In<1>, In<2>, In<2>>(),
+           nb::arg("skeleton").noconvert(), nb::arg("face"),
+           nb::arg("stiffness").noconvert(), nb::arg("turning_parts").noconvert(),
+           nb::arg("rim_slopes").noconvert(), nb::arg("elongation").noconvert(),
+           nb::arg("flank_from_skeleton").noconvert(),
+           nb::arg("flank_compliance").noconvert())
+      .def("tangents", &Sector::tangents, nb::arg("place").noconvert(),
+           nb::arg("positions").noconvert(), nb::arg("force").noconvert(),
+           nb::arg("dofs").noconvert(), nb::arg("angle").noconvert(),
+           nb::arg("gyration").noconvert(), nb::arg("kinematics").noconvert(),
+           nb::arg("flank").noconvert(), nb::arg("gradient").noconvert(),
+           nb::arg("tangent").noconvert());
+}
