@@ -27,8 +27,9 @@ class Search:
         circular_spline: Flank,
         radii: Array,
         stations: Array,
-        flank_breaks: Array,
-        flanks: Array,
+        circular_breaks: Array,
+        circular_weights: Array,
+        displaced: Array,
         teeth: int,
         teeth_in_model: int,
         angle: Array,
@@ -47,6 +48,22 @@ class Search:
         real: Array,
         corner: Mask,
         tooth: Index,
+    ) -> None: ...
+    def minima(
+        self, flank: Array, coarse: int, dense: int, limit: float, radius: float
+    ) -> tuple[Index, Index, Array]: ...
+    def meet(
+        self,
+        flank: Array,
+        sector: Index,
+        side: Index,
+        station: Array,
+        real: Array,
+        tooth: Index,
+        weight: Array,
+        circular_weight: Array,
+        sliding: Array,
+        circular_sliding: Array,
     ) -> None: ...
     def refine(
         self,

@@ -11,115 +11,8 @@
 #include "outline.h"
 #include "ring_factor.h"
 #include "tangents.h"
-#include "tooth_search.h"
 
 namespace {
-
-// The search at one state. It holds references to the arrays that it reads.
-class Search {
- public:
-  Search(const Flank& flexspline, In<1> breaks, In<3> weights, double low, double high,
-         const Flank& circular, In<1> radii, In<1> stations, In<1> flank_breaks,
-         In<4> flanks, std::int64_t teeth, std::int64_t teeth_in_model, In<1> angle,
-         In<1> bearing, swgjoint::Limits limits)
-      : breaks_(breaks), weights_(weights), radii_(radii), stations_(stations),
-        flank_breaks_(flank_breaks), flanks_(flanks), angle_(angle), bearing_(bearing),
-        search_(flexspline.profile,
-                {breaks.data(), weights.data(), weights.shape(1), weights.shape(2)}, low,
-                high, circular.profile, radii.data(), stations.data(), radii.shape(0),
-                {flank_breaks.data(), flanks.data(), flanks.shape(0), flanks.shape(1)},
-                teeth, teeth_in_model, angle.data(), bearing.data(), limits) {
-    require(weights.shape(0) == 4 && breaks.shape(0) == weights.shape(1) + 1,
-            "weights: (4, intervals, nodes)");
-    require(radii.shape(0) == stations.shape(0) && radii.shape(0) > 1, "radii");
-    require(angle.shape(0) == bearing.shape(0), "bearing: one per sector");
-    require(teeth > 0 && teeth_in_model > 0, "teeth");
-    elastic_ = flanks.shape(0) > 0;
-    require(!elastic_ || (flanks.shape(0) == static_cast<std::size_t>(2 * teeth_in_model) &&
-                          flanks.shape(2) == 4 && flanks.shape(3) == 2 &&
-                          flank_breaks.shape(0) == flanks.shape(1) + 1),
-            "flanks: (2 teeth, intervals, 4, 2)");
-  }
-
-  // Feet of n points. Columns of real: gap, normal and rest in the mirrored sector
-  // frame, curvature, arc length, then normal and rest in the mirrored frame of the
-  // circular-spline tooth.
-  void see(In<2> points, In<2> outward, Index sector, Index side, bool rigid,
-           nb::object start, int steps, Out<2> real, MaskOut corner, IndexOut tooth) const {
-    const std::size_t n = points.shape(0);
-    require(points.shape(1) == 2 && outward.shape(0) == n && outward.shape(1) == 2 &&
-                real.shape(0) == n && real.shape(1) == 11 && corner.shape(0) == n &&
-                tooth.shape(0) == n,
-            "points: (n, 2)");
-    check(n, sector, side);
-    require(rigid || elastic_, "a rigid circular spline");
-    const double* from = nullptr;
-    In<1> starts;
-    if (!start.is_none()) {
-      starts = nb::cast<In<1>>(start);
-      require(starts.shape(0) == n, "start: (n,)");
-      from = starts.data();
-    }
-    const nb::gil_scoped_release release;
-    swgjoint::Pose pose{};
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::int64_t k = sector.data()[i], flank = side.data()[i];
-      if (i == 0 || k != pose.sector || flank != pose.side) {
-        pose = search_.pose_of(k, flank);
-      }
-      const double *p = points.data() + 2 * i, *o = outward.data() + 2 * i;
-      const swgjoint::Seen seen =
-          search_.see({p[0], p[1]}, {o[0], o[1]}, pose, rigid,
-                      from ? from + i : nullptr, steps);
-      double* row = real.data() + 11 * i;
-      row[0] = seen.foot.gap;
-      row[1] = seen.normal.x;
-      row[2] = seen.normal.y;
-      row[3] = seen.rest.x;
-      row[4] = seen.rest.y;
-      row[5] = seen.foot.curvature;
-      row[6] = seen.foot.station;
-      row[7] = seen.foot.normal.x;
-      row[8] = seen.foot.normal.y;
-      row[9] = seen.foot.rest.x;
-      row[10] = seen.foot.rest.y;
-      corner.data()[i] = seen.foot.corner;
-      tooth.data()[i] = seen.tooth;
-    }
-  }
-
-  // Refine the arc lengths of n minima in place.
-  void refine(Out<1> station, In<3> mirrored, Index sector, Index side,
-              double spacing) const {
-    const std::size_t n = station.shape(0);
-    require(mirrored.shape(0) == n && mirrored.shape(1) == weights_.shape(2) &&
-                mirrored.shape(2) == 2,
-            "mirrored: (n, nodes, 2)");
-    check(n, sector, side);
-    const nb::gil_scoped_release release;
-    search_.refine(n, station.data(), mirrored.data(), sector.data(), side.data(),
-                   spacing);
-  }
-
- private:
-  // Check that indices of sectors and sides are within the arrays.
-  void check(std::size_t n, const Index& sector, const Index& side) const {
-    require(sector.shape(0) == n && side.shape(0) == n, "sector, side: (n,)");
-    const auto sectors = static_cast<std::int64_t>(angle_.shape(0));
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::int64_t k = sector.data()[i], s = side.data()[i];
-      require(k >= 0 && k < sectors && (s == 0 || s == 1), "sector or side");
-    }
-  }
-
-  In<1> breaks_;
-  In<3> weights_;
-  In<1> radii_, stations_, flank_breaks_;
-  In<4> flanks_;
-  In<1> angle_, bearing_;
-  bool elastic_ = false;
-  swgjoint::ToothSearch search_;
-};
 
 void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
   const std::size_t n = points.shape(0);
@@ -299,11 +192,13 @@ class RingFactor {
 
 }  // namespace
 
-// in plane_module.cc
+// in plane_module.cc and search_module.cc
 void bind_plane(nb::module_& m);
+void bind_search(nb::module_& m);
 
 NB_MODULE(compiled, m) {
   bind_plane(m);
+  bind_search(m);
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
         nb::arg("result").noconvert());
@@ -335,27 +230,4 @@ NB_MODULE(compiled, m) {
            nb::arg("singles"), nb::arg("before").noconvert(), nb::arg("active").noconvert(),
            nb::arg("result").noconvert(), nb::arg("approach").noconvert(),
            nb::arg("slope").noconvert(), nb::arg("solved").noconvert());
-  nb::class_<swgjoint::Limits>(m, "Limits")
-      .def(
-          "__init__",
-          [](swgjoint::Limits* self, double corner, double beyond, double refined,
-             int refinements) {
-            new (self) swgjoint::Limits{corner, beyond, refined, refinements};
-          },
-          nb::kw_only(), nb::arg("corner"), nb::arg("beyond"), nb::arg("refined"),
-          nb::arg("refinements"));
-  nb::class_<Flank>(m, "Flank")
-      .def(nb::init<In<2>, In<2>, Index, In<1>, In<3>, double>(), nb::arg("pieces"),
-           nb::arg("edges"), nb::arg("intervals"), nb::arg("stations"),
-           nb::arg("coefficients"), nb::arg("side"));
-  nb::class_<Search>(m, "Search")
-      .def(nb::init<const Flank&, In<1>, In<3>, double, double, const Flank&, In<1>,
-                    In<1>, In<1>, In<4>, std::int64_t, std::int64_t, In<1>, In<1>,
-                    swgjoint::Limits>(),
-           nb::keep_alive<1, 2>(), nb::keep_alive<1, 7>())
-      .def("see", &Search::see, nb::arg("points").noconvert(), nb::arg("outward").noconvert(), nb::arg("sector").noconvert(),
-           nb::arg("side").noconvert(), nb::arg("rigid"), nb::arg("start").none(), nb::arg("steps"),
-           nb::arg("real").noconvert(), nb::arg("corner").noconvert(), nb::arg("tooth").noconvert())
-      .def("refine", &Search::refine, nb::arg("station").noconvert(), nb::arg("mirrored").noconvert(),
-           nb::arg("sector").noconvert(), nb::arg("side").noconvert(), nb::arg("spacing"));
 }

@@ -18,19 +18,78 @@ Vec rotate(Vec v, double cos, double sin) {
 // Mirror image about the tooth axis, which turns a left flank into a right one.
 Vec mirror(Vec v) { return {-v.x, v.y}; }
 
-// Displacement of a flank and its derivative with respect to the arc length.
-void evaluate(const FlankSplines& flanks, std::size_t flank, double s, Vec* value,
-              Vec* slope) {
-  const std::size_t j = interval_of(flanks.breaks, flanks.intervals + 1, s);
-  const double* c = flanks.coefficients + 8 * (flanks.intervals * flank + j);
-  const double d = s - flanks.breaks[j];
+// Weights of the nodes at an arc length and their derivatives.
+template <typename Take>
+void weigh(const NodeSpline& spline, double s, Take take) {
+  const std::size_t j = interval_of(spline.breaks, spline.intervals + 1, s);
+  const double d = s - spline.breaks[j];
+  const std::size_t step = spline.intervals * spline.nodes;
+  const double* c = spline.coefficients + spline.nodes * j;
+  for (std::size_t k = 0; k < spline.nodes; ++k, ++c) {
+    const double c3 = c[0], c2 = c[step], c1 = c[2 * step], c0 = c[3 * step];
+    take(k, c0 + d * (c1 + d * (c2 + d * c3)), c1 + d * (2.0 * c2 + d * 3.0 * c3));
+  }
+}
+
+// Displacements of one flank (nodes, 2) in its mirrored frame.
+void to_mirrored(const double* flank, std::size_t nodes, std::int64_t sector,
+                 std::int64_t side, double* mirrored) {
+  const auto number = static_cast<std::size_t>(2 * sector + side);
+  const double* from = flank + 2 * nodes * number;
+  const double sign = side == 0 ? 1.0 : -1.0;
+  for (std::size_t k = 0; k < nodes; ++k) {
+    mirrored[2 * k] = sign * from[2 * k];
+    mirrored[2 * k + 1] = from[2 * k + 1];
+  }
+}
+
+}  // namespace
+
+// Equally spaced points of a flank, with the weights of its nodes there.
+struct Samples {
+  std::vector<double> stations, weights;
+  std::vector<At> at;
+
+  Samples(const Profile& profile, const NodeSpline& spline, double low, double high,
+          int per_node) {
+    const std::size_t n = static_cast<std::size_t>(per_node) * spline.nodes;
+    const double spacing = (high - low) / static_cast<double>(n - 1);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double s = i + 1 < n ? low + static_cast<double>(i) * spacing : high;
+      stations.push_back(s);
+      at.push_back(profile.evaluate(s));
+      weigh(spline, s, [&](std::size_t, double w, double) { weights.push_back(w); });
+    }
+  }
+};
+
+void FlankShapes::fit(std::size_t flank) const {
+  const double* from = nodes_ + 2 * spline_.nodes * flank;
+  double* to = coefficients_.data() + 8 * spline_.intervals * flank;
+  for (std::size_t j = 0; j < spline_.intervals; ++j) {
+    for (std::size_t power = 0; power < 4; ++power, to += 2) {
+      const double* c =
+          spline_.coefficients + spline_.nodes * (spline_.intervals * (3 - power) + j);
+      to[0] = to[1] = 0.0;
+      for (std::size_t k = 0; k < spline_.nodes; ++k) {
+        to[0] += c[k] * from[2 * k];
+        to[1] += c[k] * from[2 * k + 1];
+      }
+    }
+  }
+  fitted_[flank] = 1;
+}
+
+void FlankShapes::evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const {
+  if (!fitted_[flank]) fit(flank);
+  const std::size_t j = interval_of(spline_.breaks, spline_.intervals + 1, s);
+  const double* c = coefficients_.data() + 8 * (spline_.intervals * flank + j);
+  const double d = s - spline_.breaks[j];
   value->x = c[0] + d * (c[2] + d * (c[4] + d * c[6]));
   value->y = c[1] + d * (c[3] + d * (c[5] + d * c[7]));
   slope->x = c[2] + d * (2.0 * c[4] + d * 3.0 * c[6]);
   slope->y = c[3] + d * (2.0 * c[5] + d * 3.0 * c[7]);
 }
-
-}  // namespace
 
 Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
                           const double* start, int steps) const {
@@ -48,13 +107,13 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
   } else {
     s = *start;
   }
-  const double low = flanks_.breaks[0], high = flanks_.breaks[flanks_.intervals];
+  const double low = flanks_.low(), high = flanks_.high();
   const double side = circular_.side();
   double wanted = s;
   for (int k = 0; k < steps; ++k) {
     const At at = circular_.evaluate(s);
     Vec moved, slope;
-    evaluate(flanks_, flank, s, &moved, &slope);
+    flanks_.evaluate(flank, s, &moved, &slope);
     const Vec tangent = {side * at.normal.y + slope.x, side * -at.normal.x + slope.y};
     const Vec rest = point - at.point - moved;
     const double length = size(tangent);
@@ -70,7 +129,7 @@ Foot ToothSearch::foot_of(Vec point, Vec facing, std::size_t flank, bool rigid,
   foot.corner = std::abs(wanted - s) > limits_.beyond * (high - low);
   if (foot.corner) {
     Vec moved, slope;
-    evaluate(flanks_, flank, s, &moved, &slope);
+    flanks_.evaluate(flank, s, &moved, &slope);
     foot.rest = point - (circular_.evaluate(s).point + moved);
     foot.normal = {-facing.x, -facing.y};
     const bool near =
@@ -110,20 +169,13 @@ Seen ToothSearch::see(Vec point, Vec outward, const Pose& pose, bool rigid,
 void ToothSearch::displaced(double s, const double* mirrored, Vec* point, Vec* tangent,
                             double* curvature) const {
   const At at = flexspline_.evaluate(s);
-  const std::size_t j = interval_of(spline_.breaks, spline_.intervals + 1, s);
-  const double d = s - spline_.breaks[j];
-  const std::size_t step = spline_.intervals * spline_.nodes;
-  const double* c = spline_.coefficients + spline_.nodes * j;
   Vec moved{}, slope{};
-  for (std::size_t k = 0; k < spline_.nodes; ++k, ++c) {
-    const double c3 = c[0], c2 = c[step], c1 = c[2 * step], c0 = c[3 * step];
-    const double weight = c0 + d * (c1 + d * (c2 + d * c3));
-    const double by_s = c1 + d * (2.0 * c2 + d * 3.0 * c3);
+  weigh(spline_, s, [&](std::size_t k, double weight, double by_s) {
     moved.x += weight * mirrored[2 * k];
     moved.y += weight * mirrored[2 * k + 1];
     slope.x += by_s * mirrored[2 * k];
     slope.y += by_s * mirrored[2 * k + 1];
-  }
+  });
   *point = at.point + moved;
   // tangent of the profile from tip to root: the outward normal turned clockwise
   *tangent = {at.normal.y + slope.x, -at.normal.x + slope.y};
@@ -133,7 +185,7 @@ void ToothSearch::displaced(double s, const double* mirrored, Vec* point, Vec* t
 void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
                          const std::int64_t* sector, const std::int64_t* side,
                          double spacing) const {
-  const bool rigid = flanks_.flanks == 0;
+  const bool rigid = flanks_.rigid();
   std::vector<double> low(n), high(n), foot(n);
   for (std::size_t i = 0; i < n; ++i) {
     low[i] = std::max(station[i] - spacing, low_);
@@ -167,6 +219,106 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
     }
     if (change < limits_.refined) break;
   }
+}
+
+// Gaps at samples of a flank; none if no sample reaches a radius.
+std::vector<double> ToothSearch::gaps(const double* mirrored, const Pose& pose,
+                                      bool rigid, const Samples& samples,
+                                      double radius) const {
+  const std::size_t n = samples.stations.size(), nodes = spline_.nodes;
+  std::vector<Vec> points(n);
+  bool deep = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double* weights = samples.weights.data() + nodes * i;
+    Vec moved{};
+    for (std::size_t k = 0; k < nodes; ++k) {
+      moved.x += weights[k] * mirrored[2 * k];
+      moved.y += weights[k] * mirrored[2 * k + 1];
+    }
+    points[i] = samples.at[i].point + moved;
+    deep |= size(points[i]) > radius;
+  }
+  std::vector<double> gaps;
+  if (!deep) return gaps;
+  gaps.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    gaps.push_back(
+        see(points[i], samples.at[i].normal, pose, rigid, nullptr, 2).foot.gap);
+  }
+  return gaps;
+}
+
+std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
+                                       const Sampling& sampling) const {
+  const Samples coarse(flexspline_, spline_, low_, high_, sampling.coarse);
+  std::vector<Samples> fine;
+  if (sampling.dense > 0) fine.emplace_back(flexspline_, spline_, low_, high_, sampling.dense);
+  const Samples& used = fine.empty() ? coarse : fine.front();
+  std::vector<Place> found;
+  std::vector<double> mirrored(2 * spline_.nodes), of_found, stations;
+  std::vector<std::int64_t> sector, side;
+  for (std::int64_t s = 0; s < static_cast<std::int64_t>(sectors); ++s) {
+    for (std::int64_t f = 0; f < 2; ++f) {
+      to_mirrored(flank, spline_.nodes, s, f, mirrored.data());
+      const Pose pose = pose_of(s, f);
+      std::vector<double> gap = gaps(mirrored.data(), pose, true, coarse, sampling.radius);
+      if (gap.empty()) continue;
+      if (!(*std::min_element(gap.begin(), gap.end()) < sampling.limit)) continue;
+      if (!fine.empty()) {
+        gap = gaps(mirrored.data(), pose, rigid(), used, sampling.radius);
+      }
+      for (std::size_t k = 0; k < gap.size(); ++k) {
+        const double before = k > 0 ? gap[k - 1] : kInfinity;
+        const double after = k + 1 < gap.size() ? gap[k + 1] : kInfinity;
+        if (std::isfinite(gap[k]) && gap[k] <= before && gap[k] < after &&
+            gap[k] < sampling.limit) {
+          stations.push_back(used.stations[k]);
+          sector.push_back(s);
+          side.push_back(f);
+          of_found.insert(of_found.end(), mirrored.begin(), mirrored.end());
+        }
+      }
+    }
+  }
+  refine(stations.size(), stations.data(), of_found.data(), sector.data(), side.data(),
+         used.stations[1] - used.stations[0]);
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    found.push_back({sector[i], side[i], stations[i]});
+  }
+  return found;
+}
+
+Meeting ToothSearch::meet(const double* flank, const Place& place, double* weights,
+                          double* circular_weights) const {
+  std::vector<double> mirrored(2 * spline_.nodes);
+  to_mirrored(flank, spline_.nodes, place.sector, place.side, mirrored.data());
+  Vec point, tangent;
+  double curvature;
+  displaced(place.station, mirrored.data(), &point, &tangent, &curvature);
+  const double length = size(tangent);
+  const Seen seen = see(point, {-tangent.y / length, tangent.x / length},
+                        pose_of(place.sector, place.side), rigid(), nullptr, 3);
+  weigh(spline_, place.station,
+        [&](std::size_t k, double weight, double) { weights[k] = weight; });
+  Meeting meeting{};
+  meeting.slip = std::numeric_limits<double>::quiet_NaN();
+  if (!rigid()) {
+    weigh(flanks_.spline(), seen.foot.station,
+          [&](std::size_t k, double weight, double) { circular_weights[k] = weight; });
+    meeting.slip = place.station + seen.foot.station;
+  }
+  // a flank and the flank that it faces are on opposite sides of their teeth
+  const double sign = place.side == 0 ? 1.0 : -1.0;
+  const Vec out = seen.foot.normal;
+  meeting.gap = seen.foot.gap;
+  meeting.normal = {sign * seen.normal.x, seen.normal.y};
+  meeting.point = {sign * point.x, point.y};
+  // in the mirrored frame the flexspline's normal is -n: its tangent is J n
+  meeting.tangent = {sign * -seen.normal.y, seen.normal.x};
+  meeting.tooth = seen.tooth;
+  meeting.circular_normal = {-sign * out.x, out.y};
+  meeting.circular_tangent = {-sign * out.y, -out.x};
+  return meeting;
 }
 
 }  // namespace swgjoint

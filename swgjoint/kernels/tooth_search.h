@@ -8,6 +8,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "flank.h"
 
@@ -21,12 +23,31 @@ struct NodeSpline {
   std::size_t intervals, nodes;
 };
 
-// Piecewise cubic displacements of flanks. The coefficients (flanks, intervals, 4, 2)
-// belong to ascending powers of the distance from a break.
-struct FlankSplines {
-  const double* breaks;
-  const double* coefficients;
-  std::size_t flanks, intervals;
+// Displacements of flanks (flanks, nodes, 2) in mirrored frames, as piecewise cubic
+// curves. They are fitted when a point first faces a flank; most flanks face none.
+class FlankShapes {
+ public:
+  FlankShapes(NodeSpline spline, const double* nodes, std::size_t flanks)
+      : spline_(spline), nodes_(nodes), flanks_(flanks), fitted_(flanks, 0),
+        coefficients_(8 * spline.intervals * flanks) {}
+
+  bool rigid() const { return flanks_ == 0; }
+  const NodeSpline& spline() const { return spline_; }
+  double low() const { return spline_.breaks[0]; }
+  double high() const { return spline_.breaks[spline_.intervals]; }
+
+  // Displacement of a flank and its derivative with respect to the arc length.
+  void evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const;
+
+ private:
+  void fit(std::size_t flank) const;
+
+  NodeSpline spline_;
+  const double* nodes_;
+  std::size_t flanks_;
+  mutable std::vector<char> fitted_;
+  // (flanks, intervals, 4, 2) of ascending powers of the distance from a break
+  mutable std::vector<double> coefficients_;
 };
 
 // Foot of one point on a flank of the circular spline.
@@ -61,16 +82,39 @@ struct Limits {
   int refinements;        // largest number of refinement steps
 };
 
+// Place of a point on a flank of the flexspline.
+struct Place {
+  std::int64_t sector, side;
+  double station;
+};
+
+// Numbers of gap samples per flank node, and the largest gap and smallest radius of
+// points that may touch.
+struct Sampling {
+  int coarse, dense;  // dense: zero for a fast search
+  double limit, radius;
+};
+
+// Contact point of two flanks: columns of ToothContact._gather, with the weights of the
+// nodes of its two flanks in the gap and in the sliding motion.
+struct Meeting {
+  double gap;
+  Vec normal, point, tangent;
+  double slip;
+  std::int64_t tooth;
+  Vec circular_normal, circular_tangent;
+};
+
 class ToothSearch {
  public:
   ToothSearch(const Profile& flexspline, NodeSpline spline, double low, double high,
               const Profile& circular, const double* radii, const double* stations,
-              std::size_t samples, FlankSplines flanks, std::int64_t teeth,
+              std::size_t samples, FlankShapes flanks, std::int64_t teeth,
               std::int64_t teeth_in_model, const double* angle, const double* bearing,
               Limits limits)
       : flexspline_(flexspline), spline_(spline), low_(low), high_(high),
         circular_(circular), radii_(radii), stations_(stations), samples_(samples),
-        flanks_(flanks), teeth_(teeth), teeth_in_model_(teeth_in_model), angle_(angle),
+        flanks_(std::move(flanks)), teeth_(teeth), teeth_in_model_(teeth_in_model), angle_(angle),
         bearing_(bearing), limits_(limits) {}
 
   // Foot of a point in a mirrored sector frame. outward: outward normal of the
@@ -81,6 +125,18 @@ class ToothSearch {
 
   // Pose of a flank
   Pose pose_of(std::int64_t sector, std::int64_t side) const;
+
+  // Local minima of the gap, sampled and refined. flank: displacements in the sector
+  // frames (sectors, 2, nodes, 2)
+  std::vector<Place> minima(const double* flank, std::size_t sectors,
+                            const Sampling& sampling) const;
+
+  // Contact point at a place, and weights of its nodes (nodes,) on both flanks; the
+  // second ones only for elastic flanks of the circular spline
+  Meeting meet(const double* flank, const Place& place, double* weights,
+               double* circular_weights) const;
+
+  bool rigid() const { return flanks_.rigid(); }
 
   // Refine n minima of the gap in place. station: their arc lengths; mirrored: node
   // displacements of their flanks (n, nodes, 2); spacing: half width of the brackets
@@ -94,13 +150,16 @@ class ToothSearch {
   void displaced(double s, const double* mirrored, Vec* point, Vec* tangent,
                  double* curvature) const;
 
+  std::vector<double> gaps(const double* mirrored, const Pose& pose, bool rigid,
+                           const struct Samples& samples, double radius) const;
+
   const Profile& flexspline_;
   NodeSpline spline_;
   double low_, high_;
   const Profile& circular_;
   const double *radii_, *stations_;
   std::size_t samples_;
-  FlankSplines flanks_;
+  FlankShapes flanks_;
   std::int64_t teeth_, teeth_in_model_;
   const double *angle_, *bearing_;
   Limits limits_;

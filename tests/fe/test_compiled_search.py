@@ -25,15 +25,20 @@ CASES = {
     "fixed flexspline": ("reference-2d-flexspline-fixed", {}),
     "involute": ("reference-2d-involute", {}),
     "conjugate": ("dca-80-to-1", {}),
+    "friction": ("reference-2d", {"friction": 0.1}),
+    "whole ring": ("reference-2d", {"half": False}),
 }
 
 
 @pytest.fixture(scope="module", params=CASES)
 def contact(request):
     """Search of a loaded drive with its flanks, and the scale of its lobe."""
-    name, options = CASES[request.param]
-    design = Design.load(name).with_changes({"mesh.refinement": 0.5})
-    model = sector_model(design, half="auto", **options)
+    name, options = CASES[request.param][0], dict(CASES[request.param][1])
+    change = {"mesh.refinement": 0.5}
+    if "friction" in options:
+        change["friction.tooth_coefficient"] = options.pop("friction")
+    design = Design.load(name).with_changes(change)
+    model = sector_model(design, **({"half": "auto"} | options))
     follow = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
     state = follow.to_torque(follow.engage(follow.deflect()), 15.0)
     assert state.outcome.ok
@@ -155,6 +160,37 @@ def test_arrays_that_do_not_fit_are_refused(contact):
             see(**wrong)
     with pytest.raises(ValueError):
         search.refine(np.zeros(3), np.zeros((3, 2, 2)), index, index, 1e-5)
+    flank = np.ascontiguousarray(contact[1].reshape(len(contact[1]), 2, -1, 2))
+    for wrong in ((flank[1:], 2, 8), (flank[:, :, 1:].copy(), 2, 8), (flank, 1, 8)):
+        with pytest.raises(ValueError):
+            search.minima(*wrong, 1e-5, 0.01)
+    own, other = contact[0]._compiled.nodes
+    given = dict(
+        flank=flank,
+        sector=index,
+        side=index,
+        station=np.zeros(3),
+        real=np.zeros((3, 8)),
+        tooth=index.copy(),
+        weight=np.zeros((3, 2, own, 2)),
+        circular_weight=np.zeros((3, 2, other, 2)),
+        sliding=np.zeros((0, 2, own, 2)),
+        circular_sliding=np.zeros((0, 2, other, 2)),
+    )
+    search.meet(**given)
+    for name, wrong in (
+        ("flank", flank[1:]),
+        ("sector", np.full(3, 10**6)),
+        ("side", np.full(3, -1)),
+        ("station", np.zeros(2)),
+        ("real", np.zeros((3, 7))),
+        ("tooth", np.zeros(2, dtype=np.int64)),
+        ("weight", np.zeros((2, 2, own, 2))),
+        ("circular_weight", np.zeros((3, 2, other + 1, 2))),
+        ("sliding", np.zeros((2, 2, own, 2))),
+    ):
+        with pytest.raises(ValueError):
+            search.meet(**(given | {name: wrong}))
     arrays = np.zeros((2, 11)), np.zeros((0, 6))
     curves = np.array([0, 2]), np.arange(3.0), np.zeros((2, 6, 2))
     kernels().Flank(*arrays, *curves, 1.0)

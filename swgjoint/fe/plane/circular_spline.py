@@ -30,6 +30,8 @@ the flank length [-]."""
 BEYOND = 1e-9
 """Overshoot past the end of the flank from which a foot counts as a corner, as a
 fraction of the flank length [-]."""
+MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])
+"""Signs of vectors in mirrored frames: rows for the right and the left flank."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,6 +171,22 @@ class CircularSpline:
             return self.weights
         assert self.compliance is not None
         return self.compliance.element.spline
+
+    def mirror_flanks(self, flank: Array) -> Array | None:
+        """Displacements of flank nodes in mirrored frames (2 N_c, n_nodes, 2) [m].
+
+        Flank ``side`` of tooth ``tooth`` has the index 2 tooth + side.
+
+        Args:
+            flank: Displacements in the frames of the teeth (N_c, 2 n_c) [m].
+
+        Returns:
+            The displacements; None for rigid flanks.
+        """
+        if not self.flank_dofs:
+            return None
+        shaped = flank.reshape(-1, 2, self.flank_dofs // 4, 2) * MIRROR[:, None, :]
+        return np.asarray(shaped.reshape(-1, *shaped.shape[2:]))
 
     def feet(
         self,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.plane.circular_spline import CircularSpline, Feet, FlankSplines
+from swgjoint.fe.plane.circular_spline import CircularSpline, Feet
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index
@@ -63,13 +64,17 @@ class CompiledSearch:
     """The loops with the flanks of one state."""
     rigid: bool
     """Whether the circular spline is rigid."""
+    radius: float
+    """Radius of the circular spline's tips, beyond which points may touch [m]."""
+    nodes: tuple[int, int]
+    """Numbers of nodes of one flank of both members; zero for a rigid one."""
 
     @classmethod
     def for_flanks(
         cls,
         element: Flanks,
         circular_spline: CircularSpline,
-        displaced: FlankSplines | None,
+        displaced: Array | None,
         angle: Array,
         bearing: Array,
         *,
@@ -81,8 +86,8 @@ class CompiledSearch:
         Args:
             element: Flanks of the flexspline.
             circular_spline: Flanks of the circular spline.
-            displaced: Displacements of the circular spline's flanks; None for rigid
-                flanks.
+            displaced: Displacements of the flank nodes of the circular spline in their
+                mirrored frames (2 N_c, n_nodes, 2) [m]; None for rigid flanks.
             angle: Angles of the sector frames relative to the circular spline (N,)
                 [rad].
             bearing: Polar angles of the teeth relative to the circular spline (N,)
@@ -101,10 +106,11 @@ class CompiledSearch:
         spline = element.spline
         # rigid flanks need no arc lengths by radius: any two points will do
         stations, radii = np.arange(2.0), np.arange(2.0)
-        breaks, coefficients = np.zeros(1), np.zeros((0, 0, 4, 2))
+        breaks, weights, nodes = np.zeros(2), np.zeros((4, 1, 0)), np.zeros((0, 0, 2))
         if displaced is not None:
             stations, radii = circular_spline.stations_by_radius
-            breaks, coefficients = displaced.breaks, displaced.coefficients
+            facing_spline, nodes = circular_spline.spline, displaced
+            breaks, weights = facing_spline.x, facing_spline.c
         search: Search = native.Search(
             native.Flank(profile.pieces, profile.edges, *profile.curves, profile.side),
             np.ascontiguousarray(spline.x),
@@ -114,14 +120,82 @@ class CompiledSearch:
             np.ascontiguousarray(radii),
             np.ascontiguousarray(stations),
             np.ascontiguousarray(breaks),
-            np.ascontiguousarray(coefficients),
+            np.ascontiguousarray(weights),
+            np.ascontiguousarray(nodes),
             facing.teeth,
             teeth_in_model,
             np.ascontiguousarray(angle),
             np.ascontiguousarray(bearing),
             native.Limits(**limits),
         )
-        return cls(search=search, rigid=displaced is None)
+        return cls(
+            search=search,
+            rigid=displaced is None,
+            radius=facing.addendum_radius,
+            nodes=(element.flank_size, weights.shape[2]),
+        )
+
+    def find_minima(
+        self, flank: Array, coarse: int, dense: int, limit: float
+    ) -> tuple[Index, Index, Array]:
+        """Sectors, sides and arc lengths [m] of the local minima of the gap, each (n,).
+
+        Args:
+            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            coarse: Number of gap samples per flank node with a rigid circular spline.
+            dense: Number of samples on the flanks that are near; zero for the others.
+            limit: Largest gap of a sample near a minimum [m].
+        """
+        shaped = flank.reshape(len(flank), 2, -1, 2)
+        return self.search.minima(
+            np.ascontiguousarray(shaped), coarse, dense, limit, self.radius
+        )
+
+    def gather(
+        self, sector: Index, side: Index, station: Array, flank: Array, *, rubs: bool
+    ) -> Contacts:
+        """Contact points with all their derivatives at given points of the flanks.
+
+        Args:
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            station: Arc length of each point (n,) [m].
+            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            rubs: Whether to determine the derivatives along the flanks.
+        """
+        n, (own, other) = len(sector), self.nodes
+        real, tooth = np.empty((n, 8)), np.empty(n, dtype=np.int64)
+        m = n if rubs else 0
+        weights = [np.zeros((k, 2, size, 2)) for k in (n, m) for size in (own, other)]
+        self.search.meet(
+            np.ascontiguousarray(flank.reshape(len(flank), 2, -1, 2)),
+            np.ascontiguousarray(sector),
+            np.ascontiguousarray(side),
+            np.ascontiguousarray(station),
+            real,
+            tooth,
+            *weights,
+        )
+        if not rubs:
+            weights[2:] = np.zeros((n, 0)), np.zeros((n, 0))
+        by_flank, by_facing, sliding, facing_sliding = (
+            np.asarray(rows.reshape(n, rows[0].size if n else 0)) for rows in weights
+        )
+        return Contacts(
+            sector=sector,
+            side=side,
+            station=station,
+            gap=real[:, 0],
+            normal=real[:, 1:3],
+            point=real[:, 3:5],
+            weight=by_flank,
+            tooth=tooth,
+            circular_spline_weight=by_facing,
+            tangent=real[:, 5:7],
+            sliding=sliding,
+            circular_spline_sliding=facing_sliding,
+            slip=real[:, 7],
+        )
 
     def see(
         self,

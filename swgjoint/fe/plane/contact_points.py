@@ -124,6 +124,27 @@ class Contacts:
         key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
         return np.isin(key, other)
 
+    def add_places(
+        self, sector: Index, side: Index, station: Array, apart: float
+    ) -> tuple[Index, Index, Array]:
+        """Sectors, sides and arc lengths [m] of other points and then of these points.
+
+        Args:
+            sector: Sectors of the other points (n,).
+            side: Sides of the other points (n,).
+            station: Arc lengths of the other points (n,) [m].
+            apart: Distance from an other point up to which one of these points is the
+                same one and left out [m].
+        """
+        same = (2 * sector + side)[:, None] == 2 * self.sector + self.side
+        same &= np.abs(station[:, None] - self.station) < apart
+        stay = ~same.any(axis=0)
+        return (
+            np.concatenate([sector, self.sector[stay]]),
+            np.concatenate([side, self.side[stay]]),
+            np.concatenate([station, self.station[stay]]),
+        )
+
     def chosen(self, index: Index) -> Contacts:
         """The candidates with the given indices."""
         return Contacts(
@@ -135,3 +156,26 @@ def touch_twice(contacts: Contacts) -> bool:
     """Whether two of the contacts are on the same flank of the flexspline."""
     flank = 2 * contacts.sector + contacts.side
     return len(np.unique(flank)) < len(flank)
+
+
+def outward_normals(tangent: Array) -> Array:
+    """Outward unit normals of the flexspline (n, 2), from its tangents (n, 2)."""
+    size = np.hypot(tangent[:, 0], tangent[:, 1])
+    return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
+
+
+def node_weights(side: Index, spline: Array, direction: Array) -> Array:
+    """Weights of the nodes of both flanks in motions along directions.
+
+    Args:
+        side: Flank on which each point is (n,).
+        spline: Weights of the nodes of that flank (n, n_nodes) [-].
+        direction: Direction of each motion (n, 2).
+
+    Returns:
+        Rows over the nodes of both flanks (n, 4 n_nodes), zero on the other flank.
+    """
+    n, nodes = spline.shape
+    rows = np.zeros((n, 2, nodes, 2))
+    rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]
+    return rows.reshape(n, 4 * nodes)

@@ -19,11 +19,12 @@ import numpy as np
 from swgjoint.fe.plane.circular_spline import (
     BEYOND,
     CORNER,
+    MIRROR,
     CircularSpline,
     FlankSplines,
 )
 from swgjoint.fe.plane.compiled_search import CompiledSearch, Flanks, SeenFeet
-from swgjoint.fe.plane.contact_points import Contacts
+from swgjoint.fe.plane.contact_points import Contacts, node_weights, outward_normals
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.typing import Array, Index
 
@@ -38,9 +39,9 @@ REFINED = 1e-12
 MERGE = 1e-6
 """Distance below which two points count as one contact, as a fraction of the flank
 length [-]."""
-
-
-_MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side: into mirrored frames
+NEAR = 0.02
+"""Excess of the gap of a sample near a minimum over the largest gap of a candidate, as
+a fraction of the flank length [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,16 +70,10 @@ class ToothContact:
         They are in the mirrored frames; flank ``side`` of tooth ``tooth`` has the index
         2 tooth + side.
         """
-        circular_spline = self.circular_spline
-        if not circular_spline.flank_dofs:
+        nodes = self.circular_spline.mirror_flanks(self.circular_spline_flank)
+        if nodes is None:
             return None
-        shaped = self.circular_spline_flank.reshape(
-            -1, 2, circular_spline.flank_dofs // 4, 2
-        )
-        shaped = shaped * _MIRROR[:, None, :]
-        return FlankSplines.fit(
-            circular_spline.spline, shaped.reshape(-1, *shaped.shape[2:])
-        )
+        return FlankSplines.fit(self.circular_spline.spline, nodes)
 
     @cached_property
     def _compiled(self) -> CompiledSearch | None:
@@ -87,7 +82,7 @@ class ToothContact:
         return CompiledSearch.for_flanks(
             self.element,
             self.circular_spline,
-            self._circular_spline_flanks,
+            self.circular_spline.mirror_flanks(self.circular_spline_flank),
             self.angle,
             self.bearing,
             teeth_in_model=len(self.circular_spline_flank),
@@ -121,17 +116,41 @@ class ToothContact:
         Returns:
             The candidates.
         """
+        low, high = self.element.flank_range
+        limit = reach + NEAR * (high - low)
+        if self._compiled is not None:
+            dense = DENSE_SAMPLES if thorough else 0
+            sector, side, station = self._compiled.find_minima(
+                flank, SAMPLES_PER_NODE, dense, limit
+            )
+        else:
+            sector, side, station = self._minima(flank, limit, thorough=thorough)
+        if held is not None and len(held):
+            sector, side, station = held.add_places(
+                sector, side, station, MERGE * (high - low)
+            )
+        return self._gather(sector, side, station, flank, reach)
+
+    def _minima(
+        self, flank: Array, limit: float, *, thorough: bool
+    ) -> tuple[Index, Index, Array]:
+        """Sectors, sides and arc lengths [m] of the local minima of the gap, each (n,).
+
+        Args:
+            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            limit: Largest gap of a sample near a minimum [m].
+            thorough: Whether to sample the gap densely, see :meth:`search`.
+        """
         element = self.element
         size = element.flank_size
-        low, high = element.flank_range
         # flanks in their mirrored frames: (N, 2 sides, size, 2)
-        shaped = flank.reshape(-1, 2, size, 2) * _MIRROR[:, None, :]
+        shaped = flank.reshape(-1, 2, size, 2) * MIRROR[:, None, :]
         sides = shaped.reshape(-1, size, 2)
         sector, side = np.divmod(np.arange(len(sides)), 2)
         s, gap, sector, side = self._sampled(
             SAMPLES_PER_NODE, sides, sector, side, rigid=True
         )
-        near = gap.min(axis=1, initial=np.inf) < reach + 0.02 * (high - low)
+        near = gap.min(axis=1, initial=np.inf) < limit
         gap, sector, side = gap[near], sector[near], side[near]
         if thorough:
             s, gap, sector, side = self._sampled(
@@ -143,21 +162,12 @@ class ToothContact:
             np.isfinite(gap)
             & (gap <= padded[:, :-2])
             & (gap < padded[:, 2:])
-            & (gap < reach + 0.02 * (high - low))
+            & (gap < limit)
         )
         index, k = np.nonzero(minimum)
         sector, side = sector[index], side[index]
         station = self._refine(s[k], shaped[sector, side], sector, side, s[1] - s[0])
-        if held is not None and len(held):
-            key, old_key = 2 * sector + side, 2 * held.sector + held.side
-            same = (key[:, None] == old_key) & (
-                np.abs(station[:, None] - held.station) < MERGE * (high - low)
-            )
-            stay = ~same.any(axis=0)
-            sector = np.concatenate([sector, held.sector[stay]])
-            side = np.concatenate([side, held.side[stay]])
-            station = np.concatenate([station, held.station[stay]])
-        return self._gather(sector, side, station, flank, reach)
+        return sector, side, station
 
     def _sampled(
         self, per_node: int, sides: Array, sector: Index, side: Index, *, rigid: bool
@@ -230,8 +240,8 @@ class ToothContact:
         # the middle of the space
         space = np.round(sign * self.bearing[sector] / pitch)
         turn = sign * self.angle[sector] - (space - 0.5) * pitch
-        seen = rotate(points, turn) * _MIRROR[1]
-        facing = rotate(outward, turn) * _MIRROR[1]
+        seen = rotate(points, turn) * MIRROR[1]
+        facing = rotate(outward, turn) * MIRROR[1]
         # tooth j of the circular spline is half a pitch counter-clockwise from space j
         tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
         tooth %= len(self.circular_spline_flank)
@@ -246,8 +256,8 @@ class ToothContact:
         )
         return SeenFeet(
             feet=feet,
-            normal=rotate(feet.normal * _MIRROR[1], -turn),
-            rest=rotate(feet.rest * _MIRROR[1], -turn),
+            normal=rotate(feet.normal * MIRROR[1], -turn),
+            rest=rotate(feet.rest * MIRROR[1], -turn),
             tooth=tooth,
         )
 
@@ -297,7 +307,7 @@ class ToothContact:
             point, tangent, curvature = self._displaced(s, mirrored)
             seen = self._feet(
                 point,
-                _outward(tangent),
+                outward_normals(tangent),
                 sector,
                 side,
                 start=foot,
@@ -339,21 +349,25 @@ class ToothContact:
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
             reach: Largest gap of a candidate [m].
         """
+        if self._compiled is not None:
+            places = sector, side, station
+            contacts = self._compiled.gather(*places, flank, rubs=self.rubs)
+            return contacts.chosen(np.flatnonzero(contacts.gap < reach))
         element = self.element
         size = element.flank_size
         n = len(sector)
         shaped = flank.reshape(-1, 2, size, 2)[sector, side]
         spline = element.spline(station) if n else np.zeros((0, size))
-        mirror = _MIRROR[side]
+        mirror = MIRROR[side]
         mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
         point = mirrored * mirror
-        seen = self._feet(mirrored, _outward(tangent), sector, side)
+        seen = self._feet(mirrored, outward_normals(tangent), sector, side)
         normal = seen.normal * mirror
         # in the mirrored frame the flexspline's normal is -n: its tangent is J n
         tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
         # a flank and the flank that it faces are on opposite sides of their teeth, so
         # that mirroring reverses tangents
-        facing, out = _MIRROR[1 - side], seen.feet.normal
+        facing, out = MIRROR[1 - side], seen.feet.normal
         circular_spline_normal = out * facing
         circular_spline_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
         circular_spline_shapes = np.zeros((n, 0))
@@ -368,14 +382,14 @@ class ToothContact:
             gap=seen.feet.gap,
             normal=normal,
             point=point,
-            weight=_on_flank(side, spline, normal),
+            weight=node_weights(side, spline, normal),
             tooth=seen.tooth,
-            circular_spline_weight=-_on_flank(
+            circular_spline_weight=-node_weights(
                 1 - side, circular_spline_shapes, circular_spline_normal
             ),
             tangent=tangent,
-            sliding=_on_flank(side, spline, tangent) if self.rubs else none,
-            circular_spline_sliding=-_on_flank(
+            sliding=node_weights(side, spline, tangent) if self.rubs else none,
+            circular_spline_sliding=-node_weights(
                 1 - side, circular_spline_shapes, circular_spline_tangent
             )
             if self.rubs
@@ -383,17 +397,3 @@ class ToothContact:
             slip=slip,
         )
         return contacts.chosen(np.flatnonzero(contacts.gap < reach))
-
-
-def _outward(tangent: Array) -> Array:
-    """Outward unit normals of the flexspline (n, 2), from its tangents (n, 2)."""
-    size = np.hypot(tangent[:, 0], tangent[:, 1])
-    return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
-
-
-def _on_flank(side: Index, spline: Array, direction: Array) -> Array:
-    """Rows over the nodes of both flanks (n, 4 n_nodes), zero on the other flank."""
-    n, nodes = spline.shape
-    rows = np.zeros((n, 2, nodes, 2))
-    rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]
-    return rows.reshape(n, 4 * nodes)
