@@ -174,6 +174,7 @@ def ellipse_distance(
 def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...
+def respond(offsets: Index, blocks: Array, force: Array, result: Array) -> None: ...
 def contact_compliance(
     block_of: Index,
     after: Index,

@@ -4,28 +4,21 @@
 #include <cmath>
 #include <vector>
 
+#include "wide.h"
+
 namespace swgjoint {
 namespace {
 
 using Values = std::vector<double>;
 
-double product(const double* a, const double* b, std::size_t n) {
-  double sum[4] = {0.0, 0.0, 0.0, 0.0};
-  std::size_t i = 0;
-  for (; i + 4 <= n; i += 4) {
-    for (int k = 0; k < 4; ++k) sum[k] += a[i + k] * b[i + k];
-  }
-  for (; i < n; ++i) sum[0] += a[i] * b[i];
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
-
-void add(double factor, const double* values, std::size_t n, double* sum) {
+SWGJOINT_INTO_WIDE void add(double factor, const double* __restrict values,
+                            std::size_t n, double* __restrict sum) {
   for (std::size_t i = 0; i < n; ++i) sum[i] += factor * values[i];
 }
 
 // Adds the products of values (rows,) with a matrix (rows, n).
-void add_rows(const double* values, const double* matrix, std::size_t rows,
-              std::size_t n, double* sum) {
+SWGJOINT_INTO_WIDE void add_rows(const double* values, const double* matrix,
+                                 std::size_t rows, std::size_t n, double* sum) {
   for (std::size_t r = 0; r < rows; ++r, matrix += n) {
     if (values[r] != 0.0) add(values[r], matrix, n, sum);
   }
@@ -45,6 +38,13 @@ void quarter(const double* from, std::size_t nodes, double* to) {
   rotate(from, 0.0, 1.0, nodes, to);
 }
 
+// A row of a matrix that turns, from its parts.
+SWGJOINT_INTO_WIDE void turn_row(const double* parts, std::size_t apart, std::size_t n,
+                                 double cos, double sin, double* __restrict row) {
+  const double *even = parts, *along = even + apart, *across = along + apart;
+  for (std::size_t i = 0; i < n; ++i) row[i] = even[i] + cos * along[i] + sin * across[i];
+}
+
 // Fills the kinematics of one sector; the pointers of k are those of this sector.
 void move(const Sector& e, double place, const double* positions, const double* faces,
           const Kinematics& k) {
@@ -61,7 +61,7 @@ void move(const Sector& e, double place, const double* positions, const double* 
   *k.angle = place + phi;
   rotate(Values(k.position, k.position + m).data(), std::cos(phi), -std::sin(phi),
          e.nodes, k.position);
-  *k.gyration = product(faces, k.position, m);
+  *k.gyration = sum_of_products(faces, k.position, m);
   double mean[2] = {0.0, 0.0};
   for (std::size_t i = 0; i < m; ++i) {
     k.displacement[i] = k.position[i] - e.skeleton[i];
@@ -77,7 +77,7 @@ void move(const Sector& e, double place, const double* positions, const double* 
   double longer = 0.0;
   for (std::size_t r = 0; r < e.slopes; ++r) {
     const double* row = e.rim_slopes + r * m;
-    const double slope = product(row, k.deformation, m);
+    const double slope = sum_of_products(row, k.deformation, m);
     add(slope, row, m, k.elongating);
     longer += 0.5 * slope * slope;
   }
@@ -86,7 +86,7 @@ void move(const Sector& e, double place, const double* positions, const double* 
 
 }  // namespace
 
-void sector_tangents(const Sector& e, const double* place, const double* positions,
+SWGJOINT_WIDE void sector_tangents(const Sector& e, const double* place, const double* positions,
                      const double* force, const std::int64_t* dofs, std::size_t count,
                      std::size_t n, const Kinematics& result, double* gradient,
                      double* tangent) {
@@ -103,7 +103,7 @@ void sector_tangents(const Sector& e, const double* place, const double* positio
     if (on_face(i)) faces[i] = e.skeleton[i] - centre[i % 2];
   }
   add_rows(e.elongation, e.stiffness, m, m, stretched.data());
-  const double own = product(e.elongation, stretched.data(), m);
+  const double own = sum_of_products(e.elongation, stretched.data(), m);
 
   Values elastic(m), total(m), j_y(m), k_jy(m), column(m), beside(m), turned(4 * m);
   for (std::size_t s = 0; s < count; ++s) {
@@ -121,12 +121,12 @@ void sector_tangents(const Sector& e, const double* place, const double* positio
     // elastic forces, and their sum with the tooth forces
     std::fill(elastic.begin(), elastic.end(), 0.0);
     add_rows(k.deformation, e.stiffness, m, m, elastic.data());
-    const double hoop = product(elastic.data(), e.elongation, m);
+    const double hoop = sum_of_products(elastic.data(), e.elongation, m);
     add(hoop, k.elongating, m, elastic.data());
     total = elastic;
     for (std::size_t b = 0; b < e.flank; ++b) {
       const double* row = e.flank_from_skeleton + m * b;
-      k.flank[b] = product(row, k.displacement, m);
+      k.flank[b] = sum_of_products(row, k.displacement, m);
       if (force[b] != 0.0) add(-force[b], row, m, total.data());
     }
     add_rows(force, e.flank_compliance, e.flank, e.flank, k.flank);
@@ -135,28 +135,28 @@ void sector_tangents(const Sector& e, const double* place, const double* positio
     // gradient of the elastic energy
     quarter(k.position, e.nodes, j_y.data());
     beside = elastic;
-    add(-product(elastic.data(), j_y.data(), m), k.spin, m, beside.data());
+    add(-sum_of_products(elastic.data(), j_y.data(), m), k.spin, m, beside.data());
     rotate(beside.data(), cos, sin, e.nodes, turned.data());
     for (std::size_t i = 0; i < m; ++i) gradient[dofs[i]] += turned[i];
     gradient += n;
 
     // vectors of the tangent, whose products are added to the turned stiffness
-    const double tension = product(k.deformation, stretched.data(), m);
+    const double tension = sum_of_products(k.deformation, stretched.data(), m);
     column = stretched;
     add(0.5 * own, k.elongating, m, column.data());
     std::fill(k_jy.begin(), k_jy.end(), 0.0);
     add_rows(j_y.data(), e.stiffness, m, m, k_jy.data());
     for (std::size_t r = 0; r < e.slopes; ++r) {
       const double* row = e.rim_slopes + r * m;
-      add(tension * product(row, j_y.data(), m), row, m, k_jy.data());
+      add(tension * sum_of_products(row, j_y.data(), m), row, m, k_jy.data());
     }
-    const double by_column = product(column.data(), j_y.data(), m);
-    const double by_elongating = product(k.elongating, j_y.data(), m);
+    const double by_column = sum_of_products(column.data(), j_y.data(), m);
+    const double by_elongating = sum_of_products(k.elongating, j_y.data(), m);
     add(by_column, k.elongating, m, k_jy.data());
     add(by_elongating, column.data(), m, k_jy.data());
     const double quadratic =
-        product(j_y.data(), k_jy.data(), m) - product(total.data(), k.position, m);
-    const double moment = product(total.data(), j_y.data(), m);
+        sum_of_products(j_y.data(), k_jy.data(), m) - sum_of_products(total.data(), k.position, m);
+    const double moment = sum_of_products(total.data(), j_y.data(), m);
     quarter(total.data(), e.nodes, beside.data());
     add(-1.0, k_jy.data(), m, beside.data());
     // places relative to the centre of the faces: the spin times the gyration, turned
@@ -171,14 +171,16 @@ void sector_tangents(const Sector& e, const double* place, const double* positio
     const std::size_t part = m * m;
     for (std::size_t i = 0; i < m; ++i) {
       const double* p = e.turning_parts + m * i;
-      double* row = total.data();
-      for (std::size_t j = 0; j < m; ++j) {
-        row[j] = p[j] + c2 * p[part + j] + s2 * p[2 * part + j] +
-                 tension * (p[3 * part + j] + c2 * p[4 * part + j] +
-                            s2 * p[5 * part + j]) +
-                 (a[i] * c[j] + c[i] * a[j]) + (b[i] * d[j] + d[i] * b[j]);
-      }
       double* to = tangent + n * static_cast<std::size_t>(dofs[i]);
+      // rows do not overlap with what they are computed from
+      double* __restrict row = total.data();
+      turn_row(p, part, m, c2, s2, row);
+      turn_row(p + 3 * part, part, m, c2, s2, beside.data());
+      add(tension, beside.data(), m, row);
+      add(a[i], c, m, row);
+      add(c[i], a, m, row);
+      add(b[i], d, m, row);
+      add(d[i], b, m, row);
       for (std::size_t j = 0; j < m; ++j) to[dofs[j]] += row[j];
     }
     tangent += n * n;

@@ -38,6 +38,17 @@ void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
                                   stiffness.data(), count, q / p, result.data());
 }
 
+void respond(Index offsets, In<3> blocks, In<2> force, Out<2> result) {
+  const std::size_t count = offsets.shape(0), rows = blocks.shape(1);
+  const std::size_t size = blocks.shape(2), teeth = force.shape(0);
+  require(blocks.shape(0) == count && force.shape(1) == size,
+          "blocks: (n, rows, size), force: (teeth, size)");
+  require(result.shape(0) == teeth && result.shape(1) == rows, "result: (teeth, rows)");
+  const nb::gil_scoped_release release;
+  swgjoint::respond(offsets.data(), blocks.data(), count, rows, size, force.data(), teeth,
+                    result.data());
+}
+
 void contact_compliance(Index block_of, Index after, In<3> blocks, Index tooth, In<2> weight,
                         Out<2> result) {
   const std::size_t n = tooth.shape(0), size = weight.shape(1);
@@ -201,6 +212,9 @@ NB_MODULE(compiled, m) {
   bind_search(m);
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("respond", &respond, nb::arg("offsets").noconvert(),
+        nb::arg("blocks").noconvert(), nb::arg("force").noconvert(),
         nb::arg("result").noconvert());
   m.def("contact_compliance", &contact_compliance, nb::arg("block_of").noconvert(),
         nb::arg("after").noconvert(), nb::arg("blocks").noconvert(), nb::arg("tooth").noconvert(),

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "wide.h"
+
 namespace swgjoint {
 
 namespace {
@@ -11,7 +13,7 @@ namespace {
 // Subtracts from rows begin to end - 1 of an upper triangle the products of `panel`
 // eliminated rows.
 template <int panel>
-void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t begin) {
+SWGJOINT_INTO_WIDE void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t begin) {
   const double* source[panel];
   for (int k = 0; k < panel; ++k) source[k] = matrix + (pivot + k) * size;
   for (std::size_t i = begin; i < size; ++i) {
@@ -27,7 +29,7 @@ void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t b
 }
 
 // Scales the pivot row; false if the pivot is not positive.
-bool scale(double* matrix, std::size_t size, std::size_t pivot) {
+SWGJOINT_INTO_WIDE bool scale(double* matrix, std::size_t size, std::size_t pivot) {
   double* row = matrix + pivot * size;
   if (!(row[pivot] > 0.0)) return false;
   const double inverse = 1.0 / std::sqrt(row[pivot]);
@@ -37,7 +39,7 @@ bool scale(double* matrix, std::size_t size, std::size_t pivot) {
 }
 
 // Partial Cholesky factorisation of the upper triangle of a matrix, in place.
-bool factorise(double* matrix, std::size_t size, std::size_t pivots) {
+SWGJOINT_WIDE bool factorise(double* matrix, std::size_t size, std::size_t pivots) {
   constexpr int panel = 4;
   std::size_t pivot = 0;
   for (; pivot + panel <= pivots; pivot += panel) {

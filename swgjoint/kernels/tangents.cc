@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "wide.h"
+
 namespace swgjoint {
 
 void add_station_stiffness(const double* weights, std::size_t p, std::size_t width,
@@ -30,7 +32,39 @@ void add_station_stiffness(const double* weights, std::size_t p, std::size_t wid
   }
 }
 
-void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
+SWGJOINT_WIDE void respond(const std::int64_t* offsets, const double* blocks,
+                           std::size_t count, std::size_t rows, std::size_t size,
+                           const double* force, std::size_t teeth, double* result) {
+  // most teeth carry no load, and one flank of the others does
+  struct Loaded {
+    std::int64_t tooth;
+    const double* force;
+    std::size_t begin, end;
+    double* moved;
+  };
+  std::vector<Loaded> loads;
+  const auto all = static_cast<std::int64_t>(teeth);
+  for (std::int64_t tooth = 0; tooth < all; ++tooth, force += size) {
+    std::size_t begin = 0, end = size;
+    while (begin < size && force[begin] == 0.0) ++begin;
+    while (end > begin && force[end - 1] == 0.0) --end;
+    if (begin < end) loads.push_back({tooth, force, begin, end, nullptr});
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    for (Loaded& load : loads) {
+      const std::int64_t at = ((load.tooth + offsets[k]) % all + all) % all;
+      load.moved = result + rows * static_cast<std::size_t>(at);
+    }
+    for (std::size_t r = 0; r < rows; ++r, blocks += size) {
+      for (const Loaded& load : loads) {
+        const std::size_t b = load.begin;
+        load.moved[r] += sum_of_products(blocks + b, load.force + b, load.end - b);
+      }
+    }
+  }
+}
+
+SWGJOINT_WIDE void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
                         const std::int64_t* after, const double* blocks, std::size_t size,
                         const std::int64_t* tooth, const double* weight, std::size_t n,
                         double* result) {

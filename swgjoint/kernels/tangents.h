@@ -1,5 +1,5 @@
-// Dense sums behind the tangent of a drive: springs of bore stations, and compliance
-// between points of a ring of teeth.
+// Dense sums behind the tangent of a drive: springs of bore stations, displacements of
+// a ring of teeth and compliance between its points.
 
 #ifndef SWGJOINT_KERNELS_TANGENTS_H_
 #define SWGJOINT_KERNELS_TANGENTS_H_
@@ -15,6 +15,12 @@ namespace swgjoint {
 void add_station_stiffness(const double* weights, std::size_t p, std::size_t width,
                            const double* direction, const double* stiffness,
                            std::size_t count, std::size_t intervals, double* result);
+
+// Twin of respond in swgjoint/fe/common/block_circulant.py, added to result
+// (teeth, rows): offsets (count,), blocks (count, rows, size), force (teeth, size).
+void respond(const std::int64_t* offsets, const double* blocks, std::size_t count,
+             std::size_t rows, std::size_t size, const double* force, std::size_t teeth,
+             double* result);
 
 // Twin of contact_compliance in swgjoint/fe/common/block_circulant.py, result (n, n):
 // block_of: first block of a tooth offset (teeth,), after: next one of the same offset

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.common.block_circulant import contact_compliance
+from swgjoint.fe.common.block_circulant import contact_compliance, respond
 from swgjoint.fe.plane.bore_contact import BoreStations
 from swgjoint.kernels import kernels
 
@@ -63,6 +63,20 @@ def test_compliance_between_points_as_in_numpy(monkeypatch, most):
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("most", [2, 5, 11])
+def test_displacements_of_teeth_as_in_numpy(monkeypatch, most):
+    """One flank of a tooth loaded, both or none; offsets once round and back."""
+    rng = np.random.default_rng(9)
+    offsets, teeth, size = np.arange(-most, most + 1), 11, 20
+    blocks = rng.normal(size=(len(offsets), 6, size))
+    force = rng.normal(size=(teeth, size))
+    force[2], force[4, :10], force[5, 7:] = 0.0, 0.0, 0.0
+    ours = respond(offsets, blocks, force)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    near(ours, respond(offsets, blocks, force))
+    assert np.abs(ours).min() > 0.0
+
+
 def test_shapes_that_do_not_fit_are_refused():
     native = kernels()
     index = np.zeros(2, dtype=np.int64)
@@ -82,6 +96,13 @@ def test_shapes_that_do_not_fit_are_refused():
             np.zeros((2, 4)),
             np.zeros((2, 2)),
         )
+    for wrong in (
+        (index[:1], np.zeros((2, 3, 4)), np.zeros((5, 4)), np.zeros((5, 3))),
+        (index, np.zeros((2, 3, 4)), np.zeros((5, 3)), np.zeros((5, 3))),
+        (index, np.zeros((2, 3, 4)), np.zeros((5, 4)), np.zeros((5, 4))),
+    ):
+        with pytest.raises(ValueError):
+            native.respond(*wrong)
     with pytest.raises(ValueError):  # a circle of blocks would never end
         native.contact_compliance(
             index, index, np.zeros((2, 4, 4)), index, np.zeros((2, 4)), np.zeros((2, 2))

@@ -167,11 +167,12 @@ def test_an_exchange_changes_the_gradient_as_the_station_does():
     """Taken in or out of the linearised ring, or linearised anew."""
     _, follow, state = loaded("reference-2d-parabolic", 0.35)
     model = follow.model
-    linear = linearise(model, state, state.torque)
+    linear, found = (linearise(model, state, state.torque) for _ in range(2))
     near = (np.abs(linear.gap) < 3e-8) | state.touching
     stations = near & (np.random.default_rng(1).random(near.shape) < 0.5)
     assert (stations & state.touching).any() and (stations & ~state.touching).any()
-    found = linear.exchange(stations, state.touching)
+    sectors = found.exchange(stations, state.touching)
+    assert sectors.tolist() == np.flatnonzero(stations.any(axis=1)).tolist()
     other = replace(state, touching=state.touching ^ stations)
     wanted = linearise(model, other, state.torque)
     scale = np.abs(wanted.gradient).max()

@@ -23,6 +23,14 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
         Displacements (N, n_rows) [m].
     """
     result = np.zeros((len(force), blocks.shape[1]))
+    if (native := kernels()) is not None:
+        native.respond(
+            np.ascontiguousarray(offsets),
+            np.ascontiguousarray(blocks),
+            np.ascontiguousarray(force),
+            result,
+        )
+        return result
     loaded = np.flatnonzero(force.any(axis=1))
     product = blocks.reshape(-1, blocks.shape[2]) @ force[loaded].T
     moved = product.reshape(*blocks.shape[:2], len(loaded))

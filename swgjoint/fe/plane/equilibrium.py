@@ -106,7 +106,7 @@ class NewtonSolver:
                         break
                     problem = problem.exchange(wrong)
                     step = problem.solve(step.active)
-                state, linear = problem.state, problem.linear
+                state = problem.state
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -143,8 +143,8 @@ class Linearised:
         shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
 
-    def exchange(self, stations: Mask, touching: Mask) -> Linearised:
-        """The linearisation with the contact state of some stations inverted.
+    def exchange(self, stations: Mask, touching: Mask) -> Index:
+        """Invert the contact state of some stations, in place.
 
         It is valid for a rigid wave generator only. The curvature of the outline is
         neglected, because the gap of a station that opens or closes is almost zero.
@@ -152,20 +152,22 @@ class Linearised:
         Args:
             stations: Whether to switch each station (N, q).
             touching: Whether each station is in contact before the change (N, q).
+
+        Returns:
+            Sectors whose forces and tangents changed (k,).
         """
         sectors = np.flatnonzero(stations.any(axis=1))
-        change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness
-        k, normal = change[sectors], self.normal[sectors]
+        change = np.where(touching[sectors], -1.0, 1.0) * stations[sectors]
+        k, normal = change * self.stations.stiffness, self.normal[sectors]
         push = (k * self.gap[sectors])[..., None] * normal
         into, sign = self.gap_dofs, self.sign[sectors][:, self.gap_dofs]
         forces = self.stations.forces_of(push).reshape(sectors.size, -1)
         springs = self.stations.stiffness_of(normal, k)
-        gradient, hessian = self.gradient.copy(), self.hessian.copy()
-        gradient[sectors[:, None], into] += sign * forces
-        hessian[sectors[:, None, None], into[:, None], into] += (
+        self.gradient[sectors[:, None], into] += sign * forces
+        self.hessian[sectors[:, None, None], into[:, None], into] += (
             sign[:, :, None] * springs * sign[:, None, :]
         )
-        return replace(self, gradient=gradient, hessian=hessian)
+        return sectors
 
     def mean_gap_gradient(self, sector: Index, weight: Array) -> Array:
         """Derivatives of weighted means of station gaps (k, n) [-].

@@ -185,8 +185,8 @@ class NewtonProblem:
     def exchange(self, stations: Mask) -> NewtonProblem:
         """The problem with the contact state of some bore stations inverted.
 
-        It is valid for a rigid wave generator only. The factorised tangent is updated
-        in place, so that the original problem cannot be solved afterwards.
+        It is valid for a rigid wave generator only. The linearised ring and its factor
+        are updated in place, so that the original problem cannot be solved afterwards.
 
         Args:
             stations: Whether to switch each station (N, q).
@@ -195,11 +195,9 @@ class NewtonProblem:
             SingularCyclicError: If the tangent becomes singular.
         """
         touching = self.state.touching
-        linear = self.linear.exchange(stations, touching)
-        changed = np.flatnonzero(stations.any(axis=1))
-        self.factor.update(linear.anchor_tangent(changed), changed)
-        state = replace(self.state, touching=touching ^ stations)
-        return replace(self, state=state, linear=linear)
+        changed = self.linear.exchange(stations, touching)
+        self.factor.update(self.linear.anchor_tangent(changed), changed)
+        return replace(self, state=replace(self.state, touching=touching ^ stations))
 
     def solve(self, pressing: Index | None = None) -> NewtonStep:
         """Solution for the contact forces and the increment of the nodes.
