@@ -167,6 +167,21 @@ class RingFactor:
     def condense(
         self, loads: Array, sector: Index, rows: Array, result: Array
     ) -> None: ...
+    def solve_contacts(
+        self,
+        loads: Array,
+        sector: Index,
+        rows: Array,
+        gap: Array,
+        arm: Array,
+        compliance: Array,
+        numbers: Array,
+        turns: bool,
+        held: bool,
+        active: Mask,
+        result: Array,
+        increment: Array,
+    ) -> float: ...
 
 def ellipse_distance(
     points: Array, major: float, minor: float, result: Array

@@ -11,13 +11,13 @@ namespace {
 
 using Values = std::vector<double>;
 
-SWGJOINT_INTO_WIDE void add(double factor, const double* __restrict values,
+SWGJOINT_INLINE void add(double factor, const double* __restrict values,
                             std::size_t n, double* __restrict sum) {
   for (std::size_t i = 0; i < n; ++i) sum[i] += factor * values[i];
 }
 
 // Adds the products of values (rows,) with a matrix (rows, n).
-SWGJOINT_INTO_WIDE void add_rows(const double* values, const double* matrix,
+SWGJOINT_INLINE void add_rows(const double* values, const double* matrix,
                                  std::size_t rows, std::size_t n, double* sum) {
   for (std::size_t r = 0; r < rows; ++r, matrix += n) {
     if (values[r] != 0.0) add(values[r], matrix, n, sum);
@@ -39,7 +39,7 @@ void quarter(const double* from, std::size_t nodes, double* to) {
 }
 
 // A row of a matrix that turns, from its parts.
-SWGJOINT_INTO_WIDE void turn_row(const double* parts, std::size_t apart, std::size_t n,
+SWGJOINT_INLINE void turn_row(const double* parts, std::size_t apart, std::size_t n,
                                  double cos, double sin, double* __restrict row) {
   const double *even = parts, *along = even + apart, *across = along + apart;
   for (std::size_t i = 0; i < n; ++i) row[i] = even[i] + cos * along[i] + sin * across[i];

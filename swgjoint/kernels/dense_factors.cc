@@ -3,20 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-// Versions of a loop, one of which is chosen when the library is loaded. All give the
-// same bits, because they add element by element.
-#if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define SWGJOINT_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define SWGJOINT_WIDE
-#endif
-// A loop that belongs to each of these versions
-#if defined(__GNUC__)
-#define SWGJOINT_INLINE inline __attribute__((always_inline))
-#else
-#define SWGJOINT_INLINE inline
-#endif
+#include "wide.h"
 
 namespace swgjoint {
 

@@ -5,8 +5,11 @@
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
+#include <limits>
+#include <vector>
 
 #include "complementarity.h"
+#include "contact_step.h"
 #include "flank_arrays.h"
 #include "outline.h"
 #include "ring_factor.h"
@@ -184,6 +187,52 @@ class RingFactor {
     ring_.condense(loads.data(), d, sector.data(), rows.data(), k, result.data());
   }
 
+  // Contact forces and increment of one Newton step: the condensed system of the loads
+  // (minus the gradient and both constraints) and of rows on single sectors. numbers:
+  // stiffness of the anchor, moment, rotation. Compliance of the output; NaN if no active
+  // set is found.
+  double solve_contacts(In<3> loads, Index sector, In<2> rows, In<1> gap, In<1> arm,
+                        In<2> compliance, In<1> numbers, bool turns, bool held,
+                        MaskOut active, Out<1> result, Out<3> increment) const {
+    const std::size_t k = rows.shape(0), n = ring_.size();
+    require(loads.shape(0) == ring_.sectors() && loads.shape(1) == n &&
+                loads.shape(2) == 3,
+            "loads: (sectors, n, 3)");
+    require(rows.shape(1) == n && sector.shape(0) == k, "rows: (k, n)");
+    require(gap.shape(0) == k && arm.shape(0) == k && compliance.shape(0) == k &&
+                compliance.shape(1) == k && active.shape(0) == k,
+            "gap, arm, active: (k,), compliance: (k, k)");
+    require(numbers.shape(0) == 3 && result.shape(0) == k + 3, "result: (k + 3,)");
+    require(increment.shape(0) == ring_.sectors() && increment.shape(1) == n &&
+                increment.shape(2) == 1,
+            "increment: (sectors, n, 1)");
+    check(sector);
+    const double* given = numbers.data();
+    const swgjoint::ContactStep step{k,        gap.data(), arm.data(), compliance.data(),
+                                     given[0], given[1],   given[2],   turns,
+                                     held};
+    const nb::gil_scoped_release release;
+    std::vector<double> products((k + 3) * (k + 3));
+    ring_.condense(loads.data(), 3, sector.data(), rows.data(), k, products.data());
+    double output = 0.0;
+    double* z = result.data();
+    if (!swgjoint::solve_contact_step(step, products.data(), active.data(), z, &output)) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    // the loads of the solution together
+    double* load = increment.data();
+    const double* each = loads.data();
+    for (std::size_t i = 0; i < ring_.sectors() * n; ++i, each += 3) {
+      load[i] = each[0] + z[k] * each[1] + z[k + 2] * each[2];
+    }
+    for (std::size_t i = 0; i < k; ++i) {
+      double* own = load + n * static_cast<std::size_t>(sector.data()[i]);
+      for (std::size_t j = 0; j < n; ++j) own[j] += z[i] * rows.data()[n * i + j];
+    }
+    ring_.solve(load, 1);
+    return output;
+  }
+
  private:
   static std::size_t checked(std::int64_t sectors, std::int64_t size,
                              std::int64_t face) {
@@ -229,7 +278,13 @@ NB_MODULE(compiled, m) {
       .def("solve", &RingFactor::solve, nb::arg("loads").noconvert())
       .def("condense", &RingFactor::condense, nb::arg("loads").noconvert(),
            nb::arg("sector").noconvert(), nb::arg("rows").noconvert(),
-           nb::arg("result").noconvert());
+           nb::arg("result").noconvert())
+      .def("solve_contacts", &RingFactor::solve_contacts, nb::arg("loads").noconvert(),
+           nb::arg("sector").noconvert(), nb::arg("rows").noconvert(),
+           nb::arg("gap").noconvert(), nb::arg("arm").noconvert(),
+           nb::arg("compliance").noconvert(), nb::arg("numbers").noconvert(),
+           nb::arg("turns"), nb::arg("held"), nb::arg("active").noconvert(),
+           nb::arg("result").noconvert(), nb::arg("increment").noconvert());
   nb::class_<StripProblems>(m, "StripProblems")
       .def(nb::init<In<2>, In<2>, Index, Mask, In<1>, In<1>, In<1>, In<1>, In<1>, In<1>,
                     In<1>>(),

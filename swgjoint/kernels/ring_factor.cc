@@ -13,7 +13,7 @@ namespace {
 // Subtracts from rows begin to end - 1 of an upper triangle the products of `panel`
 // eliminated rows.
 template <int panel>
-SWGJOINT_INTO_WIDE void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t begin) {
+SWGJOINT_INLINE void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t begin) {
   const double* source[panel];
   for (int k = 0; k < panel; ++k) source[k] = matrix + (pivot + k) * size;
   for (std::size_t i = begin; i < size; ++i) {
@@ -29,7 +29,7 @@ SWGJOINT_INTO_WIDE void subtract(double* matrix, std::size_t size, std::size_t p
 }
 
 // Scales the pivot row; false if the pivot is not positive.
-SWGJOINT_INTO_WIDE bool scale(double* matrix, std::size_t size, std::size_t pivot) {
+SWGJOINT_INLINE bool scale(double* matrix, std::size_t size, std::size_t pivot) {
   double* row = matrix + pivot * size;
   if (!(row[pivot] > 0.0)) return false;
   const double inverse = 1.0 / std::sqrt(row[pivot]);

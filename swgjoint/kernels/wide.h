@@ -1,9 +1,6 @@
-// Loops compiled twice: for any processor, and with vectors of four doubles.
-//
-// The processor decides when the module is loaded. Vectors hold independent sums, and
-// products are not fused with sums, so both versions give the same bits.
-//
-// SWGJOINT_WIDE marks such a function, SWGJOINT_INTO_WIDE what it calls.
+// Loops compiled for several widths of vectors, one of which is chosen when the library
+// is loaded. All give the same bits: vectors hold independent sums, and products are not
+// fused with sums. SWGJOINT_WIDE marks such a function, SWGJOINT_INLINE what it calls.
 
 #ifndef SWGJOINT_KERNELS_WIDE_H_
 #define SWGJOINT_KERNELS_WIDE_H_
@@ -11,20 +8,23 @@
 #include <cstddef>
 #include <cstring>
 
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && \
-    defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
-#define SWGJOINT_WIDE __attribute__((target_clones("default", "avx2")))
-#define SWGJOINT_INTO_WIDE inline __attribute__((always_inline))
+#if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && \
+    !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define SWGJOINT_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define SWGJOINT_WIDE
-#define SWGJOINT_INTO_WIDE inline
+#endif
+#if defined(__GNUC__)
+#define SWGJOINT_INLINE inline __attribute__((always_inline))
+#else
+#define SWGJOINT_INLINE inline
 #endif
 
 namespace swgjoint {
 
 // Sum of products in four parts that do not wait for each other. Written with vectors,
 // because compilers turn a loop over an array of parts into slow permutations.
-SWGJOINT_INTO_WIDE double sum_of_products(const double* a, const double* b,
+SWGJOINT_INLINE double sum_of_products(const double* a, const double* b,
                                           std::size_t n) {
   std::size_t i = 0;
 #if defined(__GNUC__)

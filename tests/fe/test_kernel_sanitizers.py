@@ -81,7 +81,7 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     tests = Path(__file__).parents[1]
     files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
-    assert len(files) == 6
+    assert len(files) == 7
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,

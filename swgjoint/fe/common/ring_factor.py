@@ -13,7 +13,7 @@ import numpy as np
 
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.kernels import kernels
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array, Index, Mask
 
 if TYPE_CHECKING:
     from swgjoint.kernels import compiled
@@ -111,6 +111,60 @@ class RingFactor:
             result,
         )
         return result
+
+    def solve_contacts(
+        self,
+        loads: Array,
+        sector: Index,
+        rows: Array,
+        gaps: tuple[Array, Array, Array, Array],
+        *,
+        turns: bool,
+        held: bool,
+        active: Mask,
+        result: Array,
+    ) -> tuple[Array, float] | None:
+        """Contact forces of a Newton step of the 2D model, in compiled code only.
+
+        See :class:`swgjoint.fe.plane.newton_step.NewtonProblem`, whose numpy version
+        uses :meth:`condense` and :meth:`solve`.
+
+        Args:
+            loads: Minus the gradient and both constraints (N, n, 3).
+            sector: Sectors of the k lines of force (k,).
+            rows: Loads of the lines on these sectors (k, n).
+            gaps: Gaps of the lines without forces (k,) [m], their lever arms (k,) [m],
+                their compliance (k, k) [m/N], and three numbers: the stiffness of the
+                anchor, the moment on the circular spline and the rotation error.
+            turns: Whether the circular spline turns.
+            held: Whether the rotation of the flexspline is prescribed.
+            active: Whether each line carries force: first guess, then result (k,).
+            result: Unknowns of the condensed system (k + 3,), written.
+
+        Returns:
+            Increment (N, n) [m] and compliance of the output [rad/(N·m)]. None without
+            a compiled factor or if no set of active contacts is found; ``active`` is
+            then of no use.
+        """
+        if self._native is None:
+            return None
+        increment = np.empty((*loads.shape[:2], 1))
+        gap, arm, compliance, numbers = gaps
+        output = self._native.solve_contacts(
+            np.ascontiguousarray(loads),
+            np.ascontiguousarray(sector),
+            np.ascontiguousarray(rows),
+            np.ascontiguousarray(gap),
+            np.ascontiguousarray(arm),
+            np.ascontiguousarray(compliance),
+            np.ascontiguousarray(numbers),
+            turns,
+            held,
+            active,
+            result,
+            increment,
+        )
+        return None if np.isnan(output) else (increment[:, :, 0], output)
 
 
 def _condense(factor: CyclicFactor, loads: Array, sector: Index, rows: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Lines of action of the tooth forces, with the compliance of the loaded parts."""
+"""Lines of action of the tooth forces, and the condensed system of their forces."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.friction import Sliding
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,6 +94,24 @@ class ForceLines:
         )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """Unknowns of the condensed system of a Newton step."""
+
+    force: Array
+    """Forces on the lines (n,) [N]."""
+    active: Mask
+    """Whether each candidate carries force (m,)."""
+    anchor: float
+    """Force of the anchor [N]."""
+    circular_spline_turn: float
+    """Rotation increment of the circular spline [rad]."""
+    multiplier: float
+    """Multiplier of the flexspline's rotation: the torque that holds it [N·m]."""
+    compliance: float
+    """Compliance of the output, per torque of the model [rad/(N·m)]."""
+
+
 def _friction_lines(
     model: SectorModel, state: State, contacts: Contacts
 ) -> Sliding | None:
@@ -109,3 +128,87 @@ def _strips(model: SectorModel, state: State, contacts: Contacts) -> Strips | No
         return None
     held, force = state.contacts, state.tooth_force
     return Strips.from_contacts(model.indentation, contacts, held, force)
+
+
+def solve_condensed(
+    matrix: Array,
+    offset: Array,
+    sliding: Sliding | None,
+    guess: Mask,
+    *,
+    turns: bool,
+    held: bool,
+) -> Solution:
+    """Solution of the condensed system, with friction reduced to k - m forces.
+
+    Args:
+        matrix: Matrix M (n + 3, n + 3).
+        offset: Offset q (n + 3,).
+        sliding: Friction on the lines; None without friction.
+        guess: Whether each of the m candidates carries force in the first guess (m,).
+        turns: Whether the circular spline turns.
+        held: Whether the rotation of the flexspline is prescribed.
+
+    Raises:
+        ActiveSetError: If no set of active contacts is found.
+    """
+    m = len(guess)
+    k = m if sliding is None else m + len(sliding.stick)
+    used = np.arange(k + 1)
+    if turns:
+        used = np.append(used, k + 1)
+    if held:
+        used = np.append(used, k + 2)
+    multipliers = int(held)
+
+    def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
+        system = matrix[np.ix_(used, used)]
+        return solve_mixed(system, offset[used], m, multipliers, guess)
+
+    if sliding is None:
+        values, active = solved_for(matrix, offset)
+    else:
+        full = matrix, offset
+        try:
+            matrix, offset = sliding.reduce(*full)
+            values, active = solved_for(matrix, offset)
+        except ActiveSetError:
+            # friction limits from the last normal forces make the system symmetric
+            sliding = sliding.lag()
+            matrix, offset = sliding.reduce(*full)
+            values, active = solved_for(matrix, offset)
+    z = np.zeros(k + 3)
+    z[used] = values
+    inside = np.concatenate([np.flatnonzero(active), used[m:]])
+    anchor, circular_spline_turn, multiplier = z[k:]
+    return Solution(
+        force=z[:k] if sliding is None else sliding.forces(z[:k]),
+        active=active,
+        anchor=float(anchor),
+        circular_spline_turn=float(circular_spline_turn),
+        multiplier=float(multiplier),
+        compliance=_output_compliance(matrix, inside, k, turns=turns),
+    )
+
+
+def _output_compliance(matrix: Array, held: Index, k: int, *, turns: bool) -> float:
+    """Tangent compliance of the output, per torque of the model.
+
+    Args:
+        matrix: Matrix M (k + 3, k + 3) of the k forces, the anchor, the rotation of the
+            circular spline and the multiplier.
+        held: Indices of the unknowns that may differ from zero, increasing.
+        k: Number of force unknowns.
+        turns: Whether the circular spline turns.
+
+    Returns:
+        Rotation of the output against its load per torque [rad/(N·m)].
+    """
+    system = matrix[np.ix_(held, held)]
+    if turns:
+        unit = (held == k + 1).astype(float)
+        return -float(np.linalg.solve(system, unit)[held == k + 1][0])
+    held = held[held <= k]
+    reach, turn = matrix[held, k + 2], matrix[k + 2, held]
+    system = matrix[np.ix_(held, held)]
+    return float(matrix[k + 2, k + 2] - turn @ np.linalg.solve(system, reach))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
-from swgjoint.fe.common.friction import Sliding
 from swgjoint.fe.common.ring_factor import RingFactor
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
-from swgjoint.fe.plane.force_lines import ForceLines
+from swgjoint.fe.plane.force_lines import ForceLines, Solution, solve_condensed
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.sector_model import SectorModel
@@ -86,29 +85,11 @@ class NewtonStep:
     strip_error: float
     """Largest error of the linearised indentation law [m]; zero without indentation."""
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """Largest increment of a node, or the error of the indentation law [m]."""
         of_race = float(np.abs(self.race_shift).max(initial=0.0))
         return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Solution:
-    """Unknowns of the condensed system, see :class:`NewtonProblem`."""
-
-    force: Array
-    """Forces on the lines (n,) [N]."""
-    active: Mask
-    """Whether each candidate carries force (m,)."""
-    anchor: float
-    """Force of the anchor [N]."""
-    circular_spline_turn: float
-    """Rotation increment of the circular spline [rad]."""
-    multiplier: float
-    """Multiplier of the flexspline's rotation: the torque that holds it [N·m]."""
-    compliance: float
-    """Compliance of the output, per torque of the model [rad/(N·m)]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -213,16 +194,96 @@ class NewtonProblem:
         linear, lines = self.linear, self.lines
         loads = np.concatenate([-linear.gradient[:, :, None], lines.constraints], 2)
         loads[linear.fixed] = 0.0
+        compiled = self._solve_compiled(loads, pressing)
+        if compiled is not None:
+            return self._step(*compiled)
         sector = lines.force.sector
         products = self.factor.condense(loads, sector, lines.rows)
         matrix, offset = self._matrix(products), self._offset(products[0])
-        guess = _first_guess(self.state, lines.contacts, offset, pressing)
-        solution = _solve_condensed(matrix, offset, lines.sliding, guess, self.load)
+        guess = _first_guess(self.state, lines.contacts, pressing)
+        if guess is None:
+            guess = offset[: len(lines.contacts)] < 0.0
+        solution = solve_condensed(
+            matrix, offset, lines.sliding, guess, turns=self._turns, held=self._held
+        )
         # the loads of the solution together: on all sectors and on those of the teeth
         load = loads @ np.array([1.0, solution.anchor, solution.multiplier])
         np.add.at(load, sector, solution.force[:, None] * lines.rows)
         moved = self.factor.solve(load[:, :, None])[:, :, 0]
         return self._step(solution, moved)
+
+    def _solve_compiled(
+        self, loads: Array, pressing: Index | None
+    ) -> tuple[Solution, Array] | None:
+        """Solution and increment (N, n_dofs) [m] from compiled loops.
+
+        Args:
+            loads: Minus the gradient and both constraints (N, n_dofs, 3).
+            pressing: First guess, see :meth:`solve`.
+
+        Returns:
+            None if compiled loops are not available, if there is friction, if the first
+            guess is not known beforehand, or if they find no set of active contacts.
+        """
+        lines, n = self.lines, len(self.lines.force)
+        active = _first_guess(self.state, lines.contacts, pressing)
+        if active is None or lines.sliding is not None:
+            return None
+        z = np.empty(n + 3)
+        numbers = self.linear.anchor_stiffness, *self._moment_and_rotation
+        solved = self.factor.solve_contacts(
+            loads,
+            lines.force.sector,
+            lines.rows,
+            (lines.gap, self._arm, lines.compliance, np.array(numbers)),
+            turns=self._turns,
+            held=self._held,
+            active=active,
+            result=z,
+        )
+        if solved is None:
+            return None
+        increment, compliance = solved
+        anchor, turn, multiplier = z[n:]
+        solution = Solution(
+            force=z[:n],
+            active=active,
+            anchor=float(anchor),
+            circular_spline_turn=float(turn),
+            multiplier=float(multiplier),
+            compliance=compliance,
+        )
+        return solution, increment
+
+    @property
+    def _turns(self) -> bool:
+        """Whether the circular spline turns."""
+        return self.load.on_circular_spline is not None
+
+    @property
+    def _held(self) -> bool:
+        """Whether the rotation of the flexspline is prescribed."""
+        return self.load.rotation is not None
+
+    @property
+    def _arm(self) -> Array:
+        """Lever arms of the lines, by which turning the circular spline closes them.
+
+        Shape (n,) [m].
+        """
+        lines = self.lines.force
+        turned = rotate_right_angle(lines.point)
+        return np.asarray(np.einsum("ki,ki->k", turned, lines.normal))
+
+    @property
+    def _moment_and_rotation(self) -> tuple[float, float]:
+        """Moment on the circular spline [N·m] and rotation of the flexspline.
+
+        Both without line forces; the rotation is relative to the prescribed one [rad].
+        """
+        load = self.load
+        moment = -(load.on_circular_spline or 0.0) / self.model.copies
+        return moment, self.linear.rotation - (load.rotation or 0.0)
 
     def _matrix(self, products: Array) -> Array:
         """Matrix M (n + 3, n + 3).
@@ -241,8 +302,7 @@ class NewtonProblem:
         matrix[np.ix_(constrained, constrained)] = products[1:3, 1:3]
         matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
         # turning the circular spline towards the teeth closes the gap by the lever arm
-        arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
-        matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
+        matrix[:n, n + 1] = matrix[n + 1, :n] = -self._arm
         return matrix
 
     def _offset(self, products: Array) -> Array:
@@ -252,16 +312,17 @@ class NewtonProblem:
             products: Row of minus the gradient in the products of :meth:`_matrix`: the
                 changes without line forces (n + 3,).
         """
-        lines, load = self.lines, self.load
+        lines = self.lines
         n, offset = len(lines.force), np.zeros(len(lines.force) + 3)
+        moment, rotation = self._moment_and_rotation
         offset[:n] = lines.gap + products[3:]
         # anchor and rotation of the flexspline, torque on the circular spline
         offset[[n, n + 2]] = products[1:3]
-        offset[n + 1] = -(load.on_circular_spline or 0.0) / self.model.copies
-        offset[n + 2] += self.linear.rotation - (load.rotation or 0.0)
+        offset[n + 1] = moment
+        offset[n + 2] += rotation
         return offset
 
-    def _step(self, solution: _Solution, increment: Array) -> NewtonStep:
+    def _step(self, solution: Solution, increment: Array) -> NewtonStep:
         """Step with the displacements, torques and bore forces of a solution.
 
         Args:
@@ -296,78 +357,14 @@ class NewtonProblem:
 
 
 def _first_guess(
-    state: State, contacts: Contacts, offset: Array, pressing: Index | None
-) -> Mask:
-    """Whether each candidate carries force in the first guess (m,)."""
-    m = len(contacts)
+    state: State, contacts: Contacts, pressing: Index | None
+) -> Mask | None:
+    """Whether each candidate carries force in the first guess (m,).
+
+    The result is None if the candidates that overlap without forces are to be guessed.
+    """
     if pressing is not None:
-        return np.isin(np.arange(m), pressing)
+        return np.isin(np.arange(len(contacts)), pressing)
     if state.contacts is not None and len(state.contacts):
         return contacts.share_flank_with(state.contacts)
-    return np.asarray(offset[:m] < 0.0)
-
-
-def _solve_condensed(
-    matrix: Array, offset: Array, sliding: Sliding | None, guess: Mask, load: Load
-) -> _Solution:
-    """Solution of the condensed system, with friction reduced to k - m forces."""
-    m = len(guess)
-    k = m if sliding is None else m + len(sliding.stick)
-    used = np.arange(k + 1)
-    if load.on_circular_spline is not None:
-        used = np.append(used, k + 1)
-    if load.rotation is not None:
-        used = np.append(used, k + 2)
-    multipliers = int(load.rotation is not None)
-
-    def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
-        system = matrix[np.ix_(used, used)]
-        return solve_mixed(system, offset[used], m, multipliers, guess)
-
-    if sliding is None:
-        values, active = solved_for(matrix, offset)
-    else:
-        full = matrix, offset
-        try:
-            matrix, offset = sliding.reduce(*full)
-            values, active = solved_for(matrix, offset)
-        except ActiveSetError:
-            # friction limits from the last normal forces make the system symmetric
-            sliding = sliding.lag()
-            matrix, offset = sliding.reduce(*full)
-            values, active = solved_for(matrix, offset)
-    z = np.zeros(k + 3)
-    z[used] = values
-    held = np.concatenate([np.flatnonzero(active), used[m:]])
-    anchor, circular_spline_turn, multiplier = z[k:]
-    return _Solution(
-        force=z[:k] if sliding is None else sliding.forces(z[:k]),
-        active=active,
-        anchor=float(anchor),
-        circular_spline_turn=float(circular_spline_turn),
-        multiplier=float(multiplier),
-        compliance=output_compliance(matrix, held, k, load),
-    )
-
-
-def output_compliance(matrix: Array, held: Index, k: int, load: Load) -> float:
-    """Tangent compliance of the output, per torque of the model.
-
-    Args:
-        matrix: Matrix M (k + 3, k + 3) of the k forces, the anchor, the rotation of the
-            circular spline and the multiplier.
-        held: Indices of the unknowns that may differ from zero, increasing.
-        k: Number of force unknowns.
-        load: Prescribed torque or rotation.
-
-    Returns:
-        Rotation of the output against its load per torque [rad/(N·m)].
-    """
-    system = matrix[np.ix_(held, held)]
-    if load.on_circular_spline is not None:
-        unit = (held == k + 1).astype(float)
-        return -float(np.linalg.solve(system, unit)[held == k + 1][0])
-    held = held[held <= k]
-    reach, turn = matrix[held, k + 2], matrix[k + 2, held]
-    system = matrix[np.ix_(held, held)]
-    return float(matrix[k + 2, k + 2] - turn @ np.linalg.solve(system, reach))
+    return None
