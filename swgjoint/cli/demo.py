@@ -12,8 +12,10 @@ from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 
 SCENE = "ur5e-sweep"
-DRIVES = {"elliptical": "reference-2d", "simplified": "reference-2d-simplified"}
-"""Bundled design for each of the two wave generators that are compared."""
+DRIVES = {"bought": "size-25-100-bought", "coarse": "size-25-100-bought-coarse"}
+"""Bundled designs that are compared; they differ in one tolerance."""
+MODEL = "ring"
+"""Fidelity of their maps, the fastest one that has play, errors and friction."""
 FOLDER = "swgjoint-demo"
 """Default output folder."""
 
@@ -46,12 +48,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.view.run import run_scene
 
     plugin.load()  # reports another MuJoCo before maps are built
-    maps = {name: load_drive(name, progress=args.progress) for name in DRIVES.values()}
-    scene = Scene.load_file(SCENE)
-    scenes = {
-        **{label: scene.with_drive(drive) for label, drive in DRIVES.items()},
-        "rigid": scene.with_level("rigid"),
+    maps = {
+        name: load_drive(name, model=MODEL, progress=args.progress)
+        for name in DRIVES.values()
     }
+    scene = Scene.load_file(SCENE)
+    scenes = {label: scene.with_drive(drive) for label, drive in DRIVES.items()}
+    scenes["rigid"] = next(iter(scenes.values())).with_level("rigid")
     runs = {
         label: run_scene(changed, drives=maps, name=label, progress=args.progress)
         for label, changed in scenes.items()

@@ -130,3 +130,20 @@ def test_family_names_out_of_range(name, message):
     """A size or ratio beyond the rule is refused with its range."""
     with pytest.raises(DesignError, match=naming(*message)):
         Design.load(name)
+
+
+def test_the_bought_drive_is_the_bundled_one_with_errors_and_friction():
+    """Its coarse variant differs from it in the pitch error of the flexspline only."""
+    plain = Design.load("size-25-100").model_dump()
+    bought = Design.load("size-25-100-bought").model_dump()
+    coarse = Design.load("size-25-100-bought-coarse").model_dump()
+    stated = {"tolerances", "friction"}
+    for one in (plain, bought, coarse):
+        del one["drive"]["name"], one["drive"]["source"]
+    assert {key for key in plain if plain[key] != bought[key]} == stated
+    assert {key for key in bought if bought[key] != coarse[key]} == {"tolerances"}
+    fine, rough = bought["tolerances"], coarse["tolerances"]
+    (key,) = (key for key in fine if fine[key] != rough[key])
+    assert key == "flexspline_cumulative_pitch_um"
+    # three classes of ISO 1328-1, each of which is a factor of sqrt(2)
+    assert rough[key] / fine[key] == pytest.approx(8.0**0.5, rel=2e-3)

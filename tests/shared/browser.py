@@ -15,16 +15,24 @@ from pathlib import Path
 PROGRAM = shutil.which("chromium") or shutil.which("google-chrome")
 
 
+SOFTWARE_WEBGL = (
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)
+"""Options for pages that draw with WebGL, on a machine without a graphics card."""
+
+
 class Browser:
     """A browser with a profile of its own."""
 
-    def __init__(self, size=(1500, 1000)):
+    def __init__(self, size=(1500, 1000), options=("--disable-gpu",)):
         self._profile = tempfile.mkdtemp()
         self._process = subprocess.Popen(
             [
                 *(PROGRAM, "--headless=new", "--no-sandbox", "--no-first-run"),
                 *("--disable-dev-shm-usage", "--disable-background-networking"),
-                *("--disable-component-update", "--hide-scrollbars", "--disable-gpu"),
+                *("--disable-component-update", "--hide-scrollbars", *options),
                 f"--window-size={size[0]},{size[1]}",
                 f"--user-data-dir={self._profile}",
                 *("--remote-debugging-port=0", "about:blank"),

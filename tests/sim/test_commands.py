@@ -84,21 +84,24 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
     for picture in ("report.joint_png", "tables.spec_picture"):
         monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
     soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
-    maps = {"reference-2d": synthetic_map, "reference-2d-simplified": soft}
-    monkeypatch.setattr(
-        "swgjoint.drives.references.load_drive", lambda name, progress: maps[name]
-    )
+    maps = {"size-25-100-bought": synthetic_map, "size-25-100-bought-coarse": soft}
+
+    def load(name: str, *, model: str, progress: object) -> DriveMap:
+        assert model == "ring"
+        return maps[name]
+
+    monkeypatch.setattr("swgjoint.drives.references.load_drive", load)
     assert main(["demo", "--out", str(tmp_path / "demo"), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert set(result["map"]) == {"elliptical", "simplified"}
+    assert set(result["map"]) == {"bought", "coarse"}
     metrics = result["metrics"]
-    assert set(metrics) == {"elliptical", "simplified", "rigid"}
+    assert set(metrics) == {"bought", "coarse", "rigid"}
     assert metrics["rigid"]["tool_against_rigid"]["max_mm"] == 0.0
-    assert metrics["simplified"]["tool_against_rigid"]["mean_mm"] > 0.1
-    lift = metrics["elliptical"]["joints"]["shoulder_lift_joint"]
+    assert metrics["coarse"]["tool_against_rigid"]["mean_mm"] > 0.1
+    lift = metrics["bought"]["joints"]["shoulder_lift_joint"]
     assert lift["unresolved"] == []
     assert lift["orders"][0]["order"] == pytest.approx(122.0, abs=0.2)
-    pan = metrics["elliptical"]["joints"]["shoulder_pan_joint"]
+    pan = metrics["bought"]["joints"]["shoulder_pan_joint"]
     assert [item["order"] for item in pan["unresolved"]] == [122.0]
     assert {Path(f).name for f in result["files"]} == {
         "run.rrd",

@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from urllib.request import urlopen
 
 import numpy as np
@@ -14,7 +15,7 @@ from swgjoint.errors import ComputationError, InputError, OutputWarning
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run
 from swgjoint.units import mm
-from swgjoint.view.plots.runs import comparison_png
+from swgjoint.view.plots.runs import comparison_png, draw_ripple
 from swgjoint.view.recording import recording
 from swgjoint.view.recording.blueprint import joints_shown
 from swgjoint.view.recording.entities import pose_rows, signals_of
@@ -274,6 +275,24 @@ def test_the_picture_compares_the_runs(run, tmp_path):
     assert height > 800
     with pytest.raises(InputError):
         comparison_png({"soft": run}, tmp_path / "none" / "demo.png")
+
+
+def test_the_spectrum_shows_every_run_whole(synthetic_map):
+    """The axis reaches the highest line of all runs, whatever their order."""
+    import matplotlib.pyplot as plt
+
+    turn = SHORT | {"simulation.duration_s": 2.5}  # most of an input turn
+    run = run_scene("bench", overrides=turn, drives={"reference-2d": synthetic_map})
+    strong = replace(run, output_torque=3.0 * run.output_torque)
+    for pair in ((run, strong), (strong, run)):
+        figure, (over_turns, over_order) = plt.subplots(2)
+        for one in pair:
+            draw_ripple(over_turns, over_order, one, 0, {})
+        heights = [line.get_ydata().max() for line in over_order.lines]
+        assert max(heights) > 2.0 * min(heights) > 0.0
+        assert over_order.get_ylim()[0] == 0.0
+        assert over_order.get_ylim()[1] > max(heights)
+        plt.close(figure)
 
 
 def test_figures_can_be_recomputed_from_the_recording(run, tmp_path):

@@ -140,6 +140,7 @@ def draw_ripple(
         return
     inside = (spectrum.order >= 0.5) & (spectrum.order <= highest)
     draw = over_order.plot if line is None else partial(line, over_order)
+    over_order.autoscale(axis="y")  # after the limit of another run
     draw(spectrum.order[inside], spectrum.amplitude[inside], **style)
     over_order.set_xlim(0.0, highest)
     over_order.set_ylim(bottom=0.0)
