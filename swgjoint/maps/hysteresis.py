@@ -369,19 +369,32 @@ def play_hysteresis(
 
 
 def stretches(torsion: Array, reach: ArrayLike) -> Array:
-    """Stretch x - r of one element along a torsion history x [rad]. Shape (n,).
+    r"""Stretch x - r of one element along a torsion history x [rad]. Shape (n,).
 
-    The element starts relaxed at zero torsion.
+    The element starts relaxed at zero torsion. Every step clips r to an interval,
+
+    .. math:: r_k = \min(\max(r_{k-1}, x_k - l_k), x_k + l_k) ,
+
+    and clipping to several intervals in turn is clipping to one. The history is divided
+    into parts whose intervals are computed all at once.
 
     Args:
         torsion: History of the torsion [rad]. Shape (n,).
-        reach: Stretch at which the slider of the element slips [rad]. Shape (n,), or
+        reach: Stretch l at which the slider of the element slips [rad]. Shape (n,), or
             one value.
     """
-    stretch, rest = np.empty(len(torsion)), 0.0
-    limits = np.broadcast_to(np.asarray(reach, float), stretch.shape).tolist()
-    steps = zip(np.asarray(torsion, float).tolist(), limits, strict=True)
-    for k, (x, limit) in enumerate(steps):
-        rest = min(max(rest, x - limit), x + limit)
-        stretch[k] = x - rest
-    return stretch
+    x, count = np.asarray(torsion, float), len(torsion)
+    parts = -(-count // (size := max(1, round(count**0.5))))
+    # intervals by part and step in the part; those that fill the last part clip nothing
+    low, high = np.full((2, parts * size), [[-np.inf], [np.inf]])
+    low[:count], high[:count] = x - reach, x + reach
+    low, high = low.reshape(parts, size), high.reshape(parts, size)
+    for k in range(1, size):  # interval of all steps of the part so far
+        here = low[:, k].copy(), high[:, k].copy()
+        low[:, k] = np.clip(low[:, k - 1], *here)
+        high[:, k] = np.clip(high[:, k - 1], *here)
+    begins, rest = np.empty(parts), 0.0
+    for p, (lowest, highest) in enumerate(zip(low[:, -1], high[:, -1], strict=True)):
+        begins[p] = rest
+        rest = min(max(rest, lowest), highest)
+    return np.asarray(x - np.clip(begins[:, None], low, high).ravel()[:count])

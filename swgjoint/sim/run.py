@@ -125,6 +125,16 @@ class Run:
         reference = self.tool_reference if other is None else other.tool_position
         return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))
 
+    @cached_property
+    def hysteresis_energy(self) -> list[float]:
+        """Change of the energy stored in the hysteresis springs by joint [J]."""
+        return [
+            transmission.hysteresis_energy_change(
+                self.torsion[:, j], self.motor_position[:, j], self.position[:, j]
+            )
+            for j, transmission in enumerate(self.assembly.transmissions)
+        ]
+
     def metrics(self) -> dict[str, Any]:
         """Figures of the run under the keys of ``swgjoint run --json``."""
         return deepcopy(self._figures)

@@ -314,3 +314,16 @@ def test_only_elements_that_can_carry_torque_stick():
     assert found == [5.0, 12.0, 7.0, 9.0, 2.0]
     assert sticking_stiffness((*three, Jenkin(stiffness=1.0, yield_torque=1.0))) == 13.0
     assert sticking_stiffness(()) == 0.0 == sticking_stiffness((), 1.0)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 10, 101, 1000])
+def test_stretches_are_those_of_one_step_after_another(count):
+    """Bit for bit, with a constant reach and with one that changes."""
+    rng = np.random.default_rng(count)
+    torsion = np.cumsum(rng.normal(size=count))
+    for reach in (0.7, 0.0, rng.uniform(0.0, 5.0, count)):
+        limits, rest, wanted = np.broadcast_to(reach, count), 0.0, np.empty(count)
+        for k, (x, limit) in enumerate(zip(torsion, limits, strict=True)):
+            rest = min(max(rest, x - limit), x + limit)
+            wanted[k] = x - rest
+        assert np.array_equal(stretches(torsion, reach), wanted)

@@ -133,7 +133,7 @@ def dissipation(run: Run, j: int) -> float:
     total = attached.damping / step * float(twist @ twist)
     slipping = run.slipping_torque[:, j]
     total += _work(slipping, run.torsion[:, j])
-    total -= _stored(run, j)
+    total -= run.hysteresis_energy[j]
     turn = np.diff(run.motor_position[:, j])
     if attached.native is not None:
         total += attached.native.friction * float(np.abs(turn).sum())
@@ -258,14 +258,7 @@ def _elastic(run: Run, j: int) -> float:
         return 0.0
     theta, psi = run.motor_position[[0, -1], j], run.position[[0, -1], j]
     first, last = law.energy(law.torsion(theta, psi), theta, psi)
-    return float(last - first) + _stored(run, j)
-
-
-def _stored(run: Run, j: int) -> float:
-    """Change of the energy stored in the hysteresis springs of one drive [J]."""
-    return run.assembly.transmissions[j].hysteresis_energy_change(
-        run.torsion[:, j], run.motor_position[:, j], run.position[:, j]
-    )
+    return float(last - first) + run.hysteresis_energy[j]
 
 
 def _rigid_energies(run: Run) -> tuple[float, float]:
