@@ -9,7 +9,7 @@ lobes, because the map contains the passage of balls separately.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -105,17 +105,21 @@ class RingErrors:
         errors = gap_errors(self.design, pitches)
         model = with_shifting_teeth(thin_ring(with_perfect_teeth(self.design)))
         total = len(phases) + CHECKS
-        # positions of the balls alternate from pitch to pitch if the cycle permits: the
-        # harmonics that one of them resolves are then those of their mean
+        # positions of the balls alternate from pitch to pitch if the cycle permits:
+        # each is then sampled at every other pitch, which resolves half the harmonics
         shares = len(phases) if pitches.size % len(phases) == 0 else 1
-        table = np.zeros((3, 2 * levels.size + 1, pitches.size))
+        spectra = []
         for k, phase in enumerate(phases.tolist()):
-            part = slice(k if shares > 1 else 0, None, shares)
-            some = tuple(one[part] for one in errors)
+            first = k if shares > 1 else 0
+            some = tuple(one[first::shares] for one in errors)
             found = self._over_cycle(k, model, phase, levels, some)
-            table[..., part] += found * (shares / len(phases))
+            spectra.append(_spectrum(found, first, pitches.size))
             self.progress(stage, k + 1, total)
-        table, waves = _main_harmonics(table, shares)
+        turns = pitches.size / self.design.drive.teeth_circular_spline
+        passages = 0.5 * self.passage.carried_as * turns
+        table, waves = _main_harmonics(
+            _over_passage(spectra, passages, pitches.size), pitches.size
+        )
         torque = np.concatenate([-levels[::-1], [0.0], levels])
         if self.free:
             table, torque = with_mean_clearance(table, levels)
@@ -281,19 +285,63 @@ def superpose(
     return np.where(table[2] > 0.0, table, np.nan)
 
 
-def _main_harmonics(table: Array, shares: int) -> tuple[Array, Index]:
+def _spectrum(table: Array, first: int, count: int) -> Array:
+    """Harmonics of a table that is sampled at equally spaced pitches of the cycle.
+
+    Args:
+        table: Output angle, energy and compliance (3, n_torques, n).
+        first: Number of the first sampled pitch.
+        count: Number of pitches of the cycle, a multiple of n.
+
+    Returns:
+        Harmonics as those of :func:`numpy.fft.rfft` over all pitches, zero where the
+        sampled pitches do not resolve them (3, n_torques, count // 2 + 1).
+    """
+    n = table.shape[-1]
+    # the phase of half as many waves as samples is undetermined
+    known = (n + 1) // 2
+    spectrum = np.zeros((*table.shape[:-1], count // 2 + 1), dtype=complex)
+    shift = np.exp(-2j * np.pi * first / count * np.arange(known))
+    spectrum[..., :known] = np.fft.rfft(table)[..., :known] * shift * (count / n)
+    return spectrum
+
+
+def _over_passage(spectra: Sequence[Array], passages: float, count: int) -> Array:
+    r"""Harmonics while the balls pass the lobes.
+
+    With one position of the balls, theirs. With two, at which a ball is on the one lobe
+    and on the other, the quantities f and g change between them like a cosine,
+
+    .. math:: \tfrac12 (f + g) + \tfrac12 (f - g) \cos(n \alpha) ,
+
+    with n balls passing a lobe per turn of the wave generator. Errors of the teeth move
+    the output more where a ball supports them.
+
+    Args:
+        spectra: Harmonics at each position of the balls, see :func:`_spectrum`.
+        passages: Number of balls that pass a lobe over the cycle [-].
+        count: Number of pitches of the cycle.
+    """
+    if len(spectra) == 1:
+        return spectra[0]
+    first, second = spectra
+    change = np.fft.irfft(0.5 * (first - second), count)
+    wave = np.cos(2.0 * np.pi * round(passages) * np.arange(count) / count)
+    return np.asarray(0.5 * (first + second) + np.fft.rfft(change * wave))
+
+
+def _main_harmonics(spectrum: Array, count: int) -> tuple[Array, Index]:
     """Table with its mean and main harmonics only, and their numbers of waves.
 
     Random errors of single teeth spread over thousands of harmonics.
 
     Args:
-        table: Output angle, energy and compliance over the cycle (3, n_torques, n).
-        shares: Number of positions of the balls that alternate from pitch to pitch.
+        spectrum: Harmonics of output angle, energy and compliance over the cycle (3,
+            n_torques, count // 2 + 1).
+        count: Number of pitches of the cycle.
     """
-    count = table.shape[-1]
-    spectrum = np.fft.rfft(table)
-    # the phase of half as many waves as pitches is undetermined
-    spectrum[..., (count // shares + 1) // 2 :] = 0.0
+    spectrum = spectrum.copy()
+    spectrum[..., (count + 1) // 2 :] = 0.0  # half as many waves as pitches
     size = np.abs(spectrum[0, :, 1:])
     largest = np.maximum(size.max(axis=1, keepdims=True, initial=0.0), 1e-300)
     kept = np.append(True, (size > KEEP * largest).any(axis=0))

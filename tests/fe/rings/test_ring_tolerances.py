@@ -144,6 +144,36 @@ def test_errors_of_one_member_have_its_orders(monkeypatch):
     assert all(row["output_error_largest"] < 0.2 for row in rows)
 
 
+@pytest.mark.parametrize("count", [60, 61])
+def test_errors_count_for_the_lobe_whose_ball_is_there(count):
+    """Where a ball is on the one lobe or on the other, its own quantities result.
+
+    In between there is their mean, and each is resolved by every other pitch.
+    """
+    rng, pitch = np.random.default_rng(3), np.arange(count)
+    angle = 2.0 * np.pi * pitch[:, None] / count * np.arange(12)
+    amplitudes = rng.normal(size=(2, 2, 3, 4, 12))
+    on_one, on_other = (
+        a @ np.cos(angle).T + b @ np.sin(angle).T for a, b in amplitudes
+    )
+    shares = 2 if count % 2 == 0 else 1
+    spectra = [
+        ring_tolerances._spectrum(table[..., first::shares], first, count)
+        for first, table in zip((0, shares - 1), (on_one, on_other), strict=True)
+    ]
+    passages = count // 4  # one ball on a lobe at every other pitch
+    found = np.fft.irfft(ring_tolerances._over_passage(spectra, passages, count), count)
+    wave = np.cos(2.0 * np.pi * passages * pitch / count)
+    wanted = 0.5 * (on_one + on_other) + 0.5 * (on_one - on_other) * wave
+    assert found == pytest.approx(wanted, abs=1e-12)
+    assert found[..., 0] == pytest.approx(on_one[..., 0], abs=1e-12)
+    if count == 60:
+        assert found[..., 2] == pytest.approx(on_other[..., 2], abs=1e-12)
+        assert found[..., 1] == pytest.approx(
+            0.5 * (on_one + on_other)[..., 1], abs=1e-12
+        )
+
+
 class Stop(Exception):
     """An interruption."""
 
