@@ -15,6 +15,7 @@ from swgjoint.fe.rings.losses import loss_model
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
@@ -74,6 +75,7 @@ def build_map(
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     keep = Unfinished.from_parts(parts) if cache else None
+    perfect_keep = _perfect_store(design, angles) if cache and model == "ring" else None
 
     def build() -> DriveMap:
         if model == "3d":
@@ -81,7 +83,11 @@ def build_map(
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
             samples = thin_ring.sample_thin_rings(
-                design, angles=angles, progress=progress, keep=keep
+                design,
+                angles=angles,
+                progress=progress,
+                keep=keep,
+                perfect_keep=perfect_keep,
             )
         else:
             samples = sample_map(
@@ -89,7 +95,8 @@ def build_map(
             )
         drive = fit_map(samples)
         if design.friction.tooth_coefficient:
-            drive = _with_friction(design, drive, progress, keep)
+            store = perfect_keep if model == "ring" else keep
+            drive = _with_friction(design, drive, progress, store)
         return _without_losses(design, drive)
 
     if not cache:
@@ -98,6 +105,25 @@ def build_map(
     if keep is not None:
         keep.clear()  # only once the map itself is in the cache
     return drive
+
+
+def _perfect_store(design: Design, angles: int | None) -> Unfinished | None:
+    """Store of ring results without errors and friction, after changes of these alone.
+
+    It is not removed with the map, so that a drive with other tolerances computes
+    only what depends on them. None if the design has none of them.
+    """
+    perfect = without_errors(design).with_changes({"friction.tooth_coefficient": 0.0})
+    if perfect == design:
+        return None
+    return Unfinished.from_parts(
+        {
+            "perfect": perfect.content_hash(),
+            "model": "ring",
+            "angles": angles,
+            "flawed": has_errors(design),
+        }
+    )
 
 
 def check_level(design: Design, model: str) -> None:
@@ -131,7 +157,11 @@ def _with_friction(
     try:
         if drive.level == "ring":
             loops = ring_friction_loops(
-                design, top=top, rated=drive.ratings.rated_torque, progress=progress
+                design,
+                top=top,
+                rated=drive.ratings.rated_torque,
+                progress=progress,
+                keep=keep,
             )
         else:
             loops = friction_loops(

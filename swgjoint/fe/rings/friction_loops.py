@@ -13,13 +13,16 @@ no force, so that R is zero there; the clearance belongs to the elastic torsion.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from math import copysign
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.plane.figures.friction_loop import whole_path
 from swgjoint.fe.rings.friction import POSITIONS, RubbedPath, friction_path
 from swgjoint.fe.rings.loading import positions
@@ -27,6 +30,7 @@ from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 from swgjoint.maps.fit.friction_loop import FrictionLoop
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
@@ -41,6 +45,7 @@ def ring_friction_loops(
     top: float,
     rated: float | None = None,
     progress: Progress = silent,
+    keep: Unfinished | None = None,
 ) -> tuple[FrictionLoop, ...]:
     """Torque loops at a few locked input positions, with friction of teeth and race.
 
@@ -53,6 +58,8 @@ def ring_friction_loops(
             :func:`swgjoint.fe.plane.figures.friction_loop.small_loop_torques` [N·m];
             None adds none.
         progress: Called with the stage, the number of finished loops and their total.
+        keep: Store of the loading paths, which drives with other errors and another
+            coefficient of friction share; None stores none.
 
     Returns:
         One loop per position, followed by its small loops.
@@ -69,7 +76,7 @@ def ring_friction_loops(
     places = positions(thin_ring(perfect), POSITIONS).tolist()
     for k, angle in enumerate(places):
         progress(stage, k, len(places))
-        path = friction_path(perfect, outward, angles=[angle])
+        path = _loading_path(perfect, outward, angle, k, keep)
         if not path.outcome.ok:
             raise ComputationError(
                 f"{name}: no equilibrium of the thin rings above {path.torque[-1]:.4g}"
@@ -81,6 +88,47 @@ def ring_friction_loops(
         loops += [loop.cut_path(end, quarter) for end, quarter in ends]
     progress(stage, len(places), len(places))
     return tuple(loops)
+
+
+def _loading_path(
+    perfect: Design, torques: Array, angle: float, number: int, keep: Unfinished | None
+) -> RubbedPath:
+    """Loading path at an input angle, read from the store or computed and stored."""
+    name = f"friction-path-{number:04d}"
+    stored = None if keep is None else keep.read(name, partial(_stored, torques, angle))
+    if stored is not None:
+        return stored
+    path = friction_path(perfect, torques, angles=[angle])
+    if keep is not None and path.outcome.ok:
+        content = {
+            k: v for k, v in vars(path).items() if k not in ("outcome", "shares")
+        }
+        names = {f"share_{part}": share for part, share in path.shares.items()}
+        keep.write(name, {"angle": angle, "wanted": torques, **content, **names})
+    return path
+
+
+def _stored(torques: Array, angle: float, arrays: Mapping[str, Any]) -> RubbedPath:
+    """Loading path of another map.
+
+    Raises:
+        ValueError: If it has other torques or another input angle, or is not finite.
+    """
+    content = {key: np.asarray(value, float) for key, value in arrays.items()}
+    if not all(np.isfinite(value).all() for value in content.values()):
+        raise ValueError("a stored loading path is not finite")
+    wanted = content.pop("wanted")
+    if content.pop("angle") != angle or not np.array_equal(wanted, torques):
+        raise ValueError("a stored loading path has another angle or other torques")
+    begin = "share_"
+    named = [key for key in content if key.startswith(begin)]
+    shares = {key.removeprefix(begin): content.pop(key) for key in named}
+    return RubbedPath(
+        series=float(content.pop("series")),
+        shares=shares,
+        outcome=Outcome.CONVERGED,
+        **content,
+    )
 
 
 def path_loop(

@@ -81,6 +81,7 @@ def sample_thin_rings(
     angles: int | None = None,
     progress: Progress = silent,
     keep: Unfinished | None = None,
+    perfect_keep: Unfinished | None = None,
 ) -> MapSamples:
     """Samples of a map over the passage of a ball and both signs of torque.
 
@@ -99,6 +100,8 @@ def sample_thin_rings(
             total.
         keep: Store of the results by position, from which an interrupted run resumes
             with bit-identical samples; None stores none.
+        perfect_keep: Store of the results without errors, which drives with other
+            errors share; None stores them in ``keep``.
 
     Returns:
         Samples of the map.
@@ -120,7 +123,7 @@ def sample_thin_rings(
         count=angles,
         small=SMALL * ratings.rated_torque,
         series=series_compliance(design, cup=True),
-        keep=keep,
+        keep=keep if perfect_keep is None else perfect_keep,
         progress=progress,
     )
     torques = [part * ratings.repeated_peak for part in LEVELS]

@@ -13,6 +13,7 @@ from swgjoint.fe.rings.friction import RubbedPath, friction_path
 from swgjoint.fe.rings.friction_loops import path_loop, ring_friction_loops
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.hysteresis_loops import fit_elements
+from swgjoint.maps.unfinished import Unfinished
 
 MU, TOP = 0.1, 60.0
 TORQUE = loop_torques(TOP)
@@ -114,3 +115,47 @@ def test_no_friction_gives_no_elements(monkeypatch):
     loops = ring_friction_loops(rough, top=TOP)
     assert len(loops) == 2
     assert fit_elements(loops, 1e5)
+
+
+def test_drives_with_other_errors_and_friction_share_their_paths(monkeypatch, tmp_path):
+    """The paths are computed once, and the loops are those without a store."""
+    asked = []
+
+    def path(design, torques, angles):
+        asked.append(angles)
+        return known(1e-4)
+
+    monkeypatch.setattr(friction_loops, "friction_path", path)
+    smooth = Design.preset("size-25-50").with_changes(
+        {"friction.tooth_coefficient": MU}
+    )
+    rough = smooth.with_changes(
+        {
+            "friction.tooth_coefficient": 2.0 * MU,
+            "tolerances.circular_spline_ovality_um": 6.0,
+        }
+    )
+    keep = Unfinished(folder=tmp_path)
+    ring_friction_loops(smooth, top=TOP, keep=keep)
+    assert len(asked) == 2
+    shared = ring_friction_loops(rough, top=TOP, keep=keep)
+    assert len(asked) == 2
+    alone = ring_friction_loops(rough, top=TOP)
+    for one, other in zip(shared, alone, strict=True):
+        for key in ("torque", "torsion", "elastic_torsion", "stiffness", "work"):
+            assert np.array_equal(getattr(one, key), getattr(other, key))
+
+
+def test_a_stored_path_belongs_to_its_torques(monkeypatch, tmp_path):
+    """Loops to another torque compute their path again."""
+    keep, design = Unfinished(folder=tmp_path), Design.preset("size-25-50")
+    monkeypatch.setattr(friction_loops, "friction_path", lambda *_, **__: known(1e-4))
+    ring_friction_loops(design, top=TOP, keep=keep)
+
+    def fail(*_, **__):
+        raise LookupError
+
+    monkeypatch.setattr(friction_loops, "friction_path", fail)
+    ring_friction_loops(design, top=TOP, keep=keep)
+    with pytest.raises(LookupError):
+        ring_friction_loops(design, top=0.5 * TOP, keep=keep)

@@ -178,6 +178,14 @@ class Stop(Exception):
     """An interruption."""
 
 
+class OtherStop(Exception):
+    """An interruption at the errors, after everything without them."""
+
+
+def fail_with_other(*others, **options):
+    raise OtherStop
+
+
 def test_what_the_rings_lack_is_left_out(monkeypatch, tmp_path):
     """Misalignment and friction change no sample, and the label names them."""
     monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
@@ -200,18 +208,30 @@ def test_an_interrupted_map_with_errors_resumes_bit_for_bit(monkeypatch, tmp_pat
     """Finished positions and checks are read from the store."""
     monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
     monkeypatch.setattr(ring_tolerances, "CHECKS", 1)
-    keep = Unfinished(folder=tmp_path)
-    whole = sample_thin_rings(OVAL, angles=2, keep=keep)
+    keep, perfect = Unfinished(folder=tmp_path / "a"), Unfinished(folder=tmp_path / "b")
+    stores = {"keep": keep, "perfect_keep": perfect}
+    whole = sample_thin_rings(OVAL, angles=2, **stores)
 
     def fail(*others, **options):
         raise Stop
 
     monkeypatch.setattr(ring_tolerances, "solve_unloaded", fail)
-    again = sample_thin_rings(OVAL, angles=2, keep=keep)
+    monkeypatch.setattr(sampling, "solve_unloaded", fail)
+    again = sample_thin_rings(OVAL, angles=2, **stores)
     assert np.array_equal(whole.tolerances.table, again.tolerances.table)
     for key in ("output_error", "input_torque"):
         pair = (getattr(s.tolerances.solved, key) for s in (whole, again))
         assert np.array_equal(*pair)
+    # other errors need only what depends on them
+    other = OVAL.with_changes({"tolerances.circular_spline_ovality_um": 7.0})
+    with pytest.raises(Stop):
+        sample_thin_rings(other, angles=2, keep=Unfinished(folder=tmp_path / "c"))
+    monkeypatch.undo()
+    monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
+    monkeypatch.setattr(sampling, "solve_unloaded", fail)
+    monkeypatch.setattr(ring_tolerances.RingErrors, "sample", fail_with_other)
+    with pytest.raises(OtherStop):
+        sample_thin_rings(other, angles=2, perfect_keep=perfect)
 
 
 def test_unstable_superpositions_are_no_equilibria(monkeypatch):
