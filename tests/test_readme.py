@@ -37,12 +37,12 @@ def test_it_is_short():
     assert README.count("\n") <= 200
     (example,) = blocks("python")
     assert len([line for line in example.splitlines() if line]) == 10
-    assert len(re.findall(r"^!\[", section("Three questions"), re.MULTILINE)) == 3
+    assert len(re.findall(r"^!\[", section("Four questions"), re.MULTILINE)) == 4
 
 
 def paragraphs() -> list[str]:
     """Questions and rows that state figures."""
-    texts = re.split(r"\n\n(?=\*\*)", section("Three questions"))
+    texts = re.split(r"\n\n(?=\*\*)", section("Four questions"))
     texts[-1] = texts[-1].partition("\nMore questions")[0]
     table = section("How true it is").splitlines()
     return [*texts, *(row for row in table if row.startswith("| ") and "](" in row)]
@@ -61,7 +61,7 @@ def commands(text: str) -> list[list[str]]:
 
 def plain(command: list[str]) -> str:
     """A command without the options that leave its results as they are."""
-    return re.sub(r" --(out|jobs) \w+", "", shlex.join(command))
+    return re.sub(r" --(out|jobs) \w+| --report", "", shlex.join(command))
 
 
 def results(text: str) -> list[dict[str, Any]]:
@@ -79,6 +79,13 @@ def tracking(result):
     """Figures of the first three controllers."""
     rows = [row for row in result["rows"] if row["quantity"] == "tracking_rms"]
     return [f"{row['ours']:.2f}" for row in rows[:3]]
+
+
+def gauges(result):
+    """Errors with one and three exact bridges, and with the bridges of the scene."""
+    found = result["joints"]["joint"]["gauges"]
+    left = {one["bridges"]: one["ripple_rms_percent"] for one in found["compensation"]}
+    return [f"{left[1]:.0f}", f"{left[3]:.2f}", f"{found['error_rms_percent']:.2f}"]
 
 
 def calculix(state):
@@ -135,6 +142,7 @@ FIGURES = {
     "**Where are the stresses": meshing,
     "**What does the wave": lambda: [],
     "**Which controller": tracking,
+    "**What do strain gauges": gauges,
     "| shape of the bore": bore,
     "| stress in the root": root,
     "| stresses with four": thesis,

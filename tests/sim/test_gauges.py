@@ -169,7 +169,7 @@ def test_table_and_picture(one):
     contact = {"joint": {"gauges": metrics["joints"]["joint"]["gauges"]}}
     contact["joint"]["gauges"] |= {"strain": "3d"}
     (note,) = gauge_notes(contact)
-    assert note.endswith("above to a third only")
+    assert note.endswith("six lobes to a fifth")
     (table,) = gauge_tables({"one": one})
     assert len(table.rows) == 1
     assert len(table.rows[0]) == len(table.header)
