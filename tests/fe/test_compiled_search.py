@@ -73,6 +73,18 @@ def test_candidates_are_those_of_numpy(contact, monkeypatch, thorough, reach):
 
 
 @pytest.mark.fe
+def test_no_candidate_has_the_same_columns(contact, monkeypatch):
+    """Flanks that all stay apart, as in a wide clearance."""
+    search, flank, _, height = contact
+    found, wanted = (
+        one.search(flank, -height, None) for one in both(monkeypatch, search)
+    )
+    assert len(found) == len(wanted) == 0
+    for field in fields(wanted):
+        assert getattr(found, field.name).shape == getattr(wanted, field.name).shape
+
+
+@pytest.mark.fe
 def test_feet_of_any_point_are_those_of_numpy(contact, monkeypatch):
     """Also beyond the ends of the flank, at corners, and far from any flank."""
     search, _, _, height = contact

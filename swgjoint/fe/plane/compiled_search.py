@@ -179,7 +179,8 @@ class CompiledSearch:
         if not rubs:
             weights[2:] = np.zeros((n, 0)), np.zeros((n, 0))
         by_flank, by_facing, sliding, facing_sliding = (
-            np.asarray(rows.reshape(n, rows[0].size if n else 0)) for rows in weights
+            np.asarray(rows.reshape(n, int(np.prod(rows.shape[1:]))))
+            for rows in weights
         )
         return Contacts(
             sector=sector,
