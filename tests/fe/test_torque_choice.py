@@ -10,6 +10,7 @@ from swgjoint.fe.common.torque_choice import (
     FEWEST_TORQUES,
     KINK,
     MISSED_JUMPS,
+    MOST_MISSED,
     TABLE_GOAL,
     common_torques,
 )
@@ -68,12 +69,38 @@ def test_a_table_is_as_dense_as_the_jumps_require():
     apart = np.diff(ends)[np.searchsorted(table, place)]
     part = KINK * jump * apart / (height * (1.0 + 9.0 * place / TOP))
     assert (part > TABLE_GOAL).sum() <= MISSED_JUMPS * ANGLES
+    assert part.max() <= MOST_MISSED
     # denser where the ripple is small
     low, high = (
         np.median(np.diff(table[(table > part * TOP) & (table < (part + 0.25) * TOP)]))
         for part in (0.0, 0.75)
     )
     assert low < 0.5 * high
+
+
+def test_jumps_of_many_angles_leave_torques_for_a_single_one():
+    """All angles but one jump at the same torque, and that one 1 N·m further on."""
+    jump, height = 3e-5, 5e-6
+    solved = np.linspace(0.0, TOP, 3)
+    curves = []
+    for place in [21.7] * (ANGLES - 1) + [22.7]:
+        over = np.maximum(solved - place, 0.0)
+        apart = 0.5 * (solved**2 - np.minimum(solved, place) ** 2)
+        curves.append(
+            LoadPath(
+                torque=solved,
+                output_error=-COMPLIANCE * solved - jump * over,
+                energy=0.5 * COMPLIANCE * solved**2 + jump * apart,
+                compliance=COMPLIANCE + jump * (over > 0.0),
+            )
+        )
+    heights = np.array([0.0, TOP]), np.full(2, height)
+    table = common_torques(curves, {float(t) for t in solved[1:]}, 0.0, 200, heights)
+    for place in (21.7, 22.7):
+        after = np.searchsorted(table, place)
+        apart = table[after] - table[after - 1]
+        assert KINK * jump * apart / height <= MOST_MISSED
+    assert table.size < FEWEST_TORQUES + 20
 
 
 def test_a_table_stays_within_its_largest_size():
