@@ -215,6 +215,7 @@ def unknown(line):
         return []
     needed = [project["project"]["dependencies"], *extras.values()]
     programs = {re.split(r"[\[>=]", name)[0] for names in needed for name in names}
+    programs |= {"venv"}  # of Python itself
     files = [word for word in words if word.startswith(("tests/", "notebooks/", "."))]
     files += [word for word in words if word.endswith(".py")]
     missing = [name for name in dict.fromkeys(files) if not (ROOT / name).exists()]

@@ -107,7 +107,11 @@ def test_meshes_of_a_urdf_are_found_or_named(tmp_path):
     (package / "meshes").mkdir()
     tetrahedron = "v 0 0 0\nv .3 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
     (package / "meshes" / "link.obj").write_text(tetrahedron + "f 2 3 4\n")
-    for reference in ("package://my_arm/meshes/link.obj", "../meshes/link.obj"):
+    for reference in (
+        "package://my_arm/meshes/link.obj",
+        "package://robots/arms/first/meshes/link.obj",  # a part of a package
+        "../meshes/link.obj",
+    ):
         shape = f'<geometry><mesh filename="{reference}"/></geometry>'
         assert quiet_arm(urdf(package / "urdf", shape=shape)).model.nmesh == 1
     for reference in ("package://my_arm/meshes/link.dae", "package://other/link.obj"):

@@ -141,7 +141,8 @@ def choice_lines(choice: dict[str, Any]) -> list[str]:
     lines = [
         "drives selected by rule: the smallest CSG drive of ratio 100 that covers the"
         " motor torque limit in the file (effort), the weight and the motion; to select"
-        " others: --drive NAME or --set joints.JOINT.drive=NAME",
+        " others: --drive NAME or --set joints.JOINT.drive=NAME; to leave joints such"
+        " as a gripper's without a drive: --joints 'PATTERN,...'",
         table(
             [("", "", "N·m", "N·m", ""), *rows],
             header=("joint", "drive", "required torque", "capacity", ""),

@@ -134,5 +134,7 @@ def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
         for parent in parents
         for place in ((parent,) if parent.name == package else (parent / package,))
     ]
-    # a renamed copy of the package still has the same folders inside
-    return [*places, *(parent / inside for parent in parents[:4])]
+    # a copy of a part of the package still has the same folders inside
+    parts = inside.split("/")
+    ends = ["/".join(parts[k:]) for k in range(max(1, len(parts) - 1))]
+    return [*places, *(parent / end for end in ends for parent in parents[:4])]
