@@ -527,8 +527,8 @@ def test_options_have_different_names():
     [
         ("ur5e", 5, "", 0.3),  # as a user types it: motors first, then links
         ("ur5e", 5, "motor", 2.0),
-        ("kuka_iiwa/iiwa.xml", 3, "link", 0.3),
-        ("universal_robots_ur10/ur10_robot.urdf", 3, "motor", 4.0),
+        ("kuka_iiwa/iiwa.xml", 3, "", 0.3),
+        ("universal_robots_ur10/ur10_robot.urdf", 3, "", 0.3),
     ],
 )
 def test_drives_of_whole_arms_meet_the_spec(
