@@ -276,8 +276,11 @@ class Core(ABC):
 
     def observation(self) -> Array:
         """Readings and known quantities, clipped to bounds. Shape (n, n_values)."""
-        values = np.concatenate(self.columns(), axis=1)
-        return np.clip(values, self._low, self._high) / self.units
+        # one row per value, because numpy is slow along short rows
+        values = np.concatenate([column.T for column in self.columns()])
+        np.clip(values, self._low[:, None], self._high[:, None], out=values)
+        values /= self.units[:, None]
+        return values.T.copy()
 
     @property
     def observation_bounds(self) -> tuple[Array, Array]:
@@ -300,7 +303,8 @@ class Core(ABC):
             (3, torque <= limits.momentary_peak),
             (4, torque <= limits.ratcheting),
         ):
-            numbers[~inside.all(axis=1)] = number
+            if not inside.all():
+                numbers[~inside.all(axis=1)] = number
         return numbers
 
     @property

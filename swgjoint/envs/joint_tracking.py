@@ -21,6 +21,7 @@ from swgjoint.envs.references import (
     smooth_step,
 )
 from swgjoint.errors import InputError
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -152,6 +153,11 @@ class TrackingCore(BenchCore):
 
     def _plan(self, drawn: DrawnTracking, values: Motion, part: slice) -> Array:
         """Plan with the values of the motion at those instants that it covers."""
+        if (native := kernels()) is not None:
+            plan = np.empty((part.stop - part.start, 5))
+            ramp, inertia = self._load[part], self.settings.link_inertia
+            native.write_plan(*values, drawn.load, ramp, inertia, plan)
+            return plan[:, :, None]
         plan = np.zeros((part.stop - part.start, 5))
         first = len(plan) - values[0].size
         for column, one in enumerate(values):

@@ -96,12 +96,13 @@ class Plans:
         drawn, plan = self._draw(rng)
         self._drawn[k], self._first[k] = drawn, 0
         self._plan[self._planned[k]] = plan[: self._plan.shape[1]]
-        if not self._whole:
-            self._rngs[k] = deepcopy(rng)
+        if self._whole:
+            rng.standard_normal(out=self._noise[k])
+            return
+        self._rngs[k] = own = deepcopy(rng)
         noise = rng.standard_normal((size.instants, size.channels))
         self._noise[k] = noise[:window]
-        if own := self._rngs[k]:
-            own.standard_normal((window, size.channels))
+        own.standard_normal((window, size.channels))
 
     def move_to(self, instant: NDArray[np.intp]) -> None:
         """Move windows so that they contain the instants after the given ones.

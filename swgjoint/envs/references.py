@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 Motion = tuple[Array, Array, Array]
@@ -105,15 +106,21 @@ class Oscillation:
         angle = omega[:, None] * instants.time[part]
         angle += self.phase[:, None]
         sin, cos = np.sin(angle), np.cos(angle, out=angle)
-        sin *= self.weight[:, None]
-        cos *= self.weight[:, None]
         # the offset makes y itself start at 0, in addition to the factor w
         offset = (self.weight * np.sin(omega * 0.0 + self.phase)).sum()
+        ramp = [one[part] for one in instants.ramp]
+        if (native := kernels()) is not None:
+            motion = np.empty((3, angle.shape[1]))
+            given = self.weight, omega, float(offset), *ramp
+            native.grow_oscillation(sin, cos, *given, motion)
+            return motion[0], motion[1], motion[2]
+        sin *= self.weight[:, None]
+        cos *= self.weight[:, None]
         y = _sum(sin) - offset
         sin *= -(omega**2)[:, None]
         cos *= omega[:, None]
         y_1, y_2 = _sum(cos), _sum(sin)
-        w, w_1, w_2 = (one[part] for one in instants.ramp)
+        w, w_1, w_2 = ramp
         return w * y, w_1 * y + w * y_1, w_2 * y + 2.0 * w_1 * y_1 + w * y_2
 
 
@@ -134,6 +141,13 @@ class Move:
             part: Range of the instants.
         """
         time, second = instants.time[part], self.end - self.turn
+        if (native := kernels()) is not None:
+            motion, steps = np.empty((3, time.size)), []
+            for delay, whole in ((0.0, self.turn), (self.turn, second)):
+                duration = whole - 2.0 * HOLD
+                steps.append(np.array([delay, HOLD, duration, duration**2]))
+            native.move_back(time, *steps, motion)
+            return motion[0], motion[1], motion[2]
         there = smooth_step(time - HOLD, self.turn - 2.0 * HOLD)
         back = smooth_step(time - self.turn - HOLD, second - 2.0 * HOLD)
         a, b, c = (x - 0.5 * y for x, y in zip(there, back, strict=True))

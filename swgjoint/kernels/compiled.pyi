@@ -186,6 +186,27 @@ class RingFactor:
 def ellipse_distance(
     points: Array, major: float, minor: float, result: Array
 ) -> None: ...
+def grow_oscillation(
+    sin: Array,
+    cos: Array,
+    weight: Array,
+    omega: Array,
+    offset: float,
+    ramp: Array,
+    slope: Array,
+    bend: Array,
+    result: Array,
+) -> None: ...
+def move_back(time: Array, there: Array, back: Array, result: Array) -> None: ...
+def write_plan(
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    load: float,
+    ramp: Array,
+    inertia: float,
+    result: Array,
+) -> None: ...
 def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...

@@ -11,6 +11,7 @@
 #include "complementarity.h"
 #include "contact_step.h"
 #include "flank_arrays.h"
+#include "motions.h"
 #include "outline.h"
 #include "ring_factor.h"
 #include "tangents.h"
@@ -23,6 +24,38 @@ void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
           "points: (n, 2), result: (n, 4)");
   const nb::gil_scoped_release release;
   swgjoint::outline_distance(points.data(), n, {true, major, minor}, result.data());
+}
+
+void grow_oscillation(In<2> sin, In<2> cos, In<1> weight, In<1> omega, double offset,
+                      In<1> ramp, In<1> slope, In<1> bend, Out<2> result) {
+  const std::size_t count = sin.shape(0), n = sin.shape(1);
+  require(cos.shape(0) == count && cos.shape(1) == n && weight.shape(0) == count &&
+              omega.shape(0) == count && count > 0,
+          "sin, cos: (count, n)");
+  require(ramp.shape(0) == n && slope.shape(0) == n && bend.shape(0) == n,
+          "ramp, slope, bend: (n,)");
+  require(result.shape(0) == 3 && result.shape(1) == n, "result: (3, n)");
+  swgjoint::grow_oscillation(sin.data(), cos.data(), count, n, weight.data(),
+                             omega.data(), offset, ramp.data(), slope.data(),
+                             bend.data(), result.data());
+}
+
+void move_back(In<1> time, In<1> there, In<1> back, Out<2> result) {
+  require(there.shape(0) == 4 && back.shape(0) == 4, "there, back: (4,)");
+  require(result.shape(0) == 3 && result.shape(1) == time.shape(0), "result: (3, n)");
+  const double *a = there.data(), *b = back.data();
+  swgjoint::move_back(time.data(), time.shape(0), {a[0], a[1], a[2], a[3]},
+                      {b[0], b[1], b[2], b[3]}, result.data());
+}
+
+void write_plan(In<1> position, In<1> velocity, In<1> acceleration, double load,
+                In<1> ramp, double inertia, Out<2> result) {
+  const std::size_t m = position.shape(0), n = ramp.shape(0);
+  require(velocity.shape(0) == m && acceleration.shape(0) == m && m <= n,
+          "position, velocity, acceleration: (m,), m <= n");
+  require(result.shape(0) == n && result.shape(1) == 5, "result: (n, 5)");
+  swgjoint::write_plan(position.data(), velocity.data(), acceleration.data(), m, load,
+                       ramp.data(), inertia, n, result.data());
 }
 
 void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
@@ -270,6 +303,18 @@ NB_MODULE(compiled, m) {
         nb::arg("weight").noconvert(), nb::arg("result").noconvert());
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
+  m.def("grow_oscillation", &grow_oscillation, nb::arg("sin").noconvert(),
+        nb::arg("cos").noconvert(), nb::arg("weight").noconvert(),
+        nb::arg("omega").noconvert(), nb::arg("offset"), nb::arg("ramp").noconvert(),
+        nb::arg("slope").noconvert(), nb::arg("bend").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("move_back", &move_back, nb::arg("time").noconvert(),
+        nb::arg("there").noconvert(), nb::arg("back").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("write_plan", &write_plan, nb::arg("position").noconvert(),
+        nb::arg("velocity").noconvert(), nb::arg("acceleration").noconvert(),
+        nb::arg("load"), nb::arg("ramp").noconvert(), nb::arg("inertia"),
+        nb::arg("result").noconvert());
   nb::class_<RingFactor>(m, "RingFactor")
       .def(nb::init<std::int64_t, std::int64_t, std::int64_t>(), nb::arg("sectors"),
            nb::arg("size"), nb::arg("face"))

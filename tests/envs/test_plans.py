@@ -98,3 +98,19 @@ def test_memory_of_plans_is_bounded(joints, channels, shared):
     many = size(65_536)
     assert 40 <= many.window < 4001
     assert 8 * values * many.count * many.window <= MEMORY
+
+
+def test_episodes_are_those_of_numpy(monkeypatch):
+    """Observations and rewards have the same bits without the compiled loops."""
+
+    def run():
+        env = gymnasium.make_vec("swgjoint.envs:swgjoint/JointTracking-v0", 8)
+        rows, rng = [env.reset(seed=1)[0]], np.random.default_rng(0)
+        for _ in range(300):
+            rows += env.step(rng.uniform(-0.3, 0.3, (8, 1)))[:4]
+        return rows
+
+    compiled = run()
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    for one, want in zip(compiled, run(), strict=True):
+        np.testing.assert_array_equal(one, want, strict=True)

@@ -81,7 +81,8 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     tests = Path(__file__).parents[1]
     files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
-    assert len(files) == 7
+    files += sorted((tests / "envs").glob("test_compiled_*.py"))
+    assert len(files) == 8
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,
