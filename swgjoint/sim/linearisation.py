@@ -23,6 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from swgjoint.drives.references import check_joint_names
 from swgjoint.errors import ComputationError, InputError
@@ -31,6 +32,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.equilibrium import set_start
+from swgjoint.sim.figures.resonance import LOCKED
 from swgjoint.sim.motion.start_check import check_ranges
 from swgjoint.sim.sampled_loop import control_period
 from swgjoint.sim.scene.scene import Scene
@@ -77,13 +79,25 @@ class LinearScene:
     """Motor torques that hold the equilibrium [N·m]. Shape (m,)."""
     output: Array
     """Output in the equilibrium. Shape (p,)."""
+    natural_Hz: Array
+    """Undamped natural frequencies of motors and links on the mean stiffness of their
+    drives and output bearings, in ascending order [Hz]. Shape (n/2,)."""
+
+    @property
+    def aliased(self) -> bool:
+        """Whether a natural frequency exceeds half the sampling frequency.
+
+        The imaginary parts of its :attr:`poles` are then those of a slower mode. A, B
+        and C are not affected.
+        """
+        return bool(self.natural_Hz[-1] > 0.5 / self.period)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles in continuous time, log(eigenvalue of A)/period [1/s]. Shape (n,).
 
         The imaginary part of a mode faster than half the sampling frequency is wrong,
-        because it cannot be told from that of a slower mode.
+        because it cannot be told from that of a slower mode (:attr:`aliased`).
         """
         with np.errstate(divide="ignore"):
             logarithm = np.log(np.linalg.eigvals(self.A).astype(complex))
@@ -151,6 +165,7 @@ def linearise(
         state=state,
         input=torques,
         output=output,
+        natural_Hz=_natural_frequencies(assembly, data),
     )
 
 
@@ -219,6 +234,22 @@ def _settle(assembly: Assembly, data: mujoco.MjData) -> Array:
             " another posture"
         )
     return np.asarray(torques)
+
+
+def _natural_frequencies(assembly: Assembly, data: mujoco.MjData) -> Array:
+    """Natural frequencies of motors and links on elastic drives [Hz]. Shape (nv,)."""
+    model = assembly.model
+    mass, stiffness = np.zeros((2, model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    for j, transmission in enumerate(assembly.transmissions):
+        if transmission.level not in LOCKED and assembly.motor_velocity[j] >= 0:
+            torsion = np.zeros(model.nv)
+            torsion[assembly.motor_velocity[j]] = 1.0 / assembly.ratio[j]
+            torsion[assembly.link_velocity[j]] = -1.0
+            stiffness += transmission.drive.mean_stiffness * np.outer(torsion, torsion)
+    stiffness[model.jnt_dofadr, model.jnt_dofadr] += model.jnt_stiffness
+    squares = eigh(stiffness, mass, eigvals_only=True)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
 def _states(assembly: Assembly) -> tuple[NDArray[np.intp], tuple[str, ...]]:

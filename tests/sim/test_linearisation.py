@@ -278,3 +278,17 @@ def test_what_has_no_linear_model_is_refused():
     weak = hold(defaults__motor={"torque_limit_Nm": 1e-3})
     with pytest.raises(ComputationError, match=naming("shoulder", "torque limit")):
         linearise(weak)
+
+
+def test_natural_frequencies_tell_whether_poles_are_aliased():
+    """Short steps have them as poles; long steps have slower ones, and say so."""
+    fine = linearise(hold(defaults__level="linear", simulation__step_s=2e-5))
+    coarse = linearise(hold(defaults__level="linear", simulation__step_s=5e-3))
+    fastest = fine.natural_Hz[-1]
+    np.testing.assert_allclose(coarse.natural_Hz, fine.natural_Hz)
+    found = [np.abs(plant.poles.imag).max() / (2.0 * np.pi) for plant in (fine, coarse)]
+    assert found[0] == pytest.approx(fastest, rel=0.01)
+    assert not fine.aliased and coarse.aliased
+    assert found[1] < 0.5 / coarse.period + 1e-9 < fastest
+    # two drives: two elastic modes, and two in which motors and links turn together
+    assert (fine.natural_Hz[:2] < 1e-3 * fastest).all() and fine.natural_Hz[2] > 10.0
