@@ -211,7 +211,9 @@ def unknown(line):
             for extra in group.split(",")
         ]
         return [extra for extra in asked if extra not in extras]
-    if words[0] in ("git", "cd"):
+    if words[0] in ("git", "cd", "cp", "gcc", "g++") or "=" in words[0]:
+        return []
+    if words[0].startswith("./"):  # built by a line before
         return []
     needed = [project["project"]["dependencies"], *extras.values()]
     programs = {re.split(r"[\[>=]", name)[0] for names in needed for name in names}
