@@ -60,15 +60,17 @@ class BandedAssembly:
             Solutions (size, n) [m].
         """
         size = len(order)
-        rows, columns, values = [], [], []
-        for _, dofs, hessian in self._parts:
-            place, m = order[dofs], dofs.shape[1]
-            rows.append(np.repeat(place, m, axis=1).ravel())
-            columns.append(np.tile(place, (1, m)).ravel())
-            values.append(hessian.ravel())
-        row, column = np.concatenate(rows), np.concatenate(columns)
-        band = int(np.abs(row - column).max())
-        flat = (band + row - column) * size + column
+        places = [order[dofs] for _, dofs, _ in self._parts]
+        band = max(int(np.ptp(place, axis=1).max(initial=0)) for place in places)
+        # row i of column j is entry (band + i - j, j) of the banded matrix
+        flat = np.concatenate(
+            [
+                ((band + p) * size)[:, :, None] + (p * (1 - size))[:, None, :]
+                for p in places
+            ],
+            axis=None,
+        )
+        values = [hessian.ravel() for _, _, hessian in self._parts]
         matrix = np.bincount(
             flat, np.concatenate(values), (2 * band + 1) * size
         ).reshape(2 * band + 1, size)

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 
 from swgjoint.errors import Outcome
+from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.rings.equilibrium import ThinRingSolver
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import ThinRingState, initial_state
@@ -20,6 +21,13 @@ FREE = 1e-3
 fails, as a fraction of the elastic energy [1/rad]."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """Golden section, whose multiples spread angles over the tooth pitch [-]."""
+TOUCH = 1.25
+"""Rotation with which the search for a loaded equilibrium starts, as a multiple of the
+one at which the first tooth touches [-]. Closer to it, so few teeth carry so little
+load that Newton's method takes longer."""
+NEARBY = 5e-3
+"""Largest gap of teeth that a free rotation may close, as a fraction of the radius of
+the rim [-]."""
 HALVINGS = 5
 """Largest number of times that failing torque steps are halved."""
 
@@ -106,6 +114,12 @@ def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRi
         The equilibrium, or the state of the last failed step.
     """
     solver = ThinRingSolver()
+    if not state.loaded_teeth:
+        touched = _turned_to_teeth(model, state, torque)
+        if touched is not None:
+            tried = solver(model, touched, torque=torque)
+            if tried.outcome.ok:
+                return tried
     begin = state.torque if state.loaded_teeth else 0.0
     done, step, halved = 0.0, 1.0, 0
     while done < 1.0:
@@ -119,3 +133,36 @@ def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRi
         if halved > HALVINGS:
             return tried
     return state
+
+
+def _turned_to_teeth(
+    model: ThinRing, state: ThinRingState, torque: float
+) -> ThinRingState | None:
+    """Turn a free output against a torque until teeth carry load; None without success.
+
+    A free output has no stiffness, so that Newton's method at a prescribed torque takes
+    tens of iterations to find the teeth. The gaps and their change with a rigid
+    rotation of the rim tell where they are.
+
+    Args:
+        model: The rings.
+        state: Equilibrium in which no tooth carries load.
+        torque: Torque T that turns the output [N·m].
+    """
+    nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    foot, slope = nodes[:, 0], nodes[:, 1]
+    reach = NEARBY * model.rim.radius
+    contacts, angle = model.teeth.find_contacts(foot, slope, reach=reach)
+    rows, _ = model.teeth.rows(contacts, foot, slope, angle)
+    turned = np.concatenate([rotate_right_angle(foot), rotate_right_angle(slope)], 1)
+    # the load turns the output against the torque
+    way = -np.sign(torque)
+    closing = -way * np.einsum("ni,ni->n", rows, turned[contacts.sector])
+    some = closing > 1e-3 * np.abs(closing).max(initial=0.0)
+    if not some.any():
+        return None
+    free = float((contacts.gap[some] / closing[some]).min())
+    touched = ThinRingSolver()(
+        model, state, rotation=state.rotation + way * TOUCH * free
+    )
+    return touched if touched.outcome.ok and touched.loaded_teeth else None
