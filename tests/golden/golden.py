@@ -32,6 +32,7 @@ from swgjoint.cli.main import main
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import models_path
+from swgjoint.provenance import provenance
 
 FOLDER = Path(__file__).parent
 FROZEN = FOLDER / "frozen"
@@ -175,9 +176,21 @@ def text(content: Any) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
+def stamped(content: Any) -> Any:
+    """With the date and the commit at which it is frozen."""
+    found = provenance()
+    when = {"date": found["date"][:10], "commit": found["commit"]}
+    return {"frozen": when, **content}
+
+
 def load(name: str) -> Any:
     """What was frozen of a case."""
     return json.loads((FROZEN / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def result_of(content: Any) -> Any:
+    """What was frozen, without when."""
+    return {key: value for key, value in content.items() if key != "frozen"}
 
 
 def command_line() -> int:
@@ -192,19 +205,20 @@ def command_line() -> int:
     for name in given.only.split(",") if given.only else [*cases, "designs"]:
         start = time.process_time()
         if name == "designs":
-            now = text(design_hashes())
+            now = design_hashes()
         else:
             with tempfile.TemporaryDirectory() as folder:
-                now = text(run(name, cases[name], Path(folder)))
+                now = run(name, cases[name], Path(folder))
         path = FROZEN / f"{name}.json"
         if given.freeze:
-            path.write_text(now, encoding="utf-8")
-        same = path.exists() and path.read_text(encoding="utf-8") == now
+            stamp = name != "designs"
+            path.write_text(text(stamped(now) if stamp else now), encoding="utf-8")
+        same = path.exists() and text(result_of(load(name))) == text(now)
         changed += not same
         print(f"{name:24} {time.process_time() - start:7.1f} s", file=sys.stderr)
         if not same:
             print(f"  differs: {name}")
-            for line in list(differences(load(name), json.loads(now)))[:10]:
+            for line in list(differences(result_of(load(name)), now))[:10]:
                 print("   ", line)
     return 1 if changed else 0
 
