@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,39 @@ class FullSolves:
     """Output error psi - theta/i [rad]."""
     input_torque: Array
     """External torque on the input [N·m]."""
+
+    @classmethod
+    def from_rows(cls, rows: Sequence[tuple[float, float, float, float]]) -> FullSolves:
+        """Equilibria from rows.
+
+        Args:
+            rows: Input angle [rad], output torque [N·m], output error [rad] and input
+                torque [N·m] of each equilibrium.
+        """
+        angle, torque, error, moment = np.array(rows).T
+        return cls(
+            input_angle=angle, torque=torque, output_error=error, input_torque=moment
+        )
+
+    def in_series(self, compliance: float) -> FullSolves:
+        """The equilibria of the drive in series with an output spring.
+
+        Args:
+            compliance: Compliance of the spring [rad/(N·m)].
+        """
+        return replace(self, output_error=self.output_error - self.torque * compliance)
+
+    def together_with(self, other: FullSolves | None) -> FullSolves:
+        """These equilibria followed by other ones, if there are any."""
+        if other is None:
+            return self
+        pairs = {
+            key.name: np.concatenate(
+                [getattr(self, key.name), getattr(other, key.name)]
+            )
+            for key in fields(self)
+        }
+        return FullSolves(**pairs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,14 +123,11 @@ class ToleranceSamples:
         t = self.torque[:, None]
         spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) * compliance
         solved = self.solved
-        if solved is not None:
-            twisted = solved.output_error - solved.torque * compliance
-            solved = replace(solved, output_error=twisted)
         return replace(
             self,
             table=self.table + spring,
             perfect=self.perfect + spring,
-            solved=solved,
+            solved=None if solved is None else solved.in_series(compliance),
         )
 
 
@@ -142,6 +173,9 @@ class MapSamples:
     Shape (n_torques,)."""
     unseen: FullSolves | None = None
     """Equilibria at other angles and torques, zero included; None without any."""
+    worst: FullSolves | None = None
+    """Equilibria where the map is likely to be least accurate, see
+    :func:`swgjoint.maps.fit.worst_positions.worst_positions`; None without any."""
     shortfall: str = ""
     """Sampling goals that were not reached, with the reason; empty if all were."""
     fields: DriveFields | None = None

@@ -20,9 +20,8 @@ PARTS = (0.02, 0.045, 0.1, 0.19, 0.31, 0.47, 0.63, 0.87)
 ANGLES = 12
 GOAL = (0.05, 0.02)
 """Largest and rms difference, in the peak to peak at the torque."""
-BLIND = {"reference-2d-dca", "reference-2d-qca-improved"}
-"""Designs whose record overlooks their worst place: the output error is off by 3.2 and
-3.1 % at 17.6 N·m, and the equilibria of the record see 1 % of it."""
+SEEN = 0.7
+"""Smallest part of the largest difference at these equilibria that a record states."""
 DESIGNS = (
     "reference-2d",
     "reference-2d-dca",
@@ -86,59 +85,92 @@ def scaled(changes: dict[str, object]) -> Design:
     return Design.load("reference-2d").with_changes({**arcs, **rim, **changes})
 
 
-def differences(design: Design) -> tuple[np.ndarray, dict[str, dict[str, float]]]:
+class Compared:
+    """A map, and the finite elements of its design at any torque and angle."""
+
+    def __init__(self, design: Design):
+        samples = sample_map(design)
+        self.drive = fit_map(samples)
+        self.record = self.drive.info["validation"]
+        self.follow = follower_in_plane(design)
+        self.series = series_compliance(design, cup=True)
+        self.rest = self.follow.engage(self.follow.deflect())
+        zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+        self.offset = float(samples.output_error[zero].mean())
+
+    def at(self, state, theta):
+        """Equilibria at these angles under the torque of a state.
+
+        Returns:
+            Output error of the solves [rad], what the map misses; the same of the input
+            torque [N·m] (4, n).
+        """
+        drive, follow, torque = self.drive, self.follow, state.torque
+        error, moment = [], []
+        for angle in theta:
+            state = follow.to_angle(state, float(angle))
+            assert state.outcome.ok
+            error.append(follow.output_angle(state) - angle / follow.ratio)
+            moment.append(follow.input_torque(state))
+        psi = output_angle(drive, theta, np.full(len(theta), torque))
+        on_input, on_output = drive.forces(theta, psi)
+        apart = psi - theta / drive.ratio - (np.array(error) - torque * self.series)
+        predicted = -on_input - (on_output - torque) / drive.ratio
+        return np.array(
+            [error, apart + self.offset, moment, predicted - np.array(moment)]
+        )
+
+
+def differences(found: Compared, design: Design) -> np.ndarray:
     """Differences of a map at unseen torques and angles.
 
     Returns:
         Rows of torque [N·m], then largest and rms difference of the loaded error and of
         the input torque, in the peak to peak of the finite elements at that torque (n,
-        5); and the record that the map carries.
+        5).
     """
-    drive = fit_map(sample_map(design))
-    follow, rows = follower_in_plane(design), []
+    rows = []
     theta = 2.0 * pi / design.periodicity * (np.arange(ANGLES) + 0.37) / ANGLES
-    series = series_compliance(design, cup=True)
     peak = ratings_of(design).repeated_peak
     signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
-    rest = follow.engage(follow.deflect())
     for sign in signs:
-        state = rest
+        state = found.rest
         for part in PARTS:
             torque = sign * part * peak
-            state = follow.to_torque(state, torque)
-            error, moment, at = [], [], state
-            for angle in theta:
-                at = follow.to_angle(at, float(angle))
-                assert at.outcome.ok
-                error.append(follow.output_angle(at) - angle / follow.ratio)
-                moment.append(follow.input_torque(at))
-            psi = output_angle(drive, theta, np.full(ANGLES, torque))
-            on_input, on_output = drive.forces(theta, psi)
+            state = found.follow.to_torque(state, torque)
+            error, apart, moment, missed = found.at(state, theta)
             # a constant angle has no meaning: each code counts from its own zero
-            apart = psi - theta / drive.ratio - (np.array(error) - torque * series)
             apart -= apart.mean()
-            predicted = -on_input - (on_output - torque) / drive.ratio
-            missed = predicted - np.array(moment)
             row = [torque]
             for values, wrong in ((error, apart), (moment, missed)):
                 height = np.ptp(values)
                 rms = np.sqrt(np.mean(wrong**2))
                 row += [np.abs(wrong).max() / height, rms / height]
             rows.append(row)
-    return np.array(rows), drive.info["validation"]
+    return np.array(rows)
 
 
-def check(design: Design, name: str) -> None:
+def check(design: Design) -> None:
     """Hold a map to the goal, and its record too."""
-    found, record = differences(design)
+    compared = Compared(design)
+    found, record = differences(compared, design), compared.record
     largest, rms = GOAL
     assert found[:, [1, 3]].max() < largest
     assert found[:, [2, 4]].max() < rms
-    for key, column in (("output_error", 1), ("input_torque", 3)):
-        # the equilibria of the record see as much as these, where it matters
-        worst = found[:, column].max()
-        seen = record[key]["largest"] > 0.4 * worst or name in BLIND
-        assert worst < 0.5 * GOAL[0] or seen
+    for key, column, unit in (
+        ("output_error", 1, "rad"),
+        ("input_torque", 3, "Nm"),
+    ):
+        # the record sees as much as these equilibria, where it matters
+        stated, worst = record[key], found[:, column].max()
+        assert worst < 0.5 * GOAL[0] or stated["largest"] > SEEN * worst
+        # and no more than there is: a solve of our own at the place that it names
+        torque, theta = stated["at_Nm"], np.array([stated["input_angle_rad"]])
+        state = compared.follow.to_torque(compared.rest, torque)
+        wrong = compared.at(state, theta)[column][0]
+        (row,) = (r for r in record["rows"] if r["torque_Nm"] == torque)
+        own = abs(wrong) / row[f"{key}_pp_{unit}"]
+        assert own == pytest.approx(stated["largest"], rel=0.1)
     assert record["solves"] > 100
     assert record["secant_stiffness"]["largest"] < GOAL[0]
 
@@ -147,7 +179,7 @@ def check(design: Design, name: str) -> None:
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
 def test_coarse_maps_meet_unseen_solves(name):
     """Two maps meet the goal at torques and angles between their samples."""
-    check(coarse(name), name)
+    check(coarse(name))
 
 
 @pytest.mark.fe
@@ -156,7 +188,7 @@ def test_coarse_maps_meet_unseen_solves(name):
 @pytest.mark.parametrize("name", DESIGNS)
 def test_bundled_maps_meet_unseen_solves(name):
     """All bundled 2D designs meet the goal."""
-    check(Design.load(name), name)
+    check(Design.load(name))
 
 
 @pytest.mark.fe
@@ -164,4 +196,4 @@ def test_bundled_maps_meet_unseen_solves(name):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_maps_meet_unseen_solves(name):
     """Drives of other sizes do so, too: other wave generators, teeth with clearance."""
-    check(scaled(OTHERS[name]), name)
+    check(scaled(OTHERS[name]))

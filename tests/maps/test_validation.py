@@ -73,6 +73,33 @@ def test_what_is_off_counts_in_the_peak_to_peak_at_its_torque(part):
     assert given.unseen is not None
 
 
+def test_solves_at_the_worst_positions_count_in_the_largest_difference_only():
+    """They replace the estimate; as the worst ones they do not belong to a mean."""
+    drive, samples = judged()
+    clean = validation(drive, samples)
+    torque, theta = np.array([20.0, 33.0]), 2.0 * np.pi / N * np.array([0.11, 0.72])
+    psi = output_angle(drive, theta, torque)
+    on_input, _ = drive.forces(theta, psi)
+    height = clean["rows"][1]["output_error_pp_rad"]
+    worst = FullSolves(
+        input_angle=theta,
+        torque=torque,
+        output_error=psi - theta / drive.ratio + OFFSET + np.array([0.0, 0.1 * height]),
+        input_torque=-on_input,
+    )
+    record = validation(drive, replace(samples, worst=worst))
+    assert record["output_error"]["largest"] == pytest.approx(0.1, rel=0.1)
+    assert record["output_error"]["at_Nm"] == 33.0
+    assert record["input_torque"]["largest"] < 1e-9
+    assert record["torques_Nm"] == [11.0, 20.0, 33.0]
+    assert record["solves"] == clean["solves"] + 2
+    assert record["worst_solves"] == 2 and clean["worst_solves"] == 0
+    assert "output_error_rms" not in record["rows"][1]
+    for key in ("input_torque", "output_error"):
+        assert record[key]["rms"] < 1e-9
+        assert "expected" not in record[key] and "expected" in clean[key]
+
+
 def test_a_fitted_map_carries_a_record_that_can_be_read():
     """With the reason why sampling ended."""
     _, samples = judged(error=1e-6, shortfall="angles are off by 7 %")

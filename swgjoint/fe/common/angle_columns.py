@@ -17,6 +17,7 @@ from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState, Follower, Unloaded
 from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
+from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
 
@@ -253,6 +254,41 @@ class SolvedColumns(Generic[AnyState]):
             else:
                 column.states[torque] = state
             self.count()
+
+    def solve_positions(
+        self, count: int, positions: Sequence[tuple[float, float]]
+    ) -> FullSolves | None:
+        """Equilibria at given torques and angles between the columns.
+
+        Each is solved from the nearest torque of the nearest column. A position whose
+        solve fails is omitted.
+
+        Args:
+            count: Number of equally spaced columns.
+            positions: Output torque, not zero [N·m], and input angle [rad] of each.
+
+        Returns:
+            The equilibria; None without any.
+        """
+        columns = [column for _, column in self.chosen(count)]
+        rows = []
+        for torque, theta in positions:
+            # the last column is not the nearest one of the next pitch
+            nearest = min(round(theta / self.period * count), count - 1)
+            solve = partial(self._between, columns[nearest], torque, theta)
+            state = self.solve_at(theta, torque, solve)
+            self.count()
+            if state is not None:
+                error, _, _, moment = self.figures(state, theta)
+                rows.append((theta, torque, error, moment))
+        return FullSolves.from_rows(rows) if rows else None
+
+    def _between(
+        self, column: AngleColumn[AnyState], torque: float, theta: float
+    ) -> AnyState:
+        """Equilibrium near a column, first under the torque, then at the angle."""
+        state = self.follow.to_torque(column.nearest(torque), torque)
+        return self.follow.to_angle(state, theta) if state.outcome.ok else state
 
     def count(self) -> None:
         """Count one more solve and report it."""

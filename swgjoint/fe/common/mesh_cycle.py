@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic
@@ -57,6 +57,9 @@ class Effort:
     [-]."""
     beyond: bool = False
     """Whether to solve, at the end, one torque of each sign beyond the largest one."""
+    worst: bool = False
+    """Whether to validate the map where it is likely to be least accurate, if need be
+    beyond the budget."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,6 +90,8 @@ class Pattern(Generic[AnyState]):
     """Equilibria at all angles by torque [N·m]: zero and the solved initial torques."""
     info: dict[str, Any]
     """Record of the sampling, and of the checks of periodicity and mirror symmetry."""
+    solve_at: Callable[[Sequence[tuple[float, float]]], FullSolves | None]
+    """Solves for equilibria at further torques [N·m] and input angles [rad]."""
 
 
 def solve_mesh_cycle(
@@ -168,6 +173,7 @@ def solve_mesh_cycle(
         truncated=not {*torques} <= {*grid.levels},
         states=grid.states(reached.count, torques),
         info=info | {"sampling": _record(grid, reached)},
+        solve_at=partial(grid.solve_positions, reached.count),
     )
 
 

@@ -38,6 +38,8 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.mounting import series_compliance, springs_of
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.worst_positions import worst_positions
 from swgjoint.maps.samples import MapSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
@@ -104,7 +106,9 @@ def sample_map(
     Angles and torques of the nonlinear model are added, within a budget of equilibria,
     until the samples predict equilibria between them, see
     :func:`swgjoint.fe.common.mesh_cycle.solve_mesh_cycle`. A few equilibria at other
-    angles and torques are reserved for the validation of the map. With perfect teeth
+    angles and torques are reserved for the validation of the map. Unless the number of
+    angles is prescribed, the 2D map is also validated where it is likely to be least
+    accurate, see :mod:`swgjoint.maps.fit.worst_positions`. With perfect teeth
     one pitch suffices, and with a symmetric wave generator the results under negative
     torques are the mirror image of those under positive ones. Both properties are
     checked at rated torque and recorded. If a solve fails, its torque and all larger
@@ -154,23 +158,9 @@ def sample_map(
 
     pattern, shown, surface = _solved(design, model, effort, tick, keep)
     _check_torques(design, pattern)
-    # fewer solves than announced may have been needed
-    progress(stage, total, total)
     # springs in series: the cup that the 2D model lacks, boss and housing
     series = series_compliance(design, cup=model == "2d")
-    tolerances = None
-    if has_errors(design):
-        tolerances = sample_tolerances(
-            design,
-            repeated_peak=float(pattern.torque[-1]),
-            rated_torque=ratings.rated_torque,
-            model=model,
-            progress=progress,
-            keep=keep,
-        )
-        tolerances = tolerances.in_series(series)
-    unseen, states = pattern.unseen, pattern.states
-    return MapSamples(
+    samples = MapSamples(
         **_in_series(pattern, series),
         name=drive.name,
         level=model,
@@ -182,24 +172,41 @@ def sample_map(
         order=_order(design),
         input_angle=pattern.theta,
         torque=pattern.torque,
-        tolerances=tolerances,
+        tolerances=None,
         free=pattern.free,
         solved=pattern.solved,
-        unseen=replace(
-            unseen, output_error=unseen.output_error - unseen.torque * series
-        ),
+        worst=None,
+        unseen=pattern.unseen.in_series(series),
         shortfall=pattern.shortfall,
-        fields=drive_fields(design, states, shown, surface, symmetric=symmetric),
+        fields=drive_fields(
+            design, pattern.states, shown, surface, symmetric=symmetric
+        ),
         info=pattern.info
         | {
             "design_hash": given.content_hash(),
             "label": _label(given, model),
             "ratings_source": ratings.source,
             "truncated": pattern.truncated,
-            "solves": done,
-            "sampling_wall_s": time.perf_counter() - begin,
         },
     )
+    if effort.worst:
+        worst = pattern.solve_at(worst_positions(fit_map(samples), samples))
+        worst = None if worst is None else worst.in_series(series)
+        samples = replace(samples, worst=worst)
+    # fewer solves than announced may have been needed
+    progress(stage, total, total)
+    if has_errors(design):
+        tolerances = sample_tolerances(
+            design,
+            repeated_peak=float(pattern.torque[-1]),
+            rated_torque=ratings.rated_torque,
+            model=model,
+            progress=progress,
+            keep=keep,
+        )
+        samples = replace(samples, tolerances=tolerances.in_series(series))
+    spent = {"solves": done, "sampling_wall_s": time.perf_counter() - begin}
+    return replace(samples, info=samples.info | spent)
 
 
 def _solved(
@@ -321,7 +328,7 @@ def effort_of(
         both_signs: Whether negative torques are sampled as well.
         errors: Whether manufacturing errors are superposed.
     """
-    solid = model == "3d"
+    solid, chosen = model == "3d", angles is None
     unseen = SOLID_UNSEEN if solid else UNSEEN
     if angles is not None:
         # a quick map is validated at the same number of torques but at fewer angles
@@ -344,6 +351,7 @@ def effort_of(
         # in 3D these solves are better spent on other torques, and a map with tooth
         # errors is extrapolated beyond its samples anyway
         beyond=not solid and not errors,
+        worst=chosen and not solid and not errors,
     )
 
 

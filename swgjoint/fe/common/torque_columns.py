@@ -310,13 +310,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 if torque in column.states:
                     error, _, _, moment = self.figures(column.states[torque], theta)
                     rows.append((theta, torque, error, moment))
-        angle, torque, errors, moments = np.array(rows).T
-        return FullSolves(
-            input_angle=angle,
-            torque=torque,
-            output_error=errors,
-            input_torque=moments,
-        )
+        return FullSolves.from_rows(rows)
 
     def tables(
         self, count: int, most: int, faint: float = FAINT

@@ -226,15 +226,7 @@ class _Sampler:
                 if torque == 0.0 or torque in torques
             ]
             self.progress(f"{name}: unseen positions", j + 1, UNSEEN_PHASES)
-        if not solves:
-            return None
-        input_angle, torque, error, input_torque = np.array(solves).reshape(-1, 4).T
-        return FullSolves(
-            input_angle=input_angle,
-            torque=torque,
-            output_error=error,
-            input_torque=input_torque,
-        )
+        return FullSolves.from_rows(solves) if solves else None
 
     def record(self, torques: list[float], *, truncated: bool) -> dict[str, Any]:
         """Record of the sampling, for the map."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit.sample_curves import curves_at, input_torque_at
 from swgjoint.maps.fit.tolerance_modes import pitches_per_turn, relative_amplitudes
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import FullSolves, MapSamples
@@ -35,10 +36,13 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     of the toleranced drive, and the superposed values over the whole cycle replace the
     samples.
 
-    ``largest`` is the largest difference observed at a few angles of each torque.
-    ``expected`` estimates the largest difference at more angles: :data:`EXTREME` times
-    the root mean square at the worst torque, which scatters less than the largest
-    difference. Neither applies between the torques of the record.
+    ``largest`` is the largest difference at the torques and angles of all these
+    equilibria, at ``at_Nm`` and ``input_angle_rad``. Among them are those at which the
+    map is likely to be least accurate (``samples.worst``); they are left out of
+    ``rms``. Without them, ``largest`` is the largest difference at a few angles of each
+    torque, and ``expected`` estimates the largest one at more angles: :data:`EXTREME`
+    times the root mean square at the worst torque, which scatters less. Neither applies
+    between the torques of the record then.
 
     Args:
         drive: The map.
@@ -52,6 +56,10 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     solved = samples.unseen if toleranced is None else toleranced.solved
     if solved is None:
         return None
+    regular = np.ones(solved.torque.size, dtype=bool)
+    if toleranced is None and samples.worst is not None:
+        solved = solved.together_with(samples.worst)
+        regular = np.arange(solved.torque.size) < regular.size
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     offset = float(samples.output_error[zero].mean())
     if toleranced is not None:
@@ -59,7 +67,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
         offset = float(deviation[solved.torque == 0.0].mean())
     wrong = solved.output_error - offset - _predicted(drive, solved)
     missed = _input_torque(drive, solved) - solved.input_torque
-    rows = []
+    rows, angles = [], []
     # the input torque within a clearance depends on where the output stands in it
     mean_clearance = toleranced is not None and toleranced.onsets
     low, high = drive.torque_range
@@ -70,9 +78,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
         at = solved.torque == torque
         error, moment = solved.output_error[at], solved.input_torque[at]
         if toleranced is None:
-            others = [
-                _over(samples, key, torque) for key in ("output_error", "input_torque")
-            ]
+            others = _over_angle(samples, float(torque))
         else:
             others = [np.array([0.0, here]) for here in _over_cycle(samples, torque)]
             # only the differences count
@@ -81,6 +87,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
             np.concatenate(pair) for pair in zip((error, moment), others, strict=True)
         )
         row: dict[str, float] = {"torque_Nm": float(torque), "angles": int(at.sum())}
+        angle: dict[str, float] = {}
         for key, values, difference in (
             ("input_torque", moment, missed[at]),
             ("output_error", error, wrong[at]),
@@ -91,25 +98,33 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
             row[f"{key}_pp_{UNITS[key]}"] = height
             if height > 0.0:
                 row[f"{key}_largest"] = float(np.abs(difference).max() / height)
-                row[f"{key}_rms"] = float(np.sqrt((difference**2).mean()) / height)
+                angle[key] = float(solved.input_angle[at][np.abs(difference).argmax()])
+                squares = difference[regular[at]] ** 2
+                if squares.size:
+                    row[f"{key}_rms"] = float(np.sqrt(squares.mean()) / height)
         rows.append(row)
+        angles.append(angle)
     if not all(any(f"{key}_largest" in row for row in rows) for key in QUANTITIES):
         return None
     record: dict[str, Any] = {
         "solves": int(solved.torque.size),
+        "worst_solves": int(np.count_nonzero(~regular)),
         "torques_Nm": [row["torque_Nm"] for row in rows],
         "rows": rows,
     }
     for key in QUANTITIES:
         judged = [row for row in rows if f"{key}_largest" in row]
         worst = max(judged, key=lambda row: row[f"{key}_largest"])
-        squares = [row[f"{key}_rms"] ** 2 for row in judged]
+        angle = angles[rows.index(worst)]
+        means = [row[f"{key}_rms"] ** 2 for row in judged if f"{key}_rms" in row]
         record[key] = {
             "largest": worst[f"{key}_largest"],
             "at_Nm": worst["torque_Nm"],
-            "rms": float(np.sqrt(np.mean(squares))),
-            "expected": EXTREME * float(np.sqrt(max(squares))),
+            "input_angle_rad": angle[key],
+            "rms": float(np.sqrt(np.mean(means))),
         }
+        if regular.all():
+            record[key]["expected"] = EXTREME * float(np.sqrt(max(means)))
     stiffness = _stiffness(drive, solved, offset, wrong)
     if stiffness is not None:
         record[STIFFNESS] = stiffness
@@ -133,10 +148,15 @@ def _input_torque(drive: Potential, solved: FullSolves) -> Array:
     )
 
 
-def _over(samples: MapSamples, key: str, torque: float) -> Array:
-    """Output error or input torque at all sampled angles and one torque (n_angles,)."""
-    table = getattr(samples, key)
-    return np.array([np.interp(torque, samples.torque, row) for row in table.T])
+def _over_angle(samples: MapSamples, torque: float) -> list[Array]:
+    """Output error [rad] and input torque [N·m] at all sampled angles, each (n,).
+
+    At most torques of a map the input torque was not solved, but the strain energy
+    gives it.
+    """
+    error, potential = curves_at(samples, torque)
+    theta = samples.input_angle
+    return [error, input_torque_at(samples, torque, potential, theta)]
 
 
 def _over_cycle(samples: MapSamples, torque: float) -> list[float]:

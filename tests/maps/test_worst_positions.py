@@ -1,0 +1,84 @@
+"""Positions at which a map is validated because it is likely to be least accurate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_samples import RATINGS, N, samples_of
+
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.worst_positions import APART, EXTRA, worst_positions
+from swgjoint.maps.samples import FullSolves
+
+ANGLES = 24
+STEP = 2.0 * np.pi / N / ANGLES
+UNSEEN = FullSolves(
+    input_angle=np.full(5, 0.4 * STEP),
+    torque=np.array([0.0, -33.0, -11.0, 11.0, 33.0]),
+    output_error=np.zeros(5),
+    input_torque=np.zeros(5),
+)
+
+
+def cornered(place: float, **keys):
+    """Samples whose kinematic error has one corner, at a place in steps."""
+    samples = samples_of(n_angles=ANGLES, **keys)
+    corner = 1e-5 * np.abs(np.sin(0.5 * N * (samples.input_angle - place * STEP)))
+    error = samples.output_error + corner
+    return replace(samples, output_error=error, unseen=UNSEEN)
+
+
+def from_corner(positions, place):
+    """Distances of positions from the corner in steps."""
+    apart = np.array([angle for _, angle in positions]) / STEP - place
+    return np.abs((apart + 0.5 * ANGLES) % ANGLES - 0.5 * ANGLES)
+
+
+@pytest.mark.parametrize("place", [6.5, 15.3, 0.2])
+def test_positions_are_at_the_corner(place):
+    """The output error is worst there; regular angles would seldom be near it."""
+    samples = cornered(place)
+    positions = worst_positions(fit_map(samples), samples)
+    # the corner is between two samples; interpolation does not know where
+    near = from_corner(positions, place) < 1.5
+    torques = {torque for torque, _ in positions}
+    assert {torque for (torque, _), at in zip(positions, near, strict=True) if at} == (
+        torques
+    )
+    # without the corner other places are worst
+    smooth = replace(samples_of(n_angles=ANGLES), unseen=UNSEEN)
+    others = worst_positions(fit_map(smooth), smooth)
+    assert np.mean(from_corner(others, place) < 1.5) < 0.5
+
+
+def test_positions_lie_at_validation_torques_and_between_samples():
+    """At each validation torque and at others of both signs that are apart."""
+    samples = cornered(6.5)
+    drive = fit_map(samples)
+    torques = np.array([torque for torque, _ in worst_positions(drive, samples)])
+    angles = np.array([angle for _, angle in worst_positions(drive, samples)])
+    assert {-33.0, -11.0, 11.0, 33.0} <= set(torques)
+    assert 0.0 not in torques
+    others = np.setdiff1d(torques, UNSEEN.torque)
+    assert np.diff(others).min() >= APART * RATINGS.repeated_peak
+    for sign in (-1.0, 1.0):
+        assert 0 < np.count_nonzero(others * sign > 0.0) <= 2 * EXTRA
+    assert not np.isclose(angles / STEP, np.round(angles / STEP)).any()
+    assert (np.abs(torques) < RATINGS.repeated_peak).all()
+
+
+def test_only_sampled_signs_are_validated():
+    """The mirrored torques of a symmetric drive need no solves."""
+    samples = cornered(6.5)
+    half = UNSEEN.torque >= 0.0
+    one_sign = replace(
+        UNSEEN,
+        **{
+            key: getattr(UNSEEN, key)[half]
+            for key in ("input_angle", "torque", "output_error", "input_torque")
+        },
+    )
+    samples = replace(samples, unseen=one_sign)
+    assert all(torque > 0.0 for torque, _ in worst_positions(fit_map(samples), samples))
