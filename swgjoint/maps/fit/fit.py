@@ -57,7 +57,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     """
     if samples.tolerances is not None:
         samples = replace(samples, tolerances=register_by_torque(samples))
-    knots, coarse, pattern = _pattern_harmonics(samples)
+    knots, pattern = _pattern_harmonics(samples)
     if samples.tolerances is None:
         full = _map_of(samples, knots, pattern)
         fitted, record = _select_harmonics(full, samples, keep)
@@ -67,7 +67,6 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
             knots,
             pattern.potential,
             pattern.error,
-            coarse=coarse,
             keep=keep,
         )
         fitted = _map_of(samples, knots, combined)
@@ -87,23 +86,20 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     return replace(fitted, info=info)
 
 
-def _pattern_harmonics(
-    samples: MapSamples,
-) -> tuple[Array, NDArray[np.bool_], Combined]:
-    """Knots [rad], the coarse ones among them, and all harmonics of perfect teeth."""
+def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
+    """Knots [rad] and all harmonics of perfect teeth."""
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     unloaded = samples.output_error[zero]
     e0 = unloaded - unloaded.mean()
     torsion = unloaded - samples.output_error  # (n_torques, n_angles)
     energy = samples.energy - samples.energy[zero].mean()
 
-    knots, coarse = common_knots(samples, torsion)
+    knots = common_knots(samples, torsion)
     torque = np.broadcast_to(samples.torque[:, None], torsion.shape)
     curve = np.stack([energy, torque, 1.0 / samples.compliance])
     modes = _modes(interpolate_on_knots(torsion, curve, knots))
     return (
         knots,
-        coarse,
         Combined(
             orders=np.arange(len(modes))[:, None] * np.array([samples.order]),
             potential=modes,  # (n_modes, 2, 3, n_knots)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
@@ -16,9 +15,7 @@ LADDER = 12
 """Largest number of knot intervals across the end of a clearance."""
 
 
-def common_knots(
-    samples: MapSamples, torsion: Array
-) -> tuple[Array, NDArray[np.bool_]]:
+def common_knots(samples: MapSamples, torsion: Array) -> Array:
     """Common torsion knots of the curves at all angles.
 
     Args:
@@ -27,14 +24,11 @@ def common_knots(
         torsion: Torsion of the samples (n_torques, n_angles) [rad].
 
     Returns:
-        Increasing knots, zero included [rad], and a mask of the coarse ones among them,
-        at which tooth errors are evaluated because they are sampled at fewer torques;
-        each (n_knots,).
+        Increasing knots, zero included (n_knots,) [rad].
     """
     assert samples.solved is not None
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     tolerances = samples.tolerances
-    coarse = np.array(samples.solved)
     if tolerances is None:
         # the mean torsions, with both ends inside the sampled range of every angle
         knots = torsion.mean(axis=1)
@@ -44,7 +38,7 @@ def common_knots(
         inside = (knots > knots[0] + least[0]) & (knots < knots[-1] - least[1])
         inside[[0, -1]] = True
         at = zero - int((~inside[:zero]).sum())
-        knots, coarse = knots[inside], coarse[inside]
+        knots = knots[inside]
         ends = torsion[zero - 2 : zero + 3]
     else:
         # with tooth errors the stiffness varies so much that the range common to all
@@ -55,44 +49,36 @@ def common_knots(
         mean = PchipInterpolator(tolerances.torque, flawed.mean(axis=1))
         knots = mean(np.clip(samples.torque, *tolerances.torque[[0, -1]]))
         _end_at_largest_torque(knots, tolerances, flawed)
+        solved = np.array(samples.solved)
+        solved[[0, -1]] = True
+        wide = np.diff(knots[solved])
         at, ends = zero, flawed[rest - 2 : rest + 3]
     knots[at] = 0.0
     if samples.free and (tolerances is None or tolerances.onsets):
-        up, far_up = _clearance_knots(knots[at + 3 :], ends[3:])
-        down, far_down = _clearance_knots(-knots[: at - 2][::-1], -ends[:2][::-1])
+        up = _clearance_knots(knots[at + 3 :], ends[3:])
+        down = _clearance_knots(-knots[: at - 2][::-1], -ends[:2][::-1])
         knots = np.concatenate([-down[::-1], [0.0], up])
-        # all knots across the clearance, and the coarse ones among the others
-        right, left = np.ones(up.size, dtype=bool), np.ones(down.size, dtype=bool)
-        right[up.size - far_up.sum() :] = coarse[at + 3 :][far_up]
-        left[down.size - far_down.sum() :] = coarse[: at - 2][::-1][far_down]
-        coarse = np.concatenate([left[::-1], [True], right])
-    elif samples.free:
-        coarse[at - 2 : at + 3] = True
-    coarse[[0, -1]] = True
     if tolerances is not None:
         below, above = float(flawed[0].min()), float(flawed[-1].max())
-        low = -_further(-knots[coarse][::-1], -below)[::-1]
-        high = _further(knots[coarse], above)
+        low = -_further(-knots[0], -below, 2.0 * wide[0])[::-1]
+        high = _further(knots[-1], above, 2.0 * wide[-1])
         knots = np.concatenate([low, knots, high])
-        coarse = np.pad(coarse, (low.size, high.size), constant_values=True)
-        if tolerances.waves is not None:
-            coarse[:] = True  # few harmonics
-    return np.asarray(knots), coarse
+    return np.asarray(knots)
 
 
-def _further(knots: Array, last: float) -> Array:
+def _further(first: float, last: float, step: float) -> Array:
     """Knots beyond the last one that cover the torsion of soft positions (n,) [rad].
 
     Tooth errors make the torsion at the largest torque differ so much between positions
     that the mean one is too small for many of them.
 
     Args:
-        knots: Knots at which errors are evaluated, increasing [rad].
+        first: Last knot [rad].
         last: Largest torsion of any position [rad].
+        step: Largest distance of the knots [rad].
     """
-    step = 2.0 * (knots[-1] - knots[-2])
-    count = max(0, int(np.ceil((last - knots[-1]) / step)))
-    return np.linspace(knots[-1], last, count + 1)[1:]
+    count = max(0, int(np.ceil((last - first) / step)))
+    return np.linspace(first, last, count + 1)[1:]
 
 
 def _end_at_largest_torque(
@@ -114,7 +100,7 @@ def _end_at_largest_torque(
         knots[side] *= last / knots[end]
 
 
-def _clearance_knots(beyond: Array, ends: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _clearance_knots(beyond: Array, ends: Array) -> Array:
     """Knots of one side, with equal steps across the end of the clearance.
 
     The torsion at which the clearance ends varies with the angle by more than the
@@ -129,11 +115,11 @@ def _clearance_knots(beyond: Array, ends: Array) -> tuple[Array, NDArray[np.bool
             [rad]. Shape (2, n_angles).
 
     Returns:
-        The knots [rad], and a mask of the usual ones among them that are kept (n,).
+        The knots [rad].
     """
     first, last = float(ends[0].min()), float(ends[1].max())
     step = float((ends[1] - ends[0]).mean())
     count = min(LADDER, int(np.ceil((last - first) / step)))
     ladder = np.linspace(first, last, count + 1)
     kept = beyond > last + 0.5 * (ladder[1] - ladder[0])
-    return np.concatenate([ladder, beyond[kept]]), kept
+    return np.concatenate([ladder, beyond[kept]])
