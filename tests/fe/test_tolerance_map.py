@@ -76,14 +76,16 @@ def test_turn_of_the_map_is_that_of_the_superposition(drive):
 
 @pytest.mark.timeout(1800)  # about 300 CPU seconds
 def test_map_of_the_bundled_drive_meets_full_solves():
-    """Between its torques and angles, within 10 % of the ripple over the whole turn."""
+    """Between its torques and angles, within 8 % of the ripple over the whole turn."""
     design = Design.load("reference-2d-tolerances")
     drive = fit_map(sample_map(design))
-    # four phases, none of them sampled, of six pitches all over the turn
+    # Of six pitches all over the turn, four phases each. At the first one, whose
+    # stiffness changes fivefold, a map that interpolates over the torsion is off by
+    # 12 % at 29 N·m.
     follow, rests = influences(design, phases=5)
     pitches = np.array([17, 1300, 2711, 4000, 5303, 6900])
     positions = (5 * pitches[:, None] + np.arange(1, 5)).ravel()
-    torques = (0.0, 5.7, 11.0, 19.0, 31.0, 45.0)
+    torques = (0.0, 5.7, 19.0, 29.0, 31.0, 45.0)
     solved = full_solves(design, follow, rests, positions, torques)
     theta = solved.input_angle
     assert theta.size == positions.size * len(torques)
@@ -104,11 +106,9 @@ def test_map_of_the_bundled_drive_meets_full_solves():
         here = solved.torque == torque
         heights = map(np.ptp, of_map(everywhere, np.full(1000, torque)))
         wrong = (apart[here], (moment - solved.input_torque)[here])
-        # at 31 N·m the output error has corners between two levels; the harmonics that
-        # the map leaves out are 1.5 % of the input torque
-        for height, difference, rms in zip(heights, wrong, (0.03, 0.026), strict=True):
-            assert np.abs(difference).max() < 0.1 * height
-            assert np.sqrt(np.mean(difference**2)) < rms * height
+        for height, difference in zip(heights, wrong, strict=True):
+            assert np.abs(difference).max() < 0.08 * height
+            assert np.sqrt(np.mean(difference**2)) < 0.02 * height
 
 
 def test_map_survives_its_file(drive, tmp_path):

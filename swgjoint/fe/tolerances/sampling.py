@@ -21,6 +21,11 @@ from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
+from swgjoint.fe.tolerances.unseen import (
+    spread_positions,
+    unseen_positions,
+    unseen_torques,
+)
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import (
     has_errors,
@@ -47,9 +52,10 @@ reference drive, what errors change varies slowly with the torque at most positi
 With the simplified wave generator and without 0.3 and 0.7, the input torque was off by
 9.7 instead of 3.6 % of its peak to peak (rms 4.6 instead of 1.5 %). In 3D the drive is
 linearised without load only."""
-CHECKS = {"2d": 12, "3d": 3}
+CHECKS = {"2d": 24, "3d": 3}
 """Number of positions that are also solved without linearisation to validate the map.
-Each of them takes half a minute in 3D."""
+In 2D they lie between the sampled positions, half of them under negative torques, see
+:mod:`swgjoint.fe.tolerances.unseen`. Each of them takes half a minute in 3D."""
 STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
 """Stages of the sampling of a drive with errors, as reported by the progress."""
 FREE = 100.0
@@ -150,14 +156,17 @@ def sample_tolerances(
     table = np.stack(tables, axis=-1)
     table = table.reshape(*table.shape[:2], -1)
     flawless_table = np.stack(perfect, axis=-1)
-    # spread the checks over the cycle and over the phases of a pitch
-    count = pitches.size * phases
-    checks = CHECKS[model]
-    chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
-    torques = (0.0, rated_torque)
-    tick = _stage(progress, design, 3, checks)
-    solved = full_solves(design, follow, linear, chosen % count, torques, tick, keep)
     torque = np.concatenate([-levels[::-1], [0.0], levels])
+    tick = _stage(progress, design, 3, CHECKS[model])
+    chosen = spread_positions(pitches.size, phases, CHECKS[model])
+    torques, signs = np.array([0.0, rated_torque]), np.ones(chosen.size)
+    if model == "2d":
+        # half way to the next positions
+        chosen, signs = unseen_positions(table[0], torque, chosen)
+        follow, linear = influences(design, phases=2 * phases)
+        chosen = 2 * chosen + 1
+        torques = unseen_torques(levels, rated_torque, has_play=has_play)
+    solved = full_solves(design, follow, linear, chosen, torques, signs, tick, keep)
     if has_play:
         table, torque = with_mean_clearance(table, levels)
         flawless_table, _ = with_mean_clearance(flawless_table, levels)
@@ -178,7 +187,8 @@ def full_solves(
     follow: Follower[Any],
     rests: Sequence[Rest],
     positions: Index,
-    torques: Sequence[float],
+    torques: Array | Sequence[float],
+    signs: Array | None = None,
     tick: Callable[[], None] = lambda: None,
     keep: Unfinished | None = None,
 ) -> FullSolves:
@@ -191,6 +201,7 @@ def full_solves(
         positions: Numbers of the positions in the cycle, which has ``len(rests)``
             positions per pitch (n,).
         torques: Torques T at each position [N·m].
+        signs: Factors of the torques, one per position (n,) [-]; None for one.
         tick: Called after every position.
         keep: Store of solved positions, which a resumed run reads; None stores none.
 
@@ -201,11 +212,13 @@ def full_solves(
     step = pitch_of(design) / len(rests)
     pitch, phase = np.divmod(positions, len(rests))
 
-    def solved(k: int, errors: tuple[Array, ...]) -> Array:
+    factors = np.ones(len(positions)) if signs is None else signs
+
+    def solved(k: int, errors: tuple[Array, ...], loads: Array) -> Array:
         rows = []
         flawed, rest = follow.with_errors(*errors), rests[phase[k]]
         state = rest.state
-        for torque in torques:
+        for torque in loads.tolist():
             if torque == 0.0 and rest.opposite is not None:
                 # midway between both ends of the clearance
                 states = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
@@ -221,11 +234,12 @@ def full_solves(
         return np.array(rows)
 
     for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
-        at = np.array([(step * positions[k], torque) for torque in torques])
+        loads = factors[k] * np.asarray(torques) + 0.0  # no negative zero
+        at = np.array([(step * positions[k], torque) for torque in loads])
         name = _CHECK.format(k)
         table = None if keep is None else keep.read(name, partial(_checked, at))
         if table is None:
-            table = solved(k, errors)
+            table = solved(k, errors, loads)
             if keep is not None:
                 keep.write(name, {"table": table})
         tables.append(table)
