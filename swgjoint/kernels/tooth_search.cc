@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kHalf = 0.6;  // half a spacing of samples, on a strained flank
 
 Vec rotate(Vec v, double cos, double sin) {
   return {cos * v.x - sin * v.y, sin * v.x + cos * v.y};
@@ -42,11 +41,6 @@ void to_mirrored(const double* flank, std::size_t nodes, std::int64_t sector,
     mirrored[2 * k] = sign * from[2 * k];
     mirrored[2 * k + 1] = from[2 * k + 1];
   }
-}
-
-// Whether both of two samples are known to be far; an infinite gap tells nothing.
-bool far_apart(double one, double other, double far) {
-  return one > far && other > far && one < kInfinity && other < kInfinity;
 }
 
 }  // namespace
@@ -84,15 +78,6 @@ void FlankShapes::fit(std::size_t flank) const {
     }
   }
   fitted_[flank] = 1;
-}
-
-double FlankShapes::largest() const {
-  double square = 0.0;
-  for (std::size_t i = 0; i < spline_.nodes * flanks_; ++i) {
-    const Vec node{nodes_[2 * i], nodes_[2 * i + 1]};
-    square = std::max(square, dot(node, node));
-  }
-  return std::sqrt(square);
 }
 
 void FlankShapes::evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const {
@@ -236,13 +221,10 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
   }
 }
 
-// Gaps at samples of a flank; none if no sample reaches a radius. A sample is at most half
-// a spacing of coarser ones away from the nearest of them, and its gap differs at most as
-// much: between two coarse samples with a gap above far, all are far.
+// Gaps at samples of a flank; none if no sample reaches a radius.
 std::vector<double> ToothSearch::gaps(const double* mirrored, const Pose& pose,
-                                      bool rigid, const Samples& samples, double radius,
-                                      const std::vector<double>& coarse,
-                                      double far) const {
+                                      bool rigid, const Samples& samples,
+                                      double radius) const {
   const std::size_t n = samples.stations.size(), nodes = spline_.nodes;
   std::vector<Vec> points(n);
   bool deep = false;
@@ -258,16 +240,10 @@ std::vector<double> ToothSearch::gaps(const double* mirrored, const Pose& pose,
   }
   std::vector<double> gaps;
   if (!deep) return gaps;
-  gaps.resize(n);
+  gaps.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
-    if (!coarse.empty()) {
-      const std::size_t k = i * (coarse.size() - 1) / (n - 1);
-      if (far_apart(coarse[k], coarse[std::min(k + 1, coarse.size() - 1)], far)) {
-        gaps[i] = kInfinity;
-        continue;
-      }
-    }
-    gaps[i] = see(points[i], samples.at[i].normal, pose, rigid, nullptr, 2).foot.gap;
+    gaps.push_back(
+        see(points[i], samples.at[i].normal, pose, rigid, nullptr, 2).foot.gap);
   }
   return gaps;
 }
@@ -278,9 +254,6 @@ std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
   std::vector<Samples> fine;
   if (sampling.dense > 0) fine.emplace_back(flexspline_, spline_, low_, high_, sampling.dense);
   const Samples& used = fine.empty() ? coarse : fine.front();
-  // the coarse sampling neglects the displacements of the circular spline
-  const double far = sampling.limit + 2.0 * flanks_.largest() +
-                     kHalf * (coarse.stations[1] - coarse.stations[0]);
   std::vector<Place> found;
   std::vector<double> mirrored(2 * spline_.nodes), of_found, stations;
   std::vector<std::int64_t> sector, side;
@@ -288,12 +261,11 @@ std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
     for (std::int64_t f = 0; f < 2; ++f) {
       to_mirrored(flank, spline_.nodes, s, f, mirrored.data());
       const Pose pose = pose_of(s, f);
-      std::vector<double> gap =
-          gaps(mirrored.data(), pose, true, coarse, sampling.radius, {}, 0.0);
+      std::vector<double> gap = gaps(mirrored.data(), pose, true, coarse, sampling.radius);
       if (gap.empty()) continue;
       if (!(*std::min_element(gap.begin(), gap.end()) < sampling.limit)) continue;
       if (!fine.empty()) {
-        gap = gaps(mirrored.data(), pose, rigid(), used, sampling.radius, gap, far);
+        gap = gaps(mirrored.data(), pose, rigid(), used, sampling.radius);
       }
       for (std::size_t k = 0; k < gap.size(); ++k) {
         const double before = k > 0 ? gap[k - 1] : kInfinity;

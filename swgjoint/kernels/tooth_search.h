@@ -36,9 +36,6 @@ class FlankShapes {
   double low() const { return spline_.breaks[0]; }
   double high() const { return spline_.breaks[spline_.intervals]; }
 
-  // Largest displacement of a node.
-  double largest() const;
-
   // Displacement of a flank and its derivative with respect to the arc length.
   void evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const;
 
@@ -154,8 +151,7 @@ class ToothSearch {
                  double* curvature) const;
 
   std::vector<double> gaps(const double* mirrored, const Pose& pose, bool rigid,
-                           const struct Samples& samples, double radius,
-                           const std::vector<double>& coarse, double far) const;
+                           const struct Samples& samples, double radius) const;
 
   const Profile& flexspline_;
   NodeSpline spline_;

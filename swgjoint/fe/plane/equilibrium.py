@@ -33,10 +33,6 @@ CIRCULAR_SPLINE_RANGE = 0.2
 in lobe heights [-]. At half of it the input torque still agrees with the derivative of
 the energy to seven digits."""
 
-CLOSE_STEP = 0.005
-"""Largest increment of the nodes after which a search for close candidates, within 0.02
-lobe heights, is known to have been sufficient, in lobe heights [-]."""
-
 TOUCH = 1e-15
 """Largest gap that counts as zero [m]."""
 
@@ -94,11 +90,16 @@ class NewtonSolver:
                 thorough = bool(history) and history[-1] < self.thorough_below
                 # after three iterations or a small step only close candidates matter
                 close = thorough or iteration > 2
-                args = model, state, linear, load
-                found = None if close else self._small_step(*args)
-                problem, step = found or self._step(
-                    *args, thorough=thorough, close=close
+                reach = (0.02 if close else 0.1) * model.lobe_height
+                contacts = linear.no_contacts
+                if load.teeth:
+                    contacts = linear.search.search(
+                        linear.flank, reach, state.contacts, thorough=thorough
+                    )
+                problem = NewtonProblem.from_candidates(
+                    model, state, linear, load, contacts
                 )
+                step = problem.solve()
                 for _ in range(self.exchanges):
                     wrong = _stations_to_exchange(problem, step, self.exchange_below)
                     if wrong is None:
@@ -142,55 +143,6 @@ class NewtonSolver:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
         return _finished(model, state, outcome, history, self.circular_spline_range)
-
-    def _small_step(
-        self, model: SectorModel, state: State, linear: Linearised, load: Load
-    ) -> tuple[NewtonProblem, NewtonStep] | None:
-        """Step with close candidates only, from a state whose contacts are known.
-
-        The arguments are those of :meth:`_step`.
-
-        Returns:
-            None if the contacts are not known, if the close candidates are too few, or
-            if the step is so large that others might touch.
-        """
-        if state.contacts is None:
-            return None
-        try:
-            found = self._step(model, state, linear, load, thorough=False, close=True)
-        except ActiveSetError:
-            return None
-        small = found[1].largest < CLOSE_STEP * model.lobe_height
-        return found if small else None
-
-    def _step(
-        self,
-        model: SectorModel,
-        state: State,
-        linear: Linearised,
-        load: Load,
-        *,
-        thorough: bool,
-        close: bool,
-    ) -> tuple[NewtonProblem, NewtonStep]:
-        """Step at a linearisation with the tooth contacts found there.
-
-        Args:
-            model: The 2D model.
-            state: State at which the ring was linearised.
-            linear: The linearised ring.
-            load: Prescribed torque or rotation.
-            thorough: Whether the contact search is thorough.
-            close: Whether only close points are candidates.
-        """
-        contacts = linear.no_contacts
-        if load.teeth:
-            reach = (0.02 if close else 0.1) * model.lobe_height
-            contacts = linear.search.search(
-                linear.flank, reach, state.contacts, thorough=thorough
-            )
-        problem = NewtonProblem.from_candidates(model, state, linear, load, contacts)
-        return problem, problem.solve()
 
 
 def _stations_to_exchange(
