@@ -469,7 +469,7 @@ def test_a_map_with_errors_has_its_bearing():
         assert 0.98 * torsion[1] < torsion[0] < 1.15 * torsion[1]
         assert torsion[0] > 4.0 * torsion[2]
     rows = found.info["validation"]["rows"]
-    # half of the solves are where the drive is softest; within the clearance, six angles
+    # half of the solves are where the drive is softest; in the clearance, six angles
     # do not follow it, and the record says so
     at = [row for row in rows if abs(row["torque_Nm"]) == 5.0]
     assert len(at) == 2
