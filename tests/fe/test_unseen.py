@@ -24,6 +24,9 @@ SEEN = 0.7
 """Smallest part of the largest difference at these equilibria that a record states."""
 LESS_SEEN = {"own 140/142": 0.6}
 """Designs whose record states less: 1.8 instead of 2.8 % of the input torque."""
+PATHS = 0.004
+"""Scatter of one equilibrium over the path to it, in the peak to peak: dca-80-to-1 at
+16.6 N·m has 0.0033 of its 2.3 mN·m of input torque over five paths."""
 DESIGNS = (
     "reference-2d",
     "reference-2d-dca",
@@ -172,7 +175,7 @@ def check(design: Design, seen: float = SEEN) -> None:
         wrong = compared.at(state, theta)[column][0]
         (row,) = (r for r in record["rows"] if r["torque_Nm"] == torque)
         own = abs(wrong) / row[f"{key}_pp_{unit}"]
-        assert own == pytest.approx(stated["largest"], rel=0.1)
+        assert own == pytest.approx(stated["largest"], rel=0.1, abs=PATHS)
     assert record["solves"] > 100
     assert record["secant_stiffness"]["largest"] < GOAL[0]
 
