@@ -155,15 +155,8 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     Args:
         joints: Figures by joint, see :meth:`swgjoint.sim.run.Run.metrics`.
     """
-    lines = []
+    lines = _doubts(joints)
     for name, joint in joints.items():
-        doubt = joint_doubt(joint)
-        if doubt is not None and joint["ripple_valid"]:
-            low, high = joint["map_difference"]["torque_range_Nm"]
-            lines.append(
-                f"{name}: torque ripple is uncertain from {low:.4g} to {high:.4g} N·m:"
-                f" the map of {joint['drive']} {doubt}"
-            )
         if joint["ripple_is_lower_bound"] and (carries := joint["resolving"]):
             lines.append(
                 f"{name}: ripple is a lower bound: the step leaves out orders with"
@@ -227,3 +220,19 @@ def left_out_share(run: Run, j: int) -> float:
     """
     left = run.assembly.transmissions[j].attached.unresolved
     return float(np.sqrt(sum(item.torque**2 for item in left)))
+
+
+def _doubts(joints: Mapping[str, Any]) -> list[str]:
+    """Joints with an uncertain ripple, one line for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for name, joint in joints.items():
+        doubt = joint_doubt(joint)
+        if doubt is not None and joint["ripple_valid"]:
+            low, high = joint["map_difference"]["torque_range_Nm"]
+            reason = f"the map of {joint['drive']} {doubt}"
+            where = f"{name} ({low:.4g} to {high:.4g} N·m)"
+            reasons.setdefault(reason, []).append(where)
+    return [
+        f"{', '.join(where)}: torque ripple is uncertain: {reason}"
+        for reason, where in reasons.items()
+    ]

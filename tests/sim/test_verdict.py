@@ -263,6 +263,11 @@ def test_uncertain_ripple_is_a_warning_at_its_figures(bench, synthetic_map):
     assert (found["verdict"], found["reasons"]) == ("VALID", [])
     (line,) = warnings_of(found["joints"])
     assert names(line, "joint", "synthetic", "output error", "20 %", "N·m")
+    # joints with the same reason share its line
+    both = dict.fromkeys(("first", "second"), found["joints"]["joint"])
+    (shared,) = warnings_of(both)
+    assert shared.startswith("first (") and ", second (" in shared
+    assert shared.partition(":")[2] == line.partition(":")[2]
     cells = joint_row(("joint", found["joints"]["joint"]))
     assert [k for k, cell in enumerate(cells) if cell.startswith("~ ")] == [5, 6, 7, 8]
     # a difference of 1e-6 rad is nothing of an error that is mostly torsion
