@@ -64,7 +64,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         ``scene``, ``joints`` (names of the compared joints; null for all), ``rows``,
         ``spec``, ``passed`` and ``kept_by`` (arguments that meet every limit), both
-        null without limits, ``columns``, ``notes``, ``files``.
+        null without limits, ``columns``, ``assumed_rotors`` (joints in which the
+        rotor inertia assumed for a drive comes with it; the others keep that of the
+        scene), ``notes``, ``files``.
 
     Raises:
         InputError: If ``--sort`` names an unknown quantity.
@@ -85,7 +87,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             f"--sort {args.sort}: unknown key; {hint}accepted: {', '.join(SORTABLE)}"
         )
     spec = limits_of(args, SORTABLE)
-    scene = scene_or_arm(args.scene, args.overrides)
+    scene, assumed_rotors = scene_or_arm(args.scene, args.overrides)
     require_cycle(scene, {args.sort, *(spec or {})} - {None})
     joints = joints_named(scene, args.joints)
     stepped = any(text.startswith("simulation.step_s") for text in args.overrides)
@@ -98,6 +100,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         spec=spec,
         fatigue=SLOW in {args.sort, *(spec or {})},
         joints=joints,
+        assumed_rotors=assumed_rotors,
         progress=args.progress,
     )
     if args.sort is not None:
@@ -115,6 +118,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         if spec is None
         else [row.argument for row in rows if not row.missed],
         "columns": columns(rows),
+        "assumed_rotors": list(assumed_rotors),
         "notes": left_out_notes(rows),
         "files": [],
     }
@@ -188,6 +192,7 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         f"scene {result['scene']}, values of the {which}; K1 and stress of the drive",
         table([units, *rows], header=header),
+        rotor_line(result["assumed_rotors"]),
         *result["notes"],
     ]
     for row in result["rows"]:
@@ -200,3 +205,13 @@ def report(result: dict[str, Any]) -> str:
         passing = ", ".join(result["kept_by"])
         lines.append(f"all limits are met by: {passing or 'none'}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
+
+
+def rotor_line(assumed: list[str]) -> str:
+    """State whether the rotor inertia changes with the drive."""
+    if assumed:
+        return (
+            "rotor inertia: assumed for each drive, as by run of the arm; to keep one:"
+            " --set defaults.rotor_inertia_kgm2=VALUE"
+        )
+    return "rotor inertia: that of the scene with every drive"

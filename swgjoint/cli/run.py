@@ -85,7 +85,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``scene``, ``arm``, ``drives_by_rule`` (whether the drives of an arm were
-        selected by rule, as listed in ``drive_choice``), ``strict``, ``contains``,
+        selected by rule, as listed in ``drive_choice``), ``rotors_assumed`` (whether
+        rotor inertias are assumed unless ``--set`` states them), ``strict``,
+        ``contains``,
         ``files``, ``live`` (address of the viewer, or null) and the keys of
         :meth:`swgjoint.sim.run.Run.metrics`, such as ``joints``, ``tool`` and
         ``steps_per_s``.
@@ -136,6 +138,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "scene": scene.name,
         "arm": {"file": str(arm.path), "held": arm.held, "pose": scene.pose},
         "drives_by_rule": of_arm and args.drive is None,
+        "rotors_assumed": of_arm,
         "strict": args.strict,
         "drive_choice": choice or {},
         **result.metrics(),
@@ -177,6 +180,7 @@ def report(result: dict[str, Any]) -> str:
         f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
+        *(rotor_lines(contains) if result["rotors_assumed"] else []),
         *assumed_lines(contains),
         *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],
@@ -193,6 +197,22 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     return [
         f"{metrics['verdict']}: the results below do not describe this scene",
         *(f"  {reason}" for reason in metrics["reasons"]),
+    ]
+
+
+def rotor_lines(contains: dict[str, Any]) -> list[str]:
+    """Format the rotor inertias of an arm, grouped by joints that share them."""
+    names_by_inertia: dict[float, list[str]] = {}
+    for name, joint in contains["joints"].items():
+        names_by_inertia.setdefault(joint["rotor_inertia_kgm2"], []).append(name)
+    every = len(names_by_inertia) == 1
+    values = "; ".join(
+        f"{inertia:g} kg·m²" + ("" if every else f" ({', '.join(names)})")
+        for inertia, names in names_by_inertia.items()
+    )
+    return [
+        f"rotor inertia: {values}; assumed for the drive of the joint unless --set"
+        " states another"
     ]
 
 

@@ -21,7 +21,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.joint import plugin
 from swgjoint.models_path import models_path
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.arm.scene import scene_of_arm
+from swgjoint.sim.arm.scene import assumed_rotor_inertia, scene_of_arm
 from swgjoint.sim.figures.keys import LOWER, UPPER
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.run import run_scene
@@ -122,12 +122,47 @@ def test_the_drive_replaces_that_of_the_named_joints_alone(capsys):
     assert (soft["design"], stiff["design"]) == (SOFT, STIFF)
     scene = scene_of_arm(arm, overrides=quick_scene()[1::2])
     before = [scene.joint_settings(name).drive for name in joints]
-    changed = with_drive(scene, STIFF, joints[:1])
+    changed = with_drive(scene, STIFF, joints[:1], joints)
     after = [changed.joint_settings(name).drive for name in joints]
     assert after == [STIFF, *before[1:]]
     by_hand = run_scene(changed).metrics()["joints"][joints[0]]
     assert stiff["torsion_arcmin"] == abs(by_hand["torsion_arcmin"]["mean"])
     assert soft["torsion_arcmin"] > 3.0 * stiff["torsion_arcmin"]
+
+
+@pytest.mark.parametrize("stated", [None, 3e-4])
+def test_an_arm_has_the_same_figures_as_in_run(stated, capsys):
+    """The rotor inertia is that assumed for the drive, or the one that is stated.
+
+    Before, a compared drive kept the rotor of the drive that the rule had selected.
+    """
+    arm = str(models_path() / "arms" / "two-link.xml")
+    more = [] if stated is None else [f"defaults.rotor_inertia_kgm2={stated}"]
+    keys = [*quick_scene(*more), "--json", "--quiet"]
+    assert main(["compare", STIFF, SOFT, "--scene", arm, *keys]) == 0
+    compared = json.loads(capsys.readouterr().out)
+    assert bool(compared["assumed_rotors"]) == (stated is None)
+    for row in compared["rows"]:
+        assert main(["run", arm, "--drive", row["argument"], *keys]) == 0
+        alone = json.loads(capsys.readouterr().out)
+        joint = alone["joints"][row["joint"]]
+        assert row["ripple_rms_percent"] == joint["ripple_rms_percent"]
+        rotors = {
+            one["rotor_inertia_kgm2"] for one in alone["contains"]["joints"].values()
+        }
+        assert rotors == {stated or assumed_rotor_inertia(row["argument"])}
+
+
+def test_compared_drives_keep_the_rotor_inertia_of_a_scene():
+    """Only joints whose rotor inertia is assumed get that of the drive."""
+    scene = scene_of_arm("two-link", drive=SOFT)
+    kept, other = with_drive(scene, STIFF), with_drive(scene, STIFF, (), ["elbow"])
+    soft, stiff = assumed_rotor_inertia(SOFT), assumed_rotor_inertia(STIFF)
+    assert stiff > 5.0 * soft
+    for name in ("shoulder", "elbow"):
+        assert kept.joint_settings(name).rotor_inertia_kgm2 == soft
+    assert other.joint_settings("shoulder").rotor_inertia_kgm2 == soft
+    assert other.joint_settings("elbow").rotor_inertia_kgm2 == stiff
 
 
 def test_the_step_of_an_arm_carries_every_drive_that_is_compared():

@@ -274,7 +274,10 @@ def test_the_sweep_keeps_to_the_limits(tmp_path):
 
 
 def test_drives_by_rule_are_the_smallest_that_carry_the_arm(tmp_path):
-    """Rated torque covers the weight on the sweep, or repeated peak the effort."""
+    """Rated torque covers the weight on the sweep, or repeated peak the effort.
+
+    Every drive has the rotor inertia assumed for it, unless one is stated.
+    """
     rated = {"CSG-14-100": 10, "CSG-17-100": 31, "CSG-20-100": 52, "CSG-25-100": 87}
     arm, scene = RigidArm("ur5e"), scene_of_arm("ur5e")
     assert arm.effort == {}
@@ -288,6 +291,15 @@ def test_drives_by_rule_are_the_smallest_that_carry_the_arm(tmp_path):
     assert (lift.drive, lift.rotor_inertia_kgm2) == ("CSG-25-100", 8.26e-5)
     scene = scene_of_arm(urdf(tmp_path))
     assert scene.joint_settings("lift").drive == "CSG-17-100"  # 60 of 70 N·m
+    changed = scene_of_arm(
+        "ur5e",
+        overrides=[
+            "joints.elbow_joint.drive=CSG-25-100",
+            "joints.wrist_1_joint.rotor_inertia_kgm2=2e-4",
+        ],
+    )
+    rotors = [changed.joint_settings(name).rotor_inertia_kgm2 for name in arm.joints]
+    assert rotors == [6.6e-6, 8.26e-5, 8.26e-5, 2e-4, 6.6e-6, 6.6e-6]
     chosen = scene_of_arm("ur5e", drive="reference-2d")
     assert {chosen.joint_settings(name).drive for name in arm.joints} == {
         "reference-2d"

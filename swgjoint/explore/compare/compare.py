@@ -137,6 +137,7 @@ def compare(
     spec: Mapping[str, float] | None = None,
     fatigue: bool = False,
     joints: Sequence[str] = (),
+    assumed_rotors: Sequence[str] = (),
     progress: Progress = silent,
 ) -> list[Compared]:
     """Run the scene once for every argument, in the given order.
@@ -150,6 +151,8 @@ def compare(
         fatigue: Whether to assess the fatigue of designs with a cup.
         joints: Joints that get the drive or the level, and whose figures count; every
             driven joint if empty.
+        assumed_rotors: Joints in which the rotor inertia assumed for a drive comes with
+            it; the other joints keep the rotor inertia of the scene.
         progress: Called with the stage, the number of finished runs and their total.
 
     Returns:
@@ -164,7 +167,7 @@ def compare(
     scenes = [
         with_level(scene, name, joints)
         if sources[name] is None
-        else with_drive(scene, name, joints)
+        else with_drive(scene, name, joints, assumed_rotors)
         for name in arguments
     ]
     driven = rigid_arm_of(scene).joints

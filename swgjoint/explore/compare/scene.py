@@ -12,7 +12,12 @@ from swgjoint.errors import InputError
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import near_names
-from swgjoint.sim.arm.scene import is_arm, rigid_arm_of, scene_of_arm
+from swgjoint.sim.arm.scene import (
+    arm_scene,
+    assumed_rotor_inertia,
+    is_arm,
+    rigid_arm_of,
+)
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.step_choice import resolving_step
 
@@ -20,12 +25,18 @@ _END = "_joint"
 """Ending of joint names that a pattern may omit."""
 
 
-def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
+def scene_or_arm(
+    reference: str, overrides: Iterable[str] = ()
+) -> tuple[Scene, tuple[str, ...]]:
     """Load a scene from a file or a bundled name, or create one for an arm.
 
     Args:
         reference: Scene file, MJCF or URDF file of an arm, or bundled name.
         overrides: ``key=value`` strings that change the scene.
+
+    Returns:
+        The scene, and the joints of an arm whose rotor inertia is assumed for their
+        drive; a scene states that of its joints.
 
     Raises:
         InputError: If the reference is neither a scene nor an arm, or if a change is
@@ -33,8 +44,9 @@ def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
     """
     overrides = list(overrides)
     if is_arm(reference):
-        return scene_of_arm(reference, overrides=overrides)
-    return Scene.load_file(reference, overrides)
+        made = arm_scene(reference, overrides=overrides)
+        return made.scene, made.assumed_rotors
+    return Scene.load_file(reference, overrides), ()
 
 
 def resolve_step(
@@ -110,19 +122,33 @@ def _fits(name: str, pattern: str) -> bool:
     return any(fnmatchcase(n, pattern) for n in (name, name.removesuffix(_END)))
 
 
-def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scene:
+def with_drive(
+    scene: Scene,
+    reference: str,
+    joints: Sequence[str] = (),
+    assumed_rotors: Sequence[str] = (),
+) -> Scene:
     """The scene with another drive in some joints.
 
     Args:
         scene: The scene.
         reference: Design, map or catalogue drive.
         joints: Joints that get it; every driven joint if empty.
+        assumed_rotors: Joints in which the rotor inertia assumed for a drive comes with
+            it; the other joints keep the rotor inertia of the scene.
     """
 
     def changed(section: JointSection) -> JointSection:
         return section.with_drive(reference) if joints or section.has_drive else section
 
-    return _changed(scene, changed, joints)
+    replaced = _changed(scene, changed, joints)
+    rotor = {"rotor_inertia_kgm2": assumed_rotor_inertia(reference)}
+    sections = dict(replaced.joints)
+    for name in assumed_rotors:
+        if name in joints or not joints:
+            own = sections.get(name, JointSection())
+            sections[name] = own.model_copy(update=rotor)
+    return replaced.model_copy(update={"joints": sections})
 
 
 def with_level(scene: Scene, level: str, joints: Sequence[str] = ()) -> Scene:

@@ -47,6 +47,9 @@ class ArmScene:
     drive_choice: dict[str, DriveChoice]
     """Drives that were selected by rule, by joint; without joints whose drive the user
     chose."""
+    assumed_rotors: tuple[str, ...]
+    """Joints whose rotor inertia is the one assumed for their drive, because the user
+    stated none."""
 
 
 def is_arm(reference: str) -> bool:
@@ -112,8 +115,8 @@ def arm_scene(
 
     Without ``drive``, :func:`swgjoint.sim.arm.drive_choice.choose_drives` selects a
     drive for each joint. This rule is a starting point; the manufacturer of the arm may
-    have chosen other drives. The rotor inertia is twice that of the wave generator of
-    the drive's size, because a motor of equal inertia is assumed.
+    have chosen other drives. The rotor inertia of a joint follows its drive, see
+    :func:`assumed_rotor_inertia`, unless the changes state one.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
@@ -178,17 +181,16 @@ def arm_scene(
         else:
             raise
     if drive is not None:
-        data["defaults"] |= {"drive": drive, "rotor_inertia_kgm2": _rotor(drive)}
+        data["defaults"] |= {"drive": drive}
         choice = {}
     else:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the run repeats these warnings
             choice = choose_drives(rigid, trajectory_of(scene, rigid))
-        data["joints"] = {
-            joint: {"drive": one.drive, "rotor_inertia_kgm2": _rotor(one.drive)}
-            for joint, one in choice.items()
-        }
+        data["joints"] = {joint: {"drive": one.drive} for joint, one in choice.items()}
     where = f"scene of {reference}"
+    scene = Scene.from_data(data, where=where, overrides=changes)
+    assumed = _add_rotors(data, scene, rigid.joints, drive, changes)
     scene = Scene.from_data(data, where=where, overrides=changes)
     if not changes.keys() & {"simulation", "simulation.step_s"}:
         data["simulation"]["step_s"] = resolving_step(scene, rigid)
@@ -198,7 +200,7 @@ def arm_scene(
         for joint, one in choice.items()
         if scene.joint_settings(joint).drive == one.drive
     }
-    return ArmScene(scene=scene, drive_choice=kept)
+    return ArmScene(scene=scene, drive_choice=kept, assumed_rotors=assumed)
 
 
 def _with_motion(
@@ -325,9 +327,55 @@ def _name(path: Path) -> str:
     return folder if path.stem.lower() == "scene" and folder else path.stem
 
 
-def _rotor(drive: str) -> float:
-    """Inertia of rotor and wave generator of a drive [kg·m²]."""
-    return catalogue_rotor_inertia(drive) or ROTOR_INERTIA
+def assumed_rotor_inertia(drive: str | None) -> float:
+    """Inertia of rotor and wave generator that is assumed for a drive [kg·m²].
+
+    It is twice that of the wave generator of a catalogue drive, because a motor of
+    equal inertia is assumed, and :data:`ROTOR_INERTIA` for other drives.
+
+    Args:
+        drive: Design, map or catalogue name; None for a drive without a name.
+    """
+    known = None if drive is None else catalogue_rotor_inertia(drive)
+    return known or ROTOR_INERTIA
+
+
+def _add_rotors(
+    data: dict[str, Any],
+    scene: Scene,
+    joints: Iterable[str],
+    drive: str | None,
+    changes: Mapping[str, Any],
+) -> tuple[str, ...]:
+    """Add the rotor inertia that is assumed for the drive of every joint.
+
+    Args:
+        data: Tables of the scene; changed in place.
+        scene: The scene of these tables and the user's changes.
+        joints: Names of the joints.
+        drive: Drive of all joints unless the changes state another; None if every joint
+            has its own.
+        changes: The user's changes of the scene.
+
+    Returns:
+        Joints whose rotor inertia is assumed; the user stated that of the others.
+    """
+    key = "rotor_inertia_kgm2"
+    if drive is not None:
+        data["defaults"] |= {key: assumed_rotor_inertia(drive)}
+    if changes.keys() & {"joints", f"defaults.{key}"}:
+        return ()
+    assumed = tuple(
+        joint
+        for joint in joints
+        if not changes.keys() & {f"joints.{joint}", f"joints.{joint}.{key}"}
+    )
+    for joint in assumed:
+        own = scene.joint_settings(joint).drive
+        if own != drive or drive is None:
+            sections = data.setdefault("joints", {})
+            sections.setdefault(joint, {})[key] = assumed_rotor_inertia(own)
+    return assumed
 
 
 def _tool(arm: RigidArm) -> str:
