@@ -51,6 +51,19 @@ def test_one_item_says_nothing_about_the_time_left(clock, first):
     assert stream.shown() == f"{NEW}map: {first + 1}/60 {3 * (59 - first)} s left"
 
 
+def test_a_log_gets_whole_lines_and_few_of_them(clock, capfd):
+    """Redirected: the first call, one line in 5 s and the last call, each at once."""
+    tell = StderrProgress()
+    seen = []
+    for done in range(11):
+        tell("map", done, 10)
+        seen.append(capfd.readouterr().err)
+        clock[0] += 2.0
+    assert seen[0] == "map: 0/10\n" and seen[10] == "map: 10/10 20.0 s\n"
+    assert [k for k, text in enumerate(seen) if text] == [0, 3, 6, 9, 10]
+    assert all(c.isprintable() for text in seen for c in text.strip("\n"))
+
+
 def test_an_open_line_ends_once(clock):
     """A line that is being rewritten ends before a message, a finished one does not."""
     tell = StderrProgress()

@@ -48,10 +48,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.view.run import run_scene
 
     plugin.load()  # reports another MuJoCo before maps are built
-    maps = {
-        name: load_drive(name, model=MODEL, progress=args.progress)
-        for name in DRIVES.values()
-    }
+    maps = {}
+    for number, name in enumerate(DRIVES.values()):
+        # the first line appears before the first result of a map, seconds later
+        args.progress("drives", number, len(DRIVES))
+        maps[name] = load_drive(name, model=MODEL, progress=args.progress)
     scene = Scene.load_file(SCENE)
     scenes = {label: scene.with_drive(drive) for label, drive in DRIVES.items()}
     scenes["rigid"] = next(iter(scenes.values())).with_level("rigid")
