@@ -211,13 +211,14 @@ def unknown(line):
             for extra in group.split(",")
         ]
         return [extra for extra in asked if extra not in extras]
-    if words[0] in ("git", "cd", "cp", "gcc", "g++") or "=" in words[0]:
+    if words[0] in ("git", "cd", "cp", "gcc", "g++", ".") or "=" in words[0]:
+        return []
+    if words[1:3] == ["-m", "venv"]:  # writes the folder that it names
         return []
     if words[0].startswith("./"):  # built by a line before
         return []
     needed = [project["project"]["dependencies"], *extras.values()]
     programs = {re.split(r"[\[>=]", name)[0] for names in needed for name in names}
-    programs |= {"venv"}  # of Python itself
     files = [word for word in words if word.startswith(("tests/", "notebooks/", "."))]
     files += [word for word in words if word.endswith(".py")]
     missing = [name for name in dict.fromkeys(files) if not (ROOT / name).exists()]
