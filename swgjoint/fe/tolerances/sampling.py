@@ -259,7 +259,7 @@ def respond_over_torque(
     errors: tuple[Array, ...],
     levels: Array,
     small: float,
-    tick: Callable[[], None] = lambda: None,
+    tick: Callable[..., None] = lambda parts=1: None,
 ) -> tuple[Array, int]:
     """Output angle, strain energy and compliance at all torques of both signs.
 
@@ -268,7 +268,8 @@ def respond_over_torque(
         errors: Sets of errors, see :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
         levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
         small: Torque that takes up the clearance [N·m].
-        tick: Called after every :data:`CHUNK` sets of errors at a torque.
+        tick: Called with the number of chunks that are done, one by default, of
+            :data:`CHUNK` sets of errors at a torque.
 
     Returns:
         Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
@@ -277,7 +278,7 @@ def respond_over_torque(
     changes: dict[int, Array] = {}
 
     def row(
-        torque: float, chosen: Any, start: Any, tick: Callable[[], None]
+        torque: float, chosen: Any, start: Any, tick: Callable[..., None]
     ) -> tuple[Array, Any]:
         state, at = rest.near(torque)
         if id(at) not in changes:
@@ -305,23 +306,30 @@ def respond_over_torque(
         unloaded, at_rest = row(0.0, slice(None), None, tick)
         # a few free positions do not change the median much
         free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
+    ends: dict[float, tuple[Array, Any]] = {}
     if free.any():
-        ends = [row(t, free, None, lambda: None)[0] for t in (small, -small)]
-        middle = 0.5 * (ends[0] + ends[1])
+        ends = {t: row(t, free, None, lambda: None) for t in (small, -small)}
+        up, down = ends[small][0], ends[-small][0]
+        middle = 0.5 * (up + down)
         middle[1] -= 0.5 * small**2 * middle[2]  # energy stored by the small torque
-        middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
+        middle[2] = 0.5 * (down[0] - up[0]) / small
         unloaded[:, free] = middle
+    chunks = -(-count // CHUNK)
     if rest.opposite is not None:
-        for _ in range(0, count, CHUNK):
-            tick()
+        tick(chunks)
     sides = []
     for sign in (-1.0, 1.0):
         active, before, rows = at_rest, rest.near(0.0)[1], []
         for level in levels:
             at = rest.near(sign * level)[1]
-            # a guess is of use only for the same contacts
-            known = active if at is before else None
-            level_row, active = row(sign * level, slice(None), known, tick)
+            if rest.opposite is not None and sign * level in ends:
+                # all sets are free, so that these problems are solved already
+                level_row, active = ends[sign * level]
+                tick(chunks)
+            else:
+                # a guess is of use only for the same contacts
+                known = active if at is before else None
+                level_row, active = row(sign * level, slice(None), known, tick)
             before = at
             rows.append(level_row)
         sides.append(rows)
