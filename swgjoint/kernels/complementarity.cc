@@ -13,6 +13,11 @@ namespace {
 // the factors cost less than the extra unknowns.
 constexpr std::size_t kFewest = 4, kShare = 12;
 constexpr double kResidual = 1e-4;  // error of an active equation, in tolerances
+// Contacts are exchanged whose violation is at least this fraction of the largest one:
+// the first as long as the number of violations falls, the second if it does not. If all
+// of them were exchanged, the rim could lift off the wave generator in one step, and the
+// search would go around in circles.
+constexpr double kViolated = 0.05, kMostViolated = 0.5;
 
 }  // namespace
 
@@ -75,7 +80,9 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
     }
 
     std::size_t wrong = 0, last = 0;
+    double lowest = 0.0;
     for (std::size_t k = 0; k < n; ++k) {
+      lowest = std::min(lowest, result[k]);
       if (!(result[k] >= -tolerance)) {
         ++wrong;
         last = k;
@@ -97,8 +104,10 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
     if (tries < 0) {
       active[last] = !active[last];
     } else {
+      const double part = tries < p_.tries ? kMostViolated : kViolated;
+      const double limit = std::max(tolerance, -part * lowest);
       for (std::size_t k = 0; k < n; ++k) {
-        if (!(result[k] >= -tolerance)) active[k] = !active[k];
+        if (!(result[k] >= -limit)) active[k] = !active[k];
       }
     }
   }
