@@ -123,6 +123,10 @@ class ArmCore(Core):
             period=task.period,
             steps=steps,
             normalise=bool(s.normalise),
+            gauges={
+                task.joints.names.index(name): one
+                for name, one in assembly.gauges.items()
+            },
             shared=True,
         )
 
@@ -146,9 +150,9 @@ class ArmCore(Core):
             ]
         ).max(axis=0)
 
-        def each(meaning: str, unit: str, top: float) -> Entry:
+        def each(meaning: str, unit: str, top: float, count: int = n) -> Entry:
             top = ceiling(top)
-            return Entry(meaning=meaning, unit=unit, low=-top, high=top, count=n)
+            return Entry(meaning=meaning, unit=unit, low=-top, high=top, count=count)
 
         link_speed = max(float(np.abs(self._path[:, 1]).max()), 0.01)
         torque = max(float(np.abs(self._path[:, 4]).max()), 0.1)
@@ -159,6 +163,13 @@ class ArmCore(Core):
         if self.sensors.torque_sensor:
             top = 1.1 * float(limits.momentary_peak.max())
             further.append(each("measured output torque of every joint", "N·m", top))
+        if self.gauges:
+            top = 1.1 * max(
+                float(limits.momentary_peak[j]) + one.largest_ripple
+                for j, one in self.gauges.items()
+            )
+            what = "output torque that strain gauges read, of every joint with gauges"
+            further.append(each(what, "N·m", top, len(self.gauges)))
         what = {
             "torque": "added motor torque of every joint relative to authority",
             "setpoint": "set-point shift of every joint relative to largest shift",
@@ -256,9 +267,8 @@ def _scene(settings: ArmSettings) -> Scene:
     else:
         scene = Scene.load_file(name)
     for section in (scene.defaults, *scene.joints.values()):
-        for key in ("output_bearing", "gauges"):
-            if getattr(section, key) is not None:
-                raise InputError(f"scene {scene.name!r} has {key}; accepted: none")
+        if section.output_bearing is not None:
+            raise InputError(f"scene {scene.name!r} has output_bearing; accepted: none")
     scene = scene.with_level(settings.level)  # type: ignore[arg-type]
     scene = scene.with_friction(bool(settings.friction))
     return scene.with_kinematic_error(settings.kinematic_error_arcmin)

@@ -26,7 +26,9 @@ class ArmTrackingEnv(SingleEnv):
     =====  =======================================================  ====  =======
 
     Observation for scene ``ur5e-circle``; the last two entries exist only with
-    ``sensors={"link_encoder": True, "torque_sensor": True}``:
+    ``sensors={"link_encoder": True, "torque_sensor": True}``. They are followed by the
+    output torque that strain gauges read [N·m], one entry for each joint to which the
+    scene gives gauges, in the order of the joints:
 
     =====  =====================================  =====  =============
     index  meaning                                unit   range

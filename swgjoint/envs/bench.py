@@ -292,19 +292,19 @@ class BenchCore(Core):
             entries.append(
                 Entry(meaning="measured output torque", unit="N·m", low=-top, high=top)
             )
-        if self.gauges is not None:
-            ripple = self.gauges.largest_ripple
+        for gauges in self.gauges.values():
+            ripple = gauges.largest_ripple
             top = ceiling(1.1 * (float(limits.momentary_peak[0]) + ripple))
             what = "output torque that strain gauges read"
             entries.append(Entry(meaning=what, unit="N·m", low=-top, high=top))
         return tuple(entries)
 
 
-def _gauges(settings: BenchSettings, drive: DriveMap) -> JointGauges | None:
-    """Strain gauges of the settings on the nominal drive."""
+def _gauges(settings: BenchSettings, drive: DriveMap) -> dict[int, JointGauges]:
+    """Strain gauges of the settings on the nominal drive, of joint 0."""
     stated = settings.gauges
     if stated is None:
-        return None
+        return {}
     if not isinstance(stated, Mapping):
         raise InputError(
             f"gauges {format_value(stated)}; accepted: None or a mapping with"
@@ -312,7 +312,7 @@ def _gauges(settings: BenchSettings, drive: DriveMap) -> JointGauges | None:
         )
     section = validate(GaugesSection, stated, where="gauges")
     reference = settings.drive if isinstance(settings.drive, str) else None
-    return gauges_of_drive(section, drive, reference, where="gauges")
+    return {0: gauges_of_drive(section, drive, reference, where="gauges")}
 
 
 def _bench(

@@ -7,7 +7,7 @@ batch are bit-identical. :mod:`swgjoint.envs.api` has the gymnasium interfaces.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -66,7 +66,7 @@ class Core(ABC):
         period: float,
         steps: int,
         normalise: bool,
-        gauges: JointGauges | None = None,
+        gauges: Mapping[int, JointGauges] | None = None,
         shared: bool = False,
     ) -> None:
         """Prepare episodes.
@@ -81,12 +81,13 @@ class Core(ABC):
             period: Control period [s].
             steps: Number of control periods of an episode.
             normalise: Whether observations are divided by :attr:`units`.
-            gauges: Strain gauges on the flexspline of the only joint, if any.
+            gauges: Strain gauges on flexsplines, by number of the joint.
             shared: Whether all episodes follow the same plan.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
-        self.period, self.steps, self.gauges = period, steps, gauges
+        self.period, self.steps = period, steps
+        self.gauges = dict(sorted((gauges or {}).items()))
         if sensors.delay_periods > steps:
             raise InputError(
                 f"sensor delay_periods {sensors.delay_periods}; accepted: at most the"
@@ -94,7 +95,7 @@ class Core(ABC):
             )
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
-        self.readout = Readout(sensors, count, rated, period, gauges=gauges is not None)
+        self.readout = Readout(sensors, count, rated, period, gauges=list(self.gauges))
         self.instant = np.zeros(count, dtype=np.intp)
         """Number of control periods since the start. Shape (n,)."""
         size = PlanSize(
@@ -269,9 +270,9 @@ class Core(ABC):
             parts.append(self.link_angle)
         if self.sensors.torque_sensor:
             parts.append(self.output_torque)
-        if self.gauges is not None:
-            angles = self.motor_angle, self.link_angle
-            parts.append(self.gauges.read_torque(self.output_torque, *angles))
+        for j, gauges in self.gauges.items():
+            true = self.output_torque, self.motor_angle, self.link_angle
+            parts.append(gauges.read_torque(*(one[:, j : j + 1] for one in true)))
         return np.concatenate(parts, axis=1)
 
     def observation(self) -> Array:
@@ -288,7 +289,10 @@ class Core(ABC):
         return self._low / self.units, self._high / self.units
 
     def readings(self) -> list[Array]:
-        """Readings of link encoder, torque sensor and gauges, if any. (n, n_joints)."""
+        """Readings of link encoder, torque sensor and gauges, if any.
+
+        Shapes (n, n_joints); that of gauges is (n, n_gauged).
+        """
         n, value = len(self.joints.names), self.readout.value
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
@@ -350,7 +354,7 @@ class Core(ABC):
         """Sensor readings in observations with any leading axes, for controllers."""
         observation = observation * self.units
         n, last = len(self.joints.names), observation.shape[-1]
-        last -= n if self.gauges is not None else 0
+        last -= len(self.gauges)
         torque = last - n if self.sensors.torque_sensor else None
         link = (torque or last) - n if self.sensors.link_encoder else None
 

@@ -54,7 +54,7 @@ class JointEpisode(ABC):
         ]
         entries = *bounds(core.observation_entries), core.units
         self._bounds = list(zip(*(one.tolist() for one in entries), strict=True))
-        self._sensors, self._gauges = core.sensors, core.gauges
+        self._sensors, self._gauges = core.sensors, core.gauges.get(0)
         self._channels = core.readout.channel_errors()
         self._advance = core.plant.step_one
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -86,8 +86,9 @@ class Sensors:
 class Readout:
     """Readings of n simulations over time.
 
-    The channels are the motor angles of all joints, followed by the link angles, the
-    output torques and the torques that strain gauges read if there are such sensors.
+    The channels are the motor angles of all joints, followed by the link angles and the
+    output torques if there are such sensors, and by the torques that strain gauges
+    read at the joints that have them.
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class Readout:
         rated_torque: Array,
         period: float,
         *,
-        gauges: bool = False,
+        gauges: Sequence[int] = (),
     ) -> None:
         """Prepare the channels of all simulations.
 
@@ -106,7 +107,7 @@ class Readout:
             count: Number of simulations.
             rated_torque: Rated torque of every drive [N·m]. Shape (n_joints,).
             period: Control period [s].
-            gauges: Whether strain gauges read the torque.
+            gauges: Numbers of the joints with strain gauges.
         """
         joints, self._period = len(rated_torque), period
         one = np.ones(joints)
@@ -117,9 +118,10 @@ class Readout:
             parts.append(
                 (_count(sensors.link_counts) * one, sensors.link_noise_rad * one)
             )
-        parts += [(0.0 * one, sensors.torque_noise_of_rated * rated_torque)] * (
-            int(sensors.torque_sensor) + int(gauges)
-        )
+        noise = sensors.torque_noise_of_rated * rated_torque
+        if sensors.torque_sensor:
+            parts.append((0.0 * one, noise))
+        parts.append((0.0 * one[list(gauges)], noise[list(gauges)]))
         self._resolution, self._noise = map(np.concatenate, zip(*parts, strict=True))
         self._coarse = self._resolution > 0.0
         self._rounds = self._resolution[self._coarse]

@@ -1,4 +1,4 @@
-"""Strain gauges of the environments on the bench: what they read, and the refusals."""
+"""Strain gauges of the environments: what they read, and the refusals."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import swgjoint.envs  # noqa: F401  (registers the environments)
 from swgjoint.errors import InputError
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.gauges import FlexsplineWall, GaugeRing
+from swgjoint.models_path import models_path
 
 GAUGES = {"flexspline": "size-25-100", "position_mm": 13.0, "strain": "outline"}
 EXACT = {
@@ -84,6 +85,45 @@ def test_measurements_for_controllers_keep_their_places():
         want = (observation * env.core.units)[9:11]
         assert runs[-1].link_angle == want[:1]
         assert runs[-1].output_torque == want[1:]
+
+
+def test_joints_of_an_arm_read_their_own_torque_and_angle(tmp_path):
+    """Two of six joints have gauges; their readings are the last of the observation."""
+    text = (models_path() / "scenes" / "ur5e-catalogue.toml").read_text("utf-8")
+    joints, places = ("shoulder_pan_joint", "elbow_joint"), (12.0, 13.0)
+    for joint, place in zip(joints, places, strict=True):
+        text += f"\n[joints.{joint}.gauges]\nflexspline = 'size-25-100'\n"
+        text += f"position_mm = {place}\nstrain = 'outline'\n"
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    keys = {"scene": str(path), "sensors": EXACT, "normalise": False}
+    env = gymnasium.make("swgjoint/ArmTracking-v0", **keys).unwrapped
+    size = env.observation_space.shape[0]
+    plain = gymnasium.make(
+        "swgjoint/ArmTracking-v0", **keys | {"scene": "ur5e-catalogue"}
+    )
+    assert size == plain.observation_space.shape[0] + 2
+    env.reset(seed=2)
+    rng = np.random.default_rng(1)
+    rows = []
+    for _ in range(200):
+        observation, *_, info = env.step(rng.uniform(-0.2, 0.2, 6))
+        angle = info["motor_angle_rad"] - info["link_angle_rad"]
+        torque = info["output_torque_Nm"]
+        # the torque sensors of the six joints stand before the gauges
+        np.testing.assert_array_equal(observation[-8:-2], torque)
+        gauged = enumerate((0, 2), start=-2)
+        rows.append([(torque[j], angle[j], observation[k]) for k, j in gauged])
+    design = Design.load("size-25-100")
+    for k, place in enumerate(places):
+        torque, beta, reading = np.array(rows)[:, k].T
+        ring = GaugeRing(place=1e-3 * place)
+        strain = FlexsplineWall.from_design(design).strain(ring.place)
+        want = ring.signal(strain, torque, beta) / ring.gain(strain)
+        np.testing.assert_allclose(reading, want, atol=1e-9)
+        assert np.abs(reading - torque).max() > 1.0
+    read = env.core.read_measurements(observation)
+    np.testing.assert_array_equal(read.output_torque, info["output_torque_Nm"])
 
 
 @pytest.mark.parametrize(
