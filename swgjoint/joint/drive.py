@@ -13,7 +13,9 @@ from swgjoint.joint.native import NativeSpring, constant_elements
 from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import Jenkin, Sliders, vary_with_load
+from swgjoint.maps.hysteresis import Jenkin, vary_with_load
+from swgjoint.maps.potential import Law
+from swgjoint.maps.sliders import Sliders
 from swgjoint.typing import Array
 
 LEAST_DAMPING_RATIO = 0.001
@@ -184,6 +186,32 @@ class JointDrive:
             InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
                 :meth:`observe`.
         """
+        return self.signals_and_law(
+            theta, psi, theta_rate, psi_rate, slipping, friction
+        )[0]
+
+    def signals_and_law(
+        self,
+        theta: ArrayLike,
+        psi: ArrayLike,
+        theta_rate: ArrayLike = 0.0,
+        psi_rate: ArrayLike = 0.0,
+        slipping: ArrayLike = 0.0,
+        friction: ArrayLike = 0.0,
+    ) -> tuple[JointSignals, Law | None]:
+        """Result of :meth:`signals`, and the law of the map that it used.
+
+        Args:
+            theta: Rotor positions [rad].
+            psi: Link positions [rad].
+            theta_rate: Rotor velocities [rad/s].
+            psi_rate: Link velocities [rad/s].
+            slipping: Torque of the hysteresis elements along the torsion [N·m].
+            friction: Friction torque of the wave generator [N·m].
+
+        Returns:
+            The signals and the law, which is None at ``linear`` and ``native``.
+        """
         if self.rotor is None:
             raise InputError(
                 f"joint {self.joint!r}: level {self.level} has no rotor, so it has no"
@@ -200,34 +228,22 @@ class JointDrive:
             rate = theta_rate / self.ratio - psi_rate
             spring = self.native
             elastic = spring.torque(-error) if spring else -self.stiffness * error
-            return JointSignals(
+            signals = JointSignals(
                 torsion=-error,
                 transmission_error=error,
                 torque=elastic + self.damping * rate + slipping,
             )
+            return signals, None
         law = self.drive.law(theta, psi)
         rate = law.by_theta * theta_rate + law.by_psi * psi_rate
-        return JointSignals(
+        signals = JointSignals(
             torsion=law.torsion,
             transmission_error=error,
             torque=law.output_force
             - (self.damping * rate + slipping) * law.by_psi
             - self.drive.friction_direction[1] * friction,
         )
-
-    def output_slope(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Torque on the link per torque along the torsion, -dDelta/dpsi [-].
-
-        Args:
-            theta: Rotor angles [rad].
-            psi: Link angles [rad], of a shape that broadcasts with theta.
-
-        Returns:
-            1 minus the derivative of e0 by psi at ``full``; 1 at other levels.
-        """
-        if self.level != "full":
-            return np.ones(np.broadcast(theta, psi).shape)
-        return np.asarray(1.0 - self.drive.error_at(self.drive.phases(theta, psi))[2])
+        return signals, law
 
     def motor_angle(self, psi: ArrayLike) -> Array:
         """Motor angle at zero torsion for link angles [rad], same shape.

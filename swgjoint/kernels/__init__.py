@@ -1,4 +1,4 @@
-"""Compiled versions of the slowest loops of finite elements and environments.
+"""Compiled versions of the slowest loops of finite elements, maps and environments.
 
 The numpy version of each loop is the reference. It explains the method, it runs if the
 package was built without a compiler, and the tests compare the compiled loop with it.

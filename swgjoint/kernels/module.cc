@@ -286,10 +286,12 @@ class RingFactor {
 }  // namespace
 
 // in plane_module.cc and search_module.cc
+void bind_map(nb::module_& m);
 void bind_plane(nb::module_& m);
 void bind_search(nb::module_& m);
 
 NB_MODULE(compiled, m) {
+  bind_map(m);
   bind_plane(m);
   bind_search(m);
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),

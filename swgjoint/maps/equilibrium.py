@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
-from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
+from swgjoint.maps.sliders import Sliders
+from swgjoint.maps.sums import error_sums, potential_sums
 from swgjoint.typing import Array
 
 CHUNK = 2**14
@@ -45,7 +46,7 @@ def output_angle(
     # torsion of the mean curve as a function of torque, for the initial guess
     knots = drive.torsion_knots
     x = np.linspace(2.0 * knots[0], 2.0 * knots[-1], 801)
-    curve = drive.coefficients(x, 1)[:, 0, 0], x
+    curve = drive.coefficients(x, 1, count=1)[:, 0, 0], x
     size = max(1, CHUNK // len(drive.orders))
     parts = [
         _solve(
@@ -106,26 +107,33 @@ def _solve(
 
 
 def _torque(
-    drive: Potential, theta: Array, psi: Array, sliders: Sliders | None
+    drive: Potential,
+    theta: Array,
+    psi: Array,
+    sliders: Sliders | None,
+    *,
+    tangent: bool = True,
 ) -> tuple[Array, Array]:
-    """Torque T on the output [N·m] and the stiffness at fixed phases [N·m/rad]."""
-    phases = drive.phases(theta, psi)
-    cos, sin = np.cos(phases), np.sin(phases)
-    e0, _, e_psi = drive.error_at(phases)
+    """Torque T on the output [N·m] and the stiffness at fixed phases [N·m/rad].
+
+    Without ``tangent`` the second array is empty.
+    """
+    cos, sin, (e0, _, e_psi) = error_sums(drive, drive.phases(theta, psi))
     x = theta / drive.ratio + e0 - psi
-    first, second = drive.coefficients(x, 1), drive.coefficients(x, 2)
-    torque = np.sum(first[..., 0] * cos + first[..., 1] * sin, axis=-1)
-    stiffness = np.sum(second[..., 0] * cos + second[..., 1] * sin, axis=-1)
-    if sliders is not None:
-        elastic, spring = torque, stiffness
-        torque = elastic + sliders.torque(x, elastic)
-        stiffness = spring + sliders.tangent(x, elastic, spring)
+    wanted = ["torque"]
+    if tangent:
+        wanted.append("stiffness")
+    if drive.angle_orders[:, 1].any():
+        wanted.append("by_phase")
+    torque, *others = potential_sums(drive, x, cos, sin, *wanted)
+    stiffness = others.pop(0) if tangent else np.empty(0)
+    if sliders is not None and tangent:
+        slip, slope = sliders.torque_and_tangent(x, torque, stiffness)
+        torque, stiffness = torque + slip, stiffness + slope
+    elif sliders is not None:
+        torque = torque + sliders.torque(x, torque)
     total = torque * (1.0 - e_psi)
-    n_psi = drive.angle_orders[:, 1]
-    if n_psi.any():
-        ab = drive.coefficients(x)
-        total = total - np.sum((ab[..., 1] * cos - ab[..., 0] * sin) * n_psi, axis=-1)
-    return total, stiffness
+    return total - others[1] if others else total, stiffness
 
 
 def _bisect(
@@ -140,7 +148,7 @@ def _bisect(
 
     def excess(psi: Array) -> Array:
         """Torque of the drive minus the given torque [N·m]."""
-        return _torque(drive, theta, psi, sliders)[0] - torque
+        return _torque(drive, theta, psi, sliders, tangent=False)[0] - torque
 
     ends = []
     for sign in (-1.0, 1.0):

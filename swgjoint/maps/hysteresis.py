@@ -45,13 +45,15 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 MAX_ELEMENTS = 64
@@ -107,13 +109,18 @@ class Jenkin:
         """Torsion from rest to slip without load [rad]."""
         return self.yield_torque / self.stiffness
 
+    @cached_property
+    def _curve(self) -> Array:
+        """Elastic torques and yield torques of all points [N·m]. Shape (2, n)."""
+        return np.array([(0.0, self.yield_torque), *self.yield_curve]).T.copy()
+
     def yields(self, elastic: ArrayLike) -> Array:
         """Yield torque f at elastic torques of any shape [N·m].
 
         Args:
             elastic: Elastic torque T of the drive [N·m].
         """
-        at, values = np.array([(0.0, self.yield_torque), *self.yield_curve]).T
+        at, values = self._curve
         return np.asarray(np.interp(np.abs(elastic), at, values))
 
     def reach(self, elastic: ArrayLike) -> Array:
@@ -126,7 +133,7 @@ class Jenkin:
 
     def yield_slopes(self, elastic: ArrayLike) -> Array:
         """Slope of the yield torque over the magnitude of the elastic torque [-]."""
-        at, values = np.array([(0.0, self.yield_torque), *self.yield_curve]).T
+        at, values = self._curve
         slopes = np.append(np.diff(values) / np.diff(at), 0.0)
         interval = np.searchsorted(at, np.abs(elastic), side="right") - 1
         return np.asarray(slopes[interval])
@@ -253,102 +260,6 @@ def check_loads(elements: Sequence[Jenkin], name: str, largest: float) -> None:
             )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sliders:
-    """Parameters and state of the Jenkin elements of a drive; immutable.
-
-    The elastic torque of the drive, an argument of the methods, affects only elements
-    whose yield torque depends on the load.
-    """
-
-    stiffness: Array
-    """Stiffness k [N·m/rad]. Shape (n,)."""
-    reach: Array
-    """Yield torsion f/k without load [rad]. Shape (n,)."""
-    rest: Array
-    """Torsion r at which each element is currently relaxed [rad]. Shape (n,)."""
-    elements: tuple[Jenkin, ...] = ()
-    """The elements, if their yield torques depend on the load; otherwise empty."""
-
-    @classmethod
-    def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
-        """State in which all elements are relaxed at a torsion.
-
-        Args:
-            elements: Jenkin elements of the drive.
-            torsion: Torsion at which they carry no torque [rad].
-        """
-        return cls(
-            stiffness=np.array([e.stiffness for e in elements], dtype=float),
-            reach=np.array([e.yield_torsion for e in elements], dtype=float),
-            rest=np.full(len(elements), torsion, dtype=float),
-            elements=tuple(elements) if vary_with_load(elements) else (),
-        )
-
-    def move_to(self, torsion: float, elastic: float = 0.0) -> Sliders:
-        """State after a monotone path to a torsion.
-
-        Args:
-            torsion: Torsion at the end [rad].
-            elastic: Elastic torque there [N·m].
-        """
-        reach = self._reach(elastic)
-        rest = np.clip(self.rest, torsion - reach, torsion + reach)
-        return replace(self, rest=rest)
-
-    def torque(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
-        """Total torque after a monotone path to each torsion [N·m].
-
-        Args:
-            torsion: Torsions, each reached along a monotone path [rad].
-            elastic: Elastic torque T at each of them [N·m].
-        """
-        return np.asarray(self._stretch(torsion, elastic) @ self.stiffness)
-
-    def tangent(
-        self,
-        torsion: ArrayLike,
-        elastic: ArrayLike = 0.0,
-        stiffness: ArrayLike = 0.0,
-    ) -> Array:
-        """Derivative of the total torque by the torsion [N·m/rad].
-
-        Args:
-            torsion: Torsion, reached along a monotone path [rad].
-            elastic: Elastic torque T there [N·m].
-            stiffness: Stiffness dT/dx there [N·m/rad].
-        """
-        stretch = self._stretch(torsion, elastic)
-        sticks = np.abs(stretch) < self._reach(elastic)
-        total = sticks @ self.stiffness
-        if not self.elements:
-            return np.asarray(total)
-        # a slipping element follows its yield torque
-        slopes = np.stack([e.yield_slopes(elastic) for e in self.elements], -1)
-        follows = np.sum(np.where(sticks, 0.0, np.sign(stretch)) * slopes, axis=-1)
-        return np.asarray(total + follows * np.sign(elastic) * np.asarray(stiffness))
-
-    def energy(self, torsion: ArrayLike, elastic: ArrayLike = 0.0) -> Array:
-        """Strain energy of the springs after a monotone path to each torsion [J].
-
-        Args:
-            torsion: Torsions, each reached along a monotone path [rad].
-            elastic: Elastic torque T at each of them [N·m].
-        """
-        return np.asarray(0.5 * self._stretch(torsion, elastic) ** 2 @ self.stiffness)
-
-    def _reach(self, elastic: ArrayLike) -> Array:
-        """Yield torsion of each element at each elastic torque (..., n)."""
-        if not self.elements:
-            return self.reach
-        return np.stack([element.reach(elastic) for element in self.elements], -1)
-
-    def _stretch(self, torsion: ArrayLike, elastic: ArrayLike) -> Array:
-        """Stretch of each element after a monotone path to each torsion (..., n)."""
-        x, reach = np.asarray(torsion, float)[..., None], self._reach(elastic)
-        return np.asarray(np.clip(x - self.rest, -reach, reach))
-
-
 def play_hysteresis(
     elements: Sequence[Jenkin], torsion: Array, elastic: Array | float = 0.0
 ) -> Array:
@@ -384,6 +295,11 @@ def stretches(torsion: Array, reach: ArrayLike) -> Array:
             one value.
     """
     x, count = np.asarray(torsion, float), len(torsion)
+    if (native := kernels()) is not None and x.ndim == 1:
+        result = np.empty(count)
+        limit = np.ascontiguousarray(np.broadcast_to(reach, x.shape), dtype=float)
+        native.stretches(np.ascontiguousarray(x), limit, result)
+        return result
     parts = -(-count // (size := max(1, round(count**0.5))))
     # intervals by part and step in the part; those that fill the last part clip nothing
     low, high = np.full((2, parts * size), [[-np.inf], [np.inf]])

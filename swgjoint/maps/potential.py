@@ -20,6 +20,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -32,6 +33,7 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
+from swgjoint.maps.sums import derivative_sum, error_sums, potential_sums
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -46,6 +48,8 @@ class Law:
     """Derivative of the torsion by the input angle theta [-]."""
     by_psi: Array
     """Derivative of the torsion by the output angle psi [-]."""
+    torque: Array
+    """Elastic torque dV/d(torsion) at fixed angles [N·m]."""
     input_force: Array
     """Generalised force on the input, -dV/dtheta [N·m]."""
     output_force: Array
@@ -133,11 +137,13 @@ class Potential:
         """Signed ratio i [-]; the ideal output angle is theta/i."""
         return ratio(self.layout, self.teeth_flexspline, self.teeth_circular_spline)
 
-    @property
+    @cached_property
     def angle_orders(self) -> NDArray[np.int64]:
         """Derivatives of each phase by theta and psi [-]. Shape (n_harmonics, 2)."""
         alpha, beta = angle_coefficients(self.layout)
-        return np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
+        orders = np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
+        orders.setflags(write=False)
+        return orders
 
     @property
     def friction_direction(self) -> tuple[int, int]:
@@ -161,15 +167,7 @@ class Potential:
 
         ``phases`` are those of :meth:`phases` [rad]. Shape (..., n_harmonics).
         """
-        cos, sin = np.cos(phases), np.sin(phases)
-        a, b = self.kinematic_error.T
-        slope = b * cos - a * sin
-        n_theta, n_psi = self.angle_orders.T
-        return (
-            np.sum(a * cos + b * sin, axis=-1),
-            np.sum(slope * n_theta, axis=-1),
-            np.sum(slope * n_psi, axis=-1),
-        )
+        return error_sums(self, phases)[2]
 
     def torsion(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Torsion theta/i + e0 - psi [rad].
@@ -184,12 +182,15 @@ class Potential:
 
     # -- potential ------------------------------------------------------------
 
-    def coefficients(self, torsion: ArrayLike, derivative: int = 0) -> Array:
+    def coefficients(
+        self, torsion: ArrayLike, derivative: int = 0, *, count: int | None = None
+    ) -> Array:
         """A and B, or their first or second derivative, at the given torsion.
 
         Args:
             torsion: Torsion of any shape [rad].
             derivative: Order of the derivative by the torsion, 0 to 2.
+            count: Number of harmonics to evaluate, 1 for the mean; None for all.
 
         Returns:
             A and B [J], their first [N·m] or second derivative [N·m/rad]. Shape (...,
@@ -200,10 +201,10 @@ class Potential:
         inside = np.clip(x, knots[0], knots[-1])
         j = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
         d = (inside - knots[j])[..., None, None]
-        c = np.moveaxis(self.potential, 2, 0)[j]  # (..., n_harmonics, 2, 5)
+        c = np.moveaxis(self.potential[:count], 2, 0)[j]  # (..., n_harmonics, 2, 5)
         out = (x - inside)[..., None, None]
         beyond = bool(out.any())
-        low, high = self.end_stiffness[..., 0], self.end_stiffness[..., 1]
+        low, high = np.moveaxis(self.end_stiffness[:count], 2, 0)
         k_end = np.where(out < 0, low, high) if beyond else high
         if derivative == 2:
             v2 = 2 * c[..., 2] + d * (6 * c[..., 3] + d * 12 * c[..., 4])
@@ -219,10 +220,8 @@ class Potential:
 
     def _sum(self, torsion: ArrayLike, phases: Array, derivative: int) -> Array:
         """A derivative of V by the torsion at given phases."""
-        ab = self.coefficients(torsion, derivative)
-        return np.asarray(
-            np.sum(ab[..., 0] * np.cos(phases) + ab[..., 1] * np.sin(phases), axis=-1)
-        )
+        cos, sin, _ = error_sums(self, phases)
+        return derivative_sum(self, torsion, cos, sin, derivative)
 
     def energy(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Potential V at given torsion and angles [J].
@@ -274,25 +273,18 @@ class Potential:
             theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
-        phases = self.phases(theta, psi)
-        cos, sin = np.cos(phases), np.sin(phases)
-        a, b = self.kinematic_error.T
-        n_theta, n_psi = self.angle_orders.T
-        x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float)
-        x = x + np.sum(a * cos + b * sin, axis=-1)
-        slope = b * cos - a * sin
-        g_theta = 1.0 / self.ratio + np.sum(slope * n_theta, axis=-1)
-        g_psi = -1.0 + np.sum(slope * n_psi, axis=-1)
-        by_torsion = self.coefficients(x, 1)
-        torque = np.sum(by_torsion[..., 0] * cos + by_torsion[..., 1] * sin, axis=-1)
-        ab = self.coefficients(x)
-        by_phase = ab[..., 1] * cos - ab[..., 0] * sin
+        cos, sin, (e0, e_theta, e_psi) = error_sums(self, self.phases(theta, psi))
+        x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float) + e0
+        g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
+        sums = potential_sums(self, x, cos, sin, "torque", "by_phase")
+        torque, by_theta, by_psi = sums
         return Law(
             torsion=x,
             by_theta=g_theta,
             by_psi=g_psi,
-            input_force=-torque * g_theta - np.sum(by_phase * n_theta, axis=-1),
-            output_force=-torque * g_psi - np.sum(by_phase * n_psi, axis=-1),
+            torque=torque,
+            input_force=-torque * g_theta - by_theta,
+            output_force=-torque * g_psi - by_psi,
         )
 
     # -- figures used by joints -----------------------------------------------

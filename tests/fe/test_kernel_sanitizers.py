@@ -82,7 +82,8 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
     files += sorted((tests / "envs").glob("test_compiled_*.py"))
-    assert len(files) == 8
+    files += sorted((tests / "maps").glob("test_compiled_*.py"))
+    assert len(files) == 9
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,

@@ -22,7 +22,8 @@ from swgjoint.joint.reference import (
 )
 from swgjoint.joint.response import responses
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.hysteresis import Sliders, vary_with_load
+from swgjoint.maps.hysteresis import vary_with_load
+from swgjoint.maps.sliders import Sliders
 
 TWO_MASS = """
 <mujoco>

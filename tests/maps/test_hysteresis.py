@@ -14,12 +14,12 @@ from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import (
     Jenkin,
-    Sliders,
     play_hysteresis,
     sticking_stiffness,
     stretches,
 )
 from swgjoint.maps.sheet.loop import torque_loop
+from swgjoint.maps.sliders import Sliders
 
 ELEMENTS = (
     Jenkin(stiffness=4e3, yield_torque=2.0),

@@ -66,7 +66,7 @@ def test_a_first_loading_from_rest_is_told_from_a_loop_run_before(synthetic_map)
 def _at_rest(drive: DriveMap, loop: TorqueLoop) -> np.ndarray:
     """Torsion along a path from rest, in small steps of the elements."""
     from swgjoint.maps.equilibrium import output_angle
-    from swgjoint.maps.hysteresis import Sliders
+    from swgjoint.maps.sliders import Sliders
 
     free = float(output_angle(drive, 0.0, 0.0))
     sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(0.0, free)))

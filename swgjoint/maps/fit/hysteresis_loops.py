@@ -23,8 +23,9 @@ import numpy as np
 from swgjoint.maps.equilibrium import move_sliders, output_angle
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.fit.hysteresis_elements import fit_elements, is_large
-from swgjoint.maps.hysteresis import Sliders, total_yield
+from swgjoint.maps.hysteresis import total_yield
 from swgjoint.maps.potential import Potential
+from swgjoint.maps.sliders import Sliders
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 

@@ -16,9 +16,10 @@ import numpy as np
 
 from swgjoint.maps.equilibrium import move_sliders, output_angle
 from swgjoint.maps.fit.loop_match import readings
-from swgjoint.maps.hysteresis import Sliders, total_yield
+from swgjoint.maps.hysteresis import total_yield
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import NO_WIDTH, REST, TorqueLoop
+from swgjoint.maps.sliders import Sliders
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 

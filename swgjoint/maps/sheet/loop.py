@@ -16,8 +16,8 @@ from swgjoint.arrays import frozen_array
 from swgjoint.gear.catalogue import CatalogueRow
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.equilibrium import move_sliders, output_angle
-from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
+from swgjoint.maps.sliders import Sliders
 from swgjoint.typing import Array
 
 POINTS = 80

@@ -97,8 +97,8 @@ class Transmission:
             theta_rate: Motor speeds [rad/s]. Shape (n,).
             psi_rate: Link speeds [rad/s]. Shape (n,).
         """
-        pieces = [
-            self.attached.signals(
+        evaluated = [
+            self.attached.signals_and_law(
                 theta[k : k + _CHUNK],
                 psi[k : k + _CHUNK],
                 theta_rate[k : k + _CHUNK],
@@ -106,20 +106,20 @@ class Transmission:
             )
             for k in range(0, theta.size, _CHUNK)
         ]
+        pieces = [signals for signals, _ in evaluated]
+        laws = [law for _, law in evaluated if law is not None]
         torsion = np.concatenate([p.torsion for p in pieces])
         torque = np.concatenate([p.torque for p in pieces])
         played, rubs = np.zeros((2, theta.size))
         elements = self.attached.elements
         if elements:
-            elastic = self._elastic(torsion, theta, psi)
+            elastic = np.concatenate([law.torque for law in laws]) if laws else 0.0
             played = play_hysteresis(
                 elements, torsion - self._relaxed(torsion), elastic
             )
-            slopes = [
-                self.attached.output_slope(theta[k : k + _CHUNK], psi[k : k + _CHUNK])
-                for k in range(0, theta.size, _CHUNK)
-            ]
-            torque = torque + played * np.concatenate(slopes)
+            # torque on the link per torque along the torsion
+            slope = -np.concatenate([law.by_psi for law in laws]) if laws else 1.0
+            torque = torque + played * slope
         friction = self.attached.friction
         if friction is not None:
             by_theta, by_psi = self.drive.friction_direction

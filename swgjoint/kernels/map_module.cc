@@ -1,0 +1,86 @@
+// Python interface of the loops over the harmonics and hysteresis elements of a map.
+
+#include "flank_arrays.h"
+#include "map_sums.h"
+
+namespace {
+
+using Orders = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Powers = nb::ndarray<const double, nb::ndim<4>, nb::c_contig, nb::device::cpu>;
+
+void error_sums(In<2> phases, In<2> amplitudes, Orders orders, Out<2> cos, Out<2> sin,
+                Out<2> result) {
+  const std::size_t n = phases.shape(0), h = phases.shape(1);
+  require(amplitudes.shape(0) == h && amplitudes.shape(1) == 2 && orders.shape(0) == h &&
+              orders.shape(1) == 2,
+          "amplitudes, orders: (h, 2)");
+  require(cos.shape(0) == n && cos.shape(1) == h && sin.shape(0) == n && sin.shape(1) == h,
+          "cos, sin: (n, h)");
+  require(result.shape(0) == 3 && result.shape(1) == n, "result: (3, n)");
+  const nb::gil_scoped_release release;
+  swgjoint::error_sums(phases.data(), n, h, amplitudes.data(), orders.data(), cos.data(),
+                       sin.data(), result.data());
+}
+
+void potential_sums(In<1> torsion, In<2> cos, In<2> sin, Orders orders, In<1> knots,
+                    Powers powers, In<3> ends, bool torque, bool stiffness, bool by_phase,
+                    Out<2> result) {
+  const std::size_t n = torsion.shape(0), h = orders.shape(0), m = powers.shape(2);
+  require(cos.shape(0) == n && cos.shape(1) == h && sin.shape(0) == n && sin.shape(1) == h,
+          "cos, sin: (n, h)");
+  require(orders.shape(1) == 2, "orders: (h, 2)");
+  require(m > 0 && knots.shape(0) == m + 1, "knots: (m + 1,)");
+  require(powers.shape(0) == h && powers.shape(1) == 2 && powers.shape(3) == 5,
+          "powers: (h, 2, m, 5)");
+  require(ends.shape(0) == h && ends.shape(1) == 2 && ends.shape(2) == 2,
+          "ends: (h, 2, 2)");
+  require(result.shape(0) == 4 && result.shape(1) == n, "result: (4, n)");
+  const nb::gil_scoped_release release;
+  swgjoint::potential_sums({knots.data(), powers.data(), ends.data(), h, m},
+                           torsion.data(), n, cos.data(), sin.data(), orders.data(),
+                           {torque, stiffness, by_phase}, result.data());
+}
+
+void stretches(In<1> torsion, In<1> reach, Out<1> result) {
+  const std::size_t n = torsion.shape(0);
+  require(reach.shape(0) == n && result.shape(0) == n, "torsion, reach, result: (n,)");
+  const nb::gil_scoped_release release;
+  swgjoint::stretches(torsion.data(), reach.data(), n, result.data());
+}
+
+void yield_torsions(Index first, In<1> at, In<1> yields, In<1> stiffness, In<1> elastic,
+                    Out<2> reach, Out<2> slope) {
+  const std::size_t n = elastic.shape(0), count = stiffness.shape(0);
+  require(first.shape(0) == count + 1 && first.data()[0] == 0 &&
+              first.data()[count] == static_cast<std::int64_t>(at.shape(0)),
+          "first: (k + 1,), from zero to the number of points");
+  for (std::size_t e = 0; e < count; ++e)
+    require(first.data()[e] < first.data()[e + 1], "first: increasing");
+  require(yields.shape(0) == at.shape(0), "at, yields: equal length");
+  require(reach.shape(0) == n && reach.shape(1) == count && slope.shape(0) == n &&
+              slope.shape(1) == count,
+          "reach, slope: (n, k)");
+  swgjoint::yield_torsions(
+      {first.data(), at.data(), yields.data(), stiffness.data(), count}, elastic.data(),
+      n, reach.data(), slope.data());
+}
+
+}  // namespace
+
+void bind_map(nb::module_& m) {
+  m.def("error_sums", &error_sums, nb::arg("phases").noconvert(),
+        nb::arg("amplitudes").noconvert(), nb::arg("orders").noconvert(),
+        nb::arg("cos").noconvert(), nb::arg("sin").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("potential_sums", &potential_sums, nb::arg("torsion").noconvert(),
+        nb::arg("cos").noconvert(), nb::arg("sin").noconvert(),
+        nb::arg("orders").noconvert(), nb::arg("knots").noconvert(),
+        nb::arg("powers").noconvert(), nb::arg("ends").noconvert(), nb::arg("torque"),
+        nb::arg("stiffness"), nb::arg("by_phase"), nb::arg("result").noconvert());
+  m.def("stretches", &stretches, nb::arg("torsion").noconvert(),
+        nb::arg("reach").noconvert(), nb::arg("result").noconvert());
+  m.def("yield_torsions", &yield_torsions, nb::arg("first").noconvert(),
+        nb::arg("at").noconvert(), nb::arg("yields").noconvert(),
+        nb::arg("stiffness").noconvert(), nb::arg("elastic").noconvert(),
+        nb::arg("reach").noconvert(), nb::arg("slope").noconvert());
+}

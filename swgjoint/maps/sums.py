@@ -1,0 +1,130 @@
+"""Sums over the harmonics of a map: kinematic error and derivatives of the potential.
+
+The numpy versions are the reference; the compiled ones give the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swgjoint.kernels import kernels
+from swgjoint.typing import Array
+
+if TYPE_CHECKING:
+    from swgjoint.maps.potential import Potential
+
+
+def error_sums(
+    drive: Potential, phases: Array
+) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+    """Cosines and sines of phases, and the kinematic error there.
+
+    Args:
+        drive: The map.
+        phases: Phases of the harmonics [rad]. Shape (..., n_harmonics).
+
+    Returns:
+        Cosines and sines in the shape of the phases, and e0 [rad] with its derivatives
+        by theta and psi [-].
+    """
+    if (native := kernels()) is not None:
+        count = phases.shape[-1]
+        cos, sin = np.empty((2, *phases.shape))
+        sums = np.empty((3, phases.size // count))
+        native.error_sums(
+            np.ascontiguousarray(phases).reshape(-1, count),
+            np.ascontiguousarray(drive.kinematic_error),
+            np.ascontiguousarray(drive.angle_orders),
+            cos.reshape(-1, count),
+            sin.reshape(-1, count),
+            sums,
+        )
+        e0, by_theta, by_psi = sums.reshape(3, *phases.shape[:-1])
+        return cos, sin, (e0, by_theta, by_psi)
+    cos, sin = np.cos(phases), np.sin(phases)
+    a, b = drive.kinematic_error.T
+    slope = b * cos - a * sin
+    n_theta, n_psi = drive.angle_orders.T
+    return (
+        cos,
+        sin,
+        (
+            np.sum(a * cos + b * sin, axis=-1),
+            np.sum(slope * n_theta, axis=-1),
+            np.sum(slope * n_psi, axis=-1),
+        ),
+    )
+
+
+def derivative_sum(
+    drive: Potential, torsion: ArrayLike, cos: Array, sin: Array, derivative: int
+) -> Array:
+    """The potential or a derivative of it by the torsion.
+
+    Args:
+        drive: The map.
+        torsion: Torsion [rad].
+        cos: Cosines of the phases. Shape (..., n_harmonics), where the torsion
+            broadcasts with the other axes.
+        sin: Sines of the phases.
+        derivative: Order of the derivative, 0 to 2.
+
+    Returns:
+        Potential [J], torque [N·m] or stiffness [N·m/rad].
+    """
+    x = np.asarray(torsion, float)
+    if derivative and x.shape == cos.shape[:-1] and kernels() is not None:
+        row = "torque" if derivative == 1 else "stiffness"
+        return potential_sums(drive, x, cos, sin, row)[0]
+    ab = drive.coefficients(x, derivative)
+    return np.asarray(np.sum(ab[..., 0] * cos + ab[..., 1] * sin, axis=-1))
+
+
+def potential_sums(
+    drive: Potential, torsion: Array, cos: Array, sin: Array, *wanted: str
+) -> list[Array]:
+    """Derivatives of the potential at given phases, in the shape of the torsion.
+
+    Args:
+        drive: The map.
+        torsion: Torsion [rad].
+        cos: Cosines of the phases. Shape (..., n_harmonics) with the axes of the
+            torsion first.
+        sin: Sines of the phases.
+        wanted: ``torque`` and ``stiffness``, the first two derivatives by the torsion
+            [N·m, N·m/rad], and ``by_phase``, the derivatives by theta and psi at a
+            fixed torsion [N·m].
+
+    Returns:
+        The wanted arrays, in the order of this list.
+    """
+    chosen = [key in wanted for key in ("torque", "stiffness", "by_phase")]
+    if (native := kernels()) is not None:
+        count = cos.shape[-1]
+        rows = np.empty((4, cos.size // count))
+        native.potential_sums(
+            np.ascontiguousarray(torsion, dtype=float).reshape(-1),
+            np.ascontiguousarray(cos).reshape(-1, count),
+            np.ascontiguousarray(sin).reshape(-1, count),
+            np.ascontiguousarray(drive.angle_orders),
+            drive.torsion_knots,
+            np.ascontiguousarray(drive.potential),
+            np.ascontiguousarray(drive.end_stiffness),
+            *chosen,
+            rows,
+        )
+        which = np.array([*chosen, chosen[-1]])
+        return list(rows[which].reshape(-1, *cos.shape[:-1]))
+    found = []
+    for derivative, use in ((1, chosen[0]), (2, chosen[1])):
+        if use:
+            found.append(derivative_sum(drive, torsion, cos, sin, derivative))
+    if chosen[2]:
+        ab = drive.coefficients(torsion)
+        by_phase = ab[..., 1] * cos - ab[..., 0] * sin
+        n_theta, n_psi = drive.angle_orders.T
+        found += [np.sum(by_phase * n, axis=-1) for n in (n_theta, n_psi)]
+    return found

@@ -1,0 +1,132 @@
+"""The compiled sums of maps and hysteresis elements against their numpy versions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.kernels import kernels
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.hysteresis import Jenkin, stretches
+from swgjoint.maps.sliders import Sliders
+
+pytestmark = pytest.mark.skipif(kernels() is None, reason="needs the compiled loops")
+
+ELEMENTS = (
+    Jenkin(stiffness=2e4, yield_torque=1.5),
+    Jenkin(stiffness=9e3, yield_torque=0.0, yield_curve=((10.0, 0.5), (40.0, 3.0))),
+    Jenkin(stiffness=7e3, yield_torque=2.0, yield_curve=((25.0, 1.0),)),
+)
+
+
+def both(monkeypatch, compute):
+    """Results with the compiled loops and with numpy."""
+    compiled = compute()
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    plain = compute()
+    monkeypatch.delenv("SWGJOINT_KERNELS")
+    return compiled, plain
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (700,), (20, 7)])
+def test_sums_over_harmonics(monkeypatch, synthetic_map, shape):
+    """Law, derivatives and error have the same bits, inside and beyond the knots."""
+    rng = np.random.default_rng(7)
+    drive = synthetic_map
+    theta = rng.uniform(-90.0, 90.0, shape)
+    span = 1.5 * drive.torsion_knots[-1]
+    psi = theta / drive.ratio + rng.uniform(-span, span, shape)
+
+    def compute():
+        law = drive.law(theta, psi)
+        return [
+            *vars(law).values(),
+            *drive.error_at(drive.phases(theta, psi)),
+            *[f(law.torsion, theta, psi) for f in (drive.torque, drive.stiffness)],
+        ]
+
+    for got, wanted in zip(*both(monkeypatch, compute), strict=True):
+        assert np.shape(got) == shape
+        assert np.array_equal(got, wanted)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 50, 129, 300])
+def test_order_of_additions(count):
+    """The sum over any number of harmonics has the same bits as that of numpy."""
+    rng = np.random.default_rng(count)
+    native = kernels()
+    phases, amplitudes = rng.normal(size=(5, count)), rng.normal(size=(count, 2))
+    orders = rng.integers(-99, 99, (count, 2))
+    cos, sin = np.empty((2, *phases.shape))
+    sums = np.empty((3, 5))
+    native.error_sums(phases, amplitudes, orders, cos, sin, sums)
+    a, b = amplitudes.T
+    slope = b * np.cos(phases) - a * np.sin(phases)
+    # the libraries' sines may differ in the last bit off Linux
+    assert np.allclose(cos, np.cos(phases), rtol=0.0, atol=2e-16)
+    assert np.allclose(sin, np.sin(phases), rtol=0.0, atol=2e-16)
+    if np.array_equal(cos, np.cos(phases)) and np.array_equal(sin, np.sin(phases)):
+        assert np.array_equal(sums[0], np.sum(a * cos + b * sin, axis=-1))
+        assert np.array_equal(sums[1], np.sum(slope * orders[:, 0], axis=-1))
+        assert np.array_equal(sums[2], np.sum(slope * orders[:, 1], axis=-1))
+
+
+def test_sliders(monkeypatch):
+    """Torque and tangent of the elements have the same bits, also at the points."""
+    rng = np.random.default_rng(3)
+    elastic = np.concatenate([rng.uniform(-60, 60, 400), [0.0, 10.0, -25.0, 40.0]])
+    torsion = rng.uniform(-1e-3, 1e-3, elastic.size)
+
+    def compute():
+        sliders = Sliders.relax(ELEMENTS, 1e-4).move_to(4e-4, 30.0)
+        return [
+            sliders.rest,
+            *sliders.torque_and_tangent(torsion, elastic, 3e4),
+            sliders.energy(torsion, elastic),
+            sliders.torque(torsion[0], elastic[0]),
+        ]
+
+    for got, wanted in zip(*both(monkeypatch, compute), strict=True):
+        assert np.shape(got) == np.shape(wanted)
+        assert np.array_equal(got, wanted)
+
+
+@pytest.mark.parametrize("count", [1, 2, 17, 1000])
+def test_stretches(monkeypatch, count):
+    """The stretch of an element has the same bits for constant and varying reach."""
+    rng = np.random.default_rng(count)
+    torsion = np.cumsum(rng.normal(size=count))
+    for reach in (0.7, rng.uniform(0.0, 2.0, count)):
+        got, wanted = both(monkeypatch, lambda reach=reach: stretches(torsion, reach))
+        assert np.array_equal(got, wanted)
+
+
+def test_equilibrium(monkeypatch, synthetic_map):
+    """Output angles with hysteresis elements have the same bits."""
+    rng = np.random.default_rng(5)
+    theta, torque = rng.uniform(-9.0, 9.0, 60), rng.uniform(-40.0, 40.0, 60)
+
+    def compute():
+        return output_angle(synthetic_map, theta, torque, Sliders.relax(ELEMENTS))
+
+    got, wanted = both(monkeypatch, compute)
+    assert np.array_equal(got, wanted)
+
+
+def test_wrong_shapes_are_rejected():
+    """Arrays that do not fit raise an error instead of reading beyond their end."""
+    native = kernels()
+    with pytest.raises(ValueError, match="reach"):
+        native.stretches(np.zeros(3), np.zeros(2), np.zeros(3))
+    with pytest.raises(ValueError, match="orders"):
+        native.error_sums(
+            np.zeros((2, 3)),
+            np.zeros((3, 2)),
+            np.zeros((2, 2), dtype=np.int64),
+            *np.zeros((2, 2, 3)),
+            np.zeros((3, 2)),
+        )
+    with pytest.raises(ValueError, match="first"):
+        native.yield_torsions(
+            np.array([0, 3]), *np.ones((2, 2)), *np.ones((2, 1)), *np.ones((2, 1, 1))
+        )
