@@ -207,6 +207,20 @@ def write_plan(
     inertia: float,
     result: Array,
 ) -> None: ...
+def race_contact(
+    places: Array,
+    press: Array,
+    half_thickness: float,
+    per_sector: int,
+    q: Array,
+    points: Array,
+    touching: Mask,
+    gap: Array,
+    normal: Array,
+    rows: Array,
+    gradient: Array,
+    hessian: Array,
+) -> None: ...
 def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...

@@ -3,6 +3,7 @@
 #include "bore.h"
 #include "corotation.h"
 #include "flank_arrays.h"
+#include "race.h"
 
 namespace {
 
@@ -160,9 +161,46 @@ class Sector {
   swgjoint::Sector sector_{};
 };
 
+void race_contact(In<1> places, In<1> press, double half_thickness,
+                  std::size_t per_sector, In<1> q, In<3> points, Masks touching,
+                  Out<2> gap, Out<3> normal, Out<3> rows, Out<2> gradient,
+                  Out<3> hessian) {
+  const std::size_t nodes = places.shape(0), count = points.shape(0);
+  require(per_sector > 0 && q.shape(0) > 0 && q.shape(0) % 4 == 0, "q: (4 elements,)");
+  const swgjoint::Race race{q.shape(0) / 4, per_sector,   nodes,
+                            places.data(),  press.data(), half_thickness};
+  const std::size_t n = race.width();
+  require(press.shape(0) == nodes && count * per_sector <= race.elements,
+          "press: (b,), points: (n, b, 2)");
+  for (std::size_t j = 0; j < nodes; ++j) require(places.data()[j] > -1.0, "places");
+  require(points.shape(1) == nodes && points.shape(2) == 2 &&
+              normal.shape(0) == count && normal.shape(1) == nodes &&
+              normal.shape(2) == 2,
+          "points, normal: (n, b, 2)");
+  require(touching.shape(0) == count && touching.shape(1) == nodes &&
+              gap.shape(0) == count && gap.shape(1) == nodes,
+          "touching, gap: (n, b)");
+  require(rows.shape(0) == count && rows.shape(1) == nodes && rows.shape(2) == n,
+          "rows: (n, b, width)");
+  require(gradient.shape(0) == count && gradient.shape(1) == n &&
+              hessian.shape(0) == count && hessian.shape(1) == n &&
+              hessian.shape(2) == n,
+          "gradient: (n, width), hessian: (n, width, width)");
+  const nb::gil_scoped_release release;
+  swgjoint::race_contact(race, q.data(), points.data(), touching.data(), count,
+                         gap.data(), normal.data(), rows.data(), gradient.data(),
+                         hessian.data());
+}
+
 }  // namespace
 
 void bind_plane(nb::module_& m) {
+  m.def("race_contact", &race_contact, nb::arg("places").noconvert(),
+        nb::arg("press").noconvert(), nb::arg("half_thickness"), nb::arg("per_sector"),
+        nb::arg("q").noconvert(), nb::arg("points").noconvert(),
+        nb::arg("touching").noconvert(), nb::arg("gap").noconvert(),
+        nb::arg("normal").noconvert(), nb::arg("rows").noconvert(),
+        nb::arg("gradient").noconvert(), nb::arg("hessian").noconvert());
   nb::class_<Bore>(m, "Bore")
       .def(nb::init<In<3>, In<1>>(), nb::arg("weights").noconvert(),
            nb::arg("stiffness").noconvert())

@@ -67,7 +67,9 @@ def test_linearisations_are_those_of_numpy(loaded, monkeypatch):
     monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
     theirs = linearise(model, state, 5.0)
     for name in FIELDS.split():
-        near(getattr(ours, name), getattr(theirs, name))
+        # round-off of a distance from the race is relative to the positions
+        bound = 1e-11 if model.race and name == "gap" else 1e-12
+        near(getattr(ours, name), getattr(theirs, name), bound)
     for name in FRAMES.split():
         # round-off of rigid motions is relative to the positions
         bound = 1e-12 if name != "deformation" else 1e-9

@@ -27,6 +27,7 @@ from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.race_on_balls import PressedBalls, RaceOnBalls, pressed_form
 from swgjoint.gear.design.design import Design
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 ELEMENTS = 190
@@ -219,18 +220,13 @@ class PlaneRace:
         gradient = np.zeros((n, bore + self.size))
         hessian = np.zeros((*gradient.shape, gradient.shape[1]))
 
-        def add(sector: Index, dofs: Index, slope: Array | None, bend: Array) -> None:
-            row = gradient.shape[1] * sector[:, None] + dofs
-            if slope is not None:
-                _add(gradient, row, slope)
-            _add(hessian, gradient.shape[1] * row[:, :, None] + dofs[:, None, :], bend)
-
         # forces of the elements of the race and of the balls below this part of it
-        element = np.arange(n * m)
-        local = bore + NODE * (element % m)[:, None] + np.arange(2 * NODE)
         _, nodal, blocks = ring.forces(q)
         gradient[:, bore : bore + NODE * m] = nodal[: flat.size].reshape(n, -1)
-        add(element // m, local, None, blocks[: n * m])
+        blocks = blocks[: n * m].reshape(n, m, 2 * NODE, 2 * NODE)
+        for k in range(m):
+            local = slice(bore + NODE * k, bore + NODE * (k + 2))
+            hessian[:, local, local] += blocks[:, k]
         balls = on_balls.press_balls(q, alpha, self.phase, self._feet(race, alpha))
         on = np.flatnonzero(balls.overlap > 0.0)
         on = on[balls.seen.dofs[on, 0] < flat.size]
@@ -238,46 +234,109 @@ class PlaneRace:
         stiffness = 1.5 * on_balls.ball_constant * np.sqrt(balls.overlap[on])
         form = pressed_form(near, 3, force, stiffness)
         rows, under = near.by_ring, near.dofs[:, 0] // NODE
-        add(
-            under // m,
-            local[under],
-            -force[:, None] * rows[:, 0],
-            np.swapaxes(rows, 1, 2) @ form @ rows,
-        )
+        sector, dofs = (under // m)[:, None], self._local(under, bore)
+        np.add.at(gradient, (sector, dofs), -force[:, None] * rows[:, 0])
+        bend = np.swapaxes(rows, 1, 2) @ form @ rows
+        at = sector[:, :, None], dofs[:, :, None], dofs[:, None, :]
+        np.add.at(hessian, at, bend)
 
         # contact of every bore node with the race element below it
+        contact = self._numpy_contact
+        if kernels() is not None:
+            contact = self._compiled_contact
+        gap, normal, gap_rows = contact(q, points, touching, gradient, hessian)
+        pressed = 0.5 * float(np.sum(self.press * gap**2, where=touching))
+        return PlaneRaceForces(
+            gap=gap,
+            rows=gap_rows,
+            normal=normal,
+            gradient=gradient,
+            hessian=hessian,
+            fixed=self._fixed(race, bore),
+            balls=balls,
+            energy=ring.energy(q)
+            + balls.energy
+            + pressed * (2.0 if self.half else 1.0),
+        )
+
+    def _local(self, element: Index, bore: int) -> Index:
+        """Coordinates within their sector of the nodes of race elements (n, 8)."""
+        first = bore + NODE * (element % self.per_sector)
+        return np.asarray(first[:, None] + np.arange(2 * NODE))
+
+    def _numpy_contact(
+        self, q: Array, points: Array, touching: Mask, gradient: Array, hessian: Array
+    ) -> tuple[Array, Array, Array]:
+        """Contact of every bore node with the race element below it.
+
+        Args:
+            q: Coordinates of the whole race (size,) [m].
+            points: Bore nodes (N, b/2, 2) [m].
+            touching: Whether each node is assumed in contact (N, b/2).
+            gradient: Gradient to add to (N, b + r) [N].
+            hessian: Second derivative to add to (N, b + r, b + r) [N/m].
+
+        Returns:
+            Gap (N, b/2), normal (N, b/2, 2) and derivative of the gap, see
+            :class:`PlaneRaceForces`.
+        """
+        n, m, width = self.sectors, self.per_sector, gradient.shape[1]
         first = np.minimum(self.places.astype(np.int64), m - 1)
         below = (m * np.arange(n)[:, None] + first).ravel()
         start = (m * np.arange(n)[:, None] + self.places).ravel()
         seen = distances_to_ring(
-            ring, q, points.reshape(-1, 2), start, inside=False, own=below
+            self.on_balls.race,
+            q,
+            points.reshape(-1, 2),
+            start,
+            inside=False,
+            own=below,
         )
-        gap = seen.distance - 0.5 * on_balls.bearing.race_thickness
+        gap = seen.distance - 0.5 * self.on_balls.bearing.race_thickness
         k = np.where(touching, self.press, 0.0).ravel()
         force = -k * gap
         rows = np.zeros((len(gap), 3, 2 + 2 * NODE))
         rows[:, 0, :2], rows[:, 1, :2] = seen.normal, seen.tangent
         rows[:, :, 2:] = seen.by_ring
         node = np.tile(np.arange(points.shape[1]), n)
-        dofs = np.concatenate([2 * node[:, None] + np.arange(2), local[below]], axis=1)
-        sector = below // m
+        local = self._local(below, 2 * points.shape[1])
+        dofs = np.concatenate([2 * node[:, None] + np.arange(2), local], axis=1)
         bend = np.swapaxes(rows, 1, 2) @ pressed_form(seen, 3, force, k) @ rows
-        add(sector, dofs, -force[:, None] * rows[:, 0], bend)
-        gap_rows = np.zeros((len(gap), gradient.shape[1]))
+        row = width * (below // m)[:, None] + dofs
+        _add(gradient, row, -force[:, None] * rows[:, 0])
+        _add(hessian, width * row[:, :, None] + dofs[:, None, :], bend)
+        gap_rows = np.zeros((len(gap), width))
         np.put_along_axis(gap_rows, dofs, rows[:, 0], axis=1)
-
-        pressed = 0.5 * float(-force @ gap) * (2.0 if self.half else 1.0)
         shape = points.shape[:2]
-        return PlaneRaceForces(
-            gap=gap.reshape(shape),
-            rows=gap_rows.reshape(*shape, -1),
-            normal=seen.normal.reshape(points.shape),
-            gradient=gradient,
-            hessian=hessian,
-            fixed=self._fixed(race, bore),
-            balls=balls,
-            energy=ring.energy(q) + balls.energy + pressed,
+        return (
+            gap.reshape(shape),
+            seen.normal.reshape(points.shape),
+            gap_rows.reshape(*shape, -1),
         )
+
+    def _compiled_contact(
+        self, q: Array, points: Array, touching: Mask, gradient: Array, hessian: Array
+    ) -> tuple[Array, Array, Array]:
+        """The same as :meth:`_numpy_contact` in a compiled loop."""
+        native, shape = kernels(), points.shape[:2]
+        assert native is not None
+        gap, normal = np.empty(shape), np.empty(points.shape)
+        rows = np.empty((*shape, gradient.shape[1]))
+        native.race_contact(
+            self.places,
+            self.press,
+            0.5 * self.on_balls.bearing.race_thickness,
+            self.per_sector,
+            q,
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(touching),
+            gap,
+            normal,
+            rows,
+            gradient,
+            hessian,
+        )
+        return gap, normal, rows
 
     def _feet(self, race: Array, alpha: float) -> Array:
         """Approximate positions of the balls along the race, in elements."""

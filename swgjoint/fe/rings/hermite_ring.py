@@ -126,7 +126,7 @@ class HermiteRing:
     def nodal(self, q: Array) -> Array:
         """Coordinates of the two nodes of every element (elements, 4, 2) [m]."""
         x = q.reshape(self.elements, 2, 2)
-        return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
+        return np.concatenate([x, np.concatenate([x[1:], x[:1]])], axis=1)
 
     def evaluate_at(
         self, q: Array, place: Array, own: Index | None = None
@@ -256,9 +256,10 @@ class HermiteRing:
             start: Initial guess of the feet, element number plus parameter (n,).
             own: Elements whose cubics are extended, see :meth:`split` (n,).
         """
-        place = start
+        place, nodal = start, self.nodal(q)
         for _ in range(6):
-            r, v, w = self.evaluate_at(q, place, own)
+            element, xi = self.split(place, own)
+            r, v, w = (_shapes(xi) @ nodal[element]).swapaxes(0, 1)
             rest = points - r
             slope = np.einsum("ni,ni->n", rest, v)
             gain = np.einsum("ni,ni->n", v, v) - np.einsum("ni,ni->n", rest, w)
