@@ -142,9 +142,10 @@ class Indentation:
         x = force / at
         exact = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
         # for small x the terms cancel: use the series
-        n = np.arange(3.0, 14.0)
-        terms = np.power.outer(np.minimum(x, 0.05), n) * -((-1.0) ** n)
-        series = (terms / (n * (n - 2.0))).sum(axis=-1)
+        small, series = np.minimum(x, 0.05), np.zeros_like(x)
+        for n in range(13, 2, -1):
+            series = (series - (-1.0) ** n / (n * (n - 2.0))) * small
+        series *= small**2
         area = at**2 * np.where(x < 0.05, series, exact)
         return np.asarray(area + 0.5 * force**2 * log(start))
 

@@ -164,18 +164,19 @@ class Influence:
         if self.strips is not None:
             dg = gap_change.copy()
             dg[:, : len(self.sector)] += solution.approach[:, self.strips.strip]
-            offset = self.slack + dg @ self.by_gap.T + load * self.by_torque
+            offset += solution.approach @ self._problems.by_strip.T
         angle = self.angle + v @ self.angle_by_value + dg @ self.angle_by_gap
         angle += load * self.angle_by_torque
 
-        # d Pi = -forces . d gaps + psi dT while v = 0; then dPi/dv = +-w, and v.w = 0
-        n, teeth = dg.shape[1], self.closed[: dg.shape[1]]
-        force = np.where(teeth, self.slack[:n] + 0.5 * dg @ self.by_gap[:n].T, 0.0)
-        unchanged = -np.sum(force * dg, axis=1) + load * (
+        # d Pi = -forces . d gaps + psi dT while v = 0; then dPi/dv = +-w, and v.w = 0.
+        # The offset contains dg in full, the mean force on the way half of it.
+        teeth = np.flatnonzero(self.closed[: dg.shape[1]])
+        force = offset[:, teeth] - load * self.by_torque[teeth] + self.slack[teeth]
+        unchanged = -0.5 * np.sum(force * dg[:, teeth], axis=1) + load * (
             self.angle + dg @ self.angle_by_gap + 0.5 * load * self.angle_by_torque
         )
         sign = np.where(self.closed, 0.5, -0.5)
-        potential = unchanged + np.sum(sign * v * offset, axis=1)
+        potential = unchanged + (v * offset) @ sign
         if self.strips is not None:
             potential += self.strips.excess_energy(solution.force)
         slope = self.angle_by_torque + solution.slope
