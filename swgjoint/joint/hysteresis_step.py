@@ -13,6 +13,17 @@ of this mean are
 The work :math:`\bar q\,(\Delta^+ - \Delta)` is the change of :math:`k u^2/2` plus the
 slip dissipation, which is never negative.
 
+The engine receives a torque that is linear in the true change of the torsion d: offset
++ rate d, equal to the mean torque for the predicted change. While the element sticks,
+the offset is :math:`k u_0` and the rate k/2. If it slips, the rate is the slope of the
+mean torque or, if this is larger, the smallest rate with
+
+.. math:: \mathrm{offset}^2 \le 2\,k\,\mathrm{rate}\,u_0^2 .
+
+The work (offset + rate d) d is then at least :math:`-k u_0^2/2` for every d. The
+element ends with at most its initial energy plus that work. It therefore dissipates
+energy or returns only stored energy, even if an impact makes the prediction wrong.
+
 A yield torque that depends on the load is constant within a step, with the mean elastic
 torque of the step. If it is smaller than in the step before, the slider first slips
 back, to :math:`|u_0| = f/k`. This slip needs no work and only reduces :math:`k u^2/2`,
@@ -22,6 +33,8 @@ so steps of any length are passive.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -54,32 +67,100 @@ def move_rests(
     return tuple(np.clip(rest, torsion - limit, torsion + limit).tolist())
 
 
-def mean_torque(
+@dataclass(frozen=True, kw_only=True)
+class ElementStep:
+    """Torque of one element over a step, linear in the change of the torsion."""
+
+    stiffness: float
+    """Stiffness k while the element sticks [N·m/rad]."""
+    stretch: float
+    """Stretch at the beginning of the step [rad]."""
+    reach: float
+    """Largest stretch in this step [rad]."""
+    mean: float
+    """Mean torque over the predicted change of the torsion [N·m]."""
+    offset: float
+    """Torque without a change of the torsion [N·m]."""
+    rate: float
+    """Change of the torque per change of the torsion [N·m/rad]."""
+    part: float
+    """Fraction of the predicted change over which the element sticks [-]."""
+
+    def stretch_after(self, change: float) -> float:
+        """Stretch after the actual change of the torsion in the step [rad].
+
+        Args:
+            change: Actual change of the torsion [rad].
+        """
+        end = min(max(self.stretch + change, -self.reach), self.reach)
+        if self.part == 1.0:
+            return end
+        work = (self.offset + self.rate * change) * change
+        most = sqrt(max(0.0, self.stretch**2 + 2.0 * work / self.stiffness))
+        return min(max(end, -most), most)
+
+
+def element_steps(
     elements: Sequence[Jenkin],
     rest: Sequence[float],
     reach: Sequence[float],
     torsion: float,
     change: float = 0.0,
-) -> tuple[float, float, float]:
-    """Mean torque of the elements over a change of the torsion.
+    *,
+    applied: bool = True,
+) -> tuple[ElementStep, ...]:
+    """Torque of each element over a predicted change of the torsion.
 
     Args:
         elements: Jenkin elements of the drive.
         rest: Torsion at which each element is relaxed [rad].
         reach: Yield torsion of each element in this step [rad].
         torsion: Torsion at the start [rad].
-        change: Change of the torsion [rad].
-
-    Returns:
-        Mean torque [N·m], its slope and the sticking stiffness [N·m/rad].
+        change: Predicted change of the torsion [rad].
+        applied: Whether the torque has to be passive for any change of the torsion;
+            otherwise the rate is the slope of the mean torque.
     """
-    torque = slope = sticking = 0.0
+    steps = []
     for element, r, d in zip(elements, rest, reach, strict=True):
         k = element.stiffness
-        begin = float(np.clip(torsion - r, -d, d))
-        end = float(np.clip(begin + change, -d, d))
+        begin = min(max(torsion - r, -d), d)
+        end = min(max(begin + change, -d), d)
         part = 1.0 if end == begin + change else (end - begin) / change
-        torque += k * (0.5 * (begin + end) * part + end * (1.0 - part))
-        slope += 0.5 * k * part**2
-        sticking += k * part
-    return torque, slope, sticking
+        mean = k * (0.5 * (begin + end) * part + end * (1.0 - part))
+        rate = 0.5 * k * part**2
+        if applied and part != 1.0:
+            # (mean - rate change)² = 2 k rate begin², the smaller solution
+            work, stored = mean * change, k * begin**2
+            total = work + stored + sqrt(stored * (2.0 * work + stored))
+            if total > 0.0:
+                rate = max(rate, mean**2 / total)
+        steps.append(
+            ElementStep(
+                stiffness=k,
+                stretch=begin,
+                reach=d,
+                mean=mean,
+                offset=mean - rate * change,
+                rate=rate,
+                part=part,
+            )
+        )
+    return tuple(steps)
+
+
+def rests_after(
+    steps: Sequence[ElementStep], rest: Sequence[float], torsion: float, change: float
+) -> tuple[float, ...]:
+    """Torsion at which each element is relaxed after a step [rad].
+
+    Args:
+        steps: Torques of the elements in the step.
+        rest: Torsion at which each element is relaxed before [rad].
+        torsion: Torsion at the start of the step [rad].
+        change: Actual change of the torsion [rad].
+    """
+    rest = move_rests(rest, [step.reach for step in steps], torsion)
+    return tuple(
+        r + (step.stretch + change - step.stretch_after(change))
+        for r, step in zip(rest, steps, strict=True)
+    )

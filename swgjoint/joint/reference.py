@@ -19,7 +19,7 @@ of its two end values, and g is the secant of the torsion. The scheme predicts t
 of the pair. The rest of the force, which is linear in the velocity step, is passed to
 the engine as the metric :math:`M + h^2 p\,g g^T`.
 
-Hysteresis adds its mean torque over the step to L and the slope of that mean to the
+Hysteresis adds its mean torque over the step to L and the rate of that torque to the
 slope of L, which enters p; see :mod:`swgjoint.joint.hysteresis_step`.
 
 Friction acts along beta, the rotation of the wave generator relative to the flexspline,
@@ -39,7 +39,13 @@ from itertools import pairwise
 import numpy as np
 
 from swgjoint.joint.friction_step import FrictionStep, friction_step, stretch_after
-from swgjoint.joint.hysteresis_step import mean_torque, move_rests, yield_torsions
+from swgjoint.joint.hysteresis_step import (
+    ElementStep,
+    element_steps,
+    move_rests,
+    rests_after,
+    yield_torsions,
+)
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
@@ -87,11 +93,16 @@ class SchemeForce:
     e_theta: float
     e_psi: float
     """Secants of V by theta and by psi at fixed torsion [N·m]."""
-    reach: tuple[float, ...] = ()
-    """Yield torsion of each hysteresis element in this step [rad]."""
+    elements: tuple[ElementStep, ...] = ()
+    """Hysteresis elements; their torques are part of ``along`` and ``metric``."""
     friction: FrictionStep | None = None
     """Friction along beta; ``theta`` and ``psi`` include its torque, but ``metric``
     excludes its metric."""
+
+    @property
+    def reach(self) -> tuple[float, ...]:
+        """Yield torsion of each hysteresis element in this step [rad]."""
+        return tuple(element.reach for element in self.elements)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,12 +133,9 @@ def gradient_force(
     friction = damping * (g_theta * motion.theta_rate + g_psi * motion.psi_rate)
     torsion = float(drive.torsion(motion.theta, motion.psi))
     elastic = float(drive.torque(torsion, motion.theta, motion.psi))
-    slipping = mean_torque(
-        drive.hysteresis,
-        motion.rest,
-        yield_torsions(drive.hysteresis, elastic),
-        torsion,
-    )[0]
+    reach = yield_torsions(drive.hysteresis, elastic)
+    elements = element_steps(drive.hysteresis, motion.rest, reach, torsion)
+    slipping = sum(element.mean for element in elements)
     friction += slipping
     on_theta, on_psi = float(theta) - friction * g_theta, float(psi) - friction * g_psi
     if drive.friction is not None:
@@ -171,17 +179,19 @@ def scheme_force(
     beta, speed = float(b @ x), float(b @ v)
     rubs: FrictionStep | None = None
     dv: Array = np.zeros(2)
-    for _ in range(passes):
+    for remaining in reversed(range(passes)):
         dx = h * (v + 0.5 * dv)
         s = _secant(drive, x, dx)
-        reach = yield_torsions(drive.hysteresis, s.torque)
-        torque, slope, sticking = mean_torque(
-            drive.hysteresis, rest, reach, start, float(s.g @ dx)
+        elements = element_steps(
+            *(drive.hysteresis, rest, yield_torsions(drive.hysteresis, s.torque)),
+            *(start, float(s.g @ dx)),
+            applied=remaining == 0,
         )
+        sticking = sum(element.part * element.stiffness for element in elements)
         s = replace(
             s,
-            torque=s.torque + torque,
-            slope=s.slope + slope,
+            torque=s.torque + sum(element.mean for element in elements),
+            slope=s.slope + sum(element.rate for element in elements),
             k0=s.k0 + sticking,
             k1=s.k1 + sticking,
         )
@@ -224,7 +234,7 @@ def scheme_force(
         metric=p,
         e_theta=float(s.e[0]),
         e_psi=float(s.e[1]),
-        reach=reach,
+        elements=elements,
         friction=rubs,
     )
 
@@ -288,29 +298,30 @@ def other_acceleration(
 
 
 def rest_after(
-    drive: DriveMap, motion: TwinMotion, force: SchemeForce, *, timestep: float
+    drive: DriveMap,
+    motion: TwinMotion,
+    force: SchemeForce,
+    *,
+    timestep: float,
+    theta_rate: float,
+    psi_rate: float,
 ) -> tuple[float, ...]:
     """Plugin state after a step: torsion at which each element is relaxed [rad].
-
-    The state contains the slip up to the start of the step. The slip of the step itself
-    follows at the beginning of the next step, to which the yield torsions
-    ``force.reach`` are passed as ``limit``.
 
     Args:
         drive: The map.
         motion: State of the pair at the beginning of the step.
         force: Linearised force of the step.
         timestep: Step h [s].
+        theta_rate: Rotor speed at the end of the step [rad/s].
+        psi_rate: Link speed at the end of the step [rad/s].
     """
-    torsion = float(
-        drive.torsion(
-            motion.theta - 0.5 * timestep * motion.theta_rate,
-            motion.psi - 0.5 * timestep * motion.psi_rate,
-        )
-    )
-    return move_rests(
-        move_rests(motion.rest, motion.limit, torsion), force.reach, torsion
-    )
+    half, v = 0.5 * timestep, (motion.theta_rate, motion.psi_rate)
+    torsion = drive.torsion(motion.theta - half * v[0], motion.psi - half * v[1])
+    change = half * force.g_theta * (v[0] + theta_rate)
+    change += half * force.g_psi * (v[1] + psi_rate)
+    rest = move_rests(motion.rest, motion.limit, float(torsion))
+    return rests_after(force.elements, rest, float(torsion), change)
 
 
 def relax_state(

@@ -37,6 +37,7 @@ const char* Hysteresis::Parse(const char* elements, const char* curves) {
     }
   }
   stretch_.assign(reach_.size(), 0.0);
+  elements_.assign(reach_.size(), {});
   if (!vary) return nullptr;
 
   if (!ParseNumbers(curves, &list) || list[0] < 2 || list[0] > list.size() ||

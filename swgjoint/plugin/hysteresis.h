@@ -5,6 +5,7 @@
 #define SWGJOINT_PLUGIN_HYSTERESIS_H_
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "drive_map.h"
@@ -41,11 +42,16 @@ class Hysteresis {
   }
 
   // Adds the contribution of the elements over a change of the torsion: their mean
-  // torque, so that their work is exact, and the derivative of this mean with respect
-  // to the change. An element sticks over the fraction f of the change. If yield
-  // torques vary, they are those at the mean elastic torque `value->torque` throughout
-  // the change. All torques of the elements are multiplied by `losses`.
-  void Slip(double change, double losses, DriveValue* value) {
+  // torque, so that their work is exact, and its rate of change with the change of the
+  // torsion. An element sticks over the fraction f of the change. If yield torques vary,
+  // they are those at the mean elastic torque `value->torque` throughout the change. All
+  // torques of the elements are multiplied by `losses`.
+  //
+  // The rate is the derivative of the mean torque or, if the torque is `applied`, the
+  // smallest rate at least as large that keeps the element passive, whatever the torsion
+  // does in the step: the work of offset + rate change is never less than minus the
+  // stored energy.
+  void Slip(double change, double losses, bool applied, DriveValue* value) {
     if (varies()) Load(value->torque);
     for (size_t j = 0; j < reach_.size(); ++j) {
       const double k = losses * stiffness_[j];
@@ -54,10 +60,38 @@ class Hysteresis {
       const double free = begin + change;
       const double end = std::clamp(free, -reach_[j], reach_[j]);
       const double f = end == free ? 1 : (end - begin) / change;
-      value->torque += k * (0.5 * (begin + end) * f + end * (1 - f));
-      value->slope += 0.5 * k * f * f;
+      const double mean = 0.5 * (begin + end) * f + end * (1 - f);
+      double rate = 0.5 * f * f;
+      if (applied) {
+        if (f != 1) {
+          // (mean - rate change)^2 = 2 rate begin^2, the smaller solution
+          const double work = mean * change, stored = begin * begin;
+          const double root = std::fabs(begin) * std::sqrt(2 * work + stored);
+          const double sum = work + stored + root;
+          if (sum > 0) rate = std::max(rate, mean * mean / sum);
+        }
+        elements_[j] = {begin, mean - rate * change, rate, f == 1};
+      }
+      value->torque += k * mean;
+      value->slope += k * rate;
       value->stiffness_begin += k * f;
       value->stiffness_end += k * f;
+    }
+  }
+
+  // Moves the relaxed torsions by the slip in a step, after the actual change of the
+  // torsion. An element stores at most its previous energy plus the work of the step.
+  void Settle(double change, double* rest) const {
+    for (size_t j = 0; j < reach_.size(); ++j) {
+      const Element& step = elements_[j];
+      const double free = step.begin + change;
+      double end = std::clamp(free, -reach_[j], reach_[j]);
+      if (!step.sticks) {
+        const double work = (step.offset + step.rate * change) * change;
+        const double most = std::sqrt(std::max(0.0, step.begin * step.begin + 2 * work));
+        end = std::clamp(end, -most, most);
+      }
+      rest[j] += free - end;
     }
   }
 
@@ -71,12 +105,22 @@ class Hysteresis {
   // Stores the current yield torsions as those of the last step.
   void Store(double* limit) const;
 
-  // Takes over the yield torsions of a step that another instance has begun.
+  // Takes over a step that another instance has begun.
   void Continue(const Hysteresis& other) {
-    if (varies() && other.size() == size()) reach_ = other.reach_;
+    if (other.size() != size()) return;
+    elements_ = other.elements_;
+    if (varies()) reach_ = other.reach_;
   }
 
  private:
+  // Step of one element: stretch at its start, and torque offset + rate change, both
+  // divided by the stiffness.
+  struct Element {
+    double begin, offset, rate;
+    bool sticks;
+  };
+
+  std::vector<Element> elements_;
   // stiffness, current yield torsion, and torsion relative to the relaxed state
   std::vector<double> stiffness_, reach_, stretch_;
   // yield curves: elastic torques, increasing from 0, and for each of them the yield

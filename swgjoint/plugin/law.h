@@ -105,7 +105,7 @@ class Law {
                 double* rubs) {
     map_.Gradient(q[0], q[1], value);
     hysteresis_.Place(map_.torsion(), state + kAccelerations, nullptr);
-    hysteresis_.Slip(0, losses_, value);
+    hysteresis_.Slip(0, losses_, false, value);
     *rubs = 0;
     if (friction_) {
       const double* bristle = Bristle(state);
@@ -137,7 +137,9 @@ class Law {
     for (int pass = 0; pass < passes_; ++pass) {
       const Pair dx = v * h + dv * (0.5 * h);
       map_.Secant(dx[0], dx[1], &g);
-      if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, dx), losses_, &g);
+      if (hysteresis_.size()) {
+        hysteresis_.Slip(Dot(g.g, dx), losses_, pass + 1 == passes_, &g);
+      }
       const double k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
       const double w = Dot(g.g * g.g, weight);
       const double ka = h * h * w * k;
@@ -176,8 +178,8 @@ class Law {
   void Finish(double h, const Pair& q, const Pair& v, Step* step, double* state) {
     state[0] = state[1] = 0;
     // The torsion at the end of a step determines where each element is relaxed. In the
-    // scheme, the end of a step is the start of the next step and is evaluated there.
-    // With other integrators, intermediate stages are ignored.
+    // scheme, it follows from the linearised change of the torsion. With other
+    // integrators, intermediate stages are ignored.
     double *rest = state + kAccelerations, *bristle = Bristle(state);
     if (hysteresis_.size() && (step->scheme || step->gradient)) {
       double* limit = Limit(state);
@@ -191,6 +193,10 @@ class Law {
         step->torsion = map_.torsion();
       }
       hysteresis_.Relax(step->torsion, step->scheme ? limit : nullptr, rest);
+      if (step->scheme) {
+        const Pair mean = step->v + (v - step->v) * 0.5;
+        hysteresis_.Settle(h * Dot(step->value.g, mean), rest);
+      }
       if (limit) hysteresis_.Store(limit);
     }
     if (friction_ && step->gradient) {
@@ -198,7 +204,7 @@ class Law {
       DriveValue value;
       map_.Gradient(q[0], q[1], &value);
       hysteresis_.Place(map_.torsion(), rest, nullptr);
-      hysteresis_.Slip(0, losses_, &value);
+      hysteresis_.Slip(0, losses_, false, &value);
       const double reach = friction_->Reach(Rotation(v), value.torque);
       bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
       bristle[1] = 1;

@@ -74,7 +74,7 @@ def twin_motion(drive, torques, *, h, rotor, load, damping, start=(0.0, 0.0)):
             psi=float(x[1] + 0.5 * h * end[1]),
             rotor_acceleration=float(other[0]),
             link_acceleration=float(other[1]),
-            rest=rest_after(drive, motion, force, timestep=h),
+            rest=rest_after(drive, motion, force, timestep=h, **rates),
             limit=force.reach,
             relaxed=relaxed,
             **rates,
@@ -131,7 +131,7 @@ def test_a_stiffness_loop_equals_the_twin(lossy, tmp_path):
     """
     drive = replace(lossy, friction=None)
     rated, h, rotor = drive.ratings.rated_torque, 2e-3, 1e6
-    path = np.sin(2.0 * np.pi * np.arange(1, 1001) / 500)
+    path = np.sin(2.0 * np.pi * np.arange(1, 4001) / 2000)
     torques = np.column_stack([0.0 * path, -rated * path])
     fmu = fmu_of(drive, tmp_path, by_steps=True, rotor_inertia=rotor, step=h)
     assert fmu.start()
@@ -140,11 +140,11 @@ def test_a_stiffness_loop_equals_the_twin(lossy, tmp_path):
     twin = twin_motion(drive, torques, h=h, rotor=rotor, load=LOAD, damping=damping)
     assert np.abs(found - twin)[:, :2].max() < 1e-9
     # a step has the torque of its middle: zero is half a step before its end
-    falling, rising = (found[[k - 1, k], 1].mean() for k in (749, 999))
+    falling, rising = (found[[k - 1, k], 1].mean() for k in (2999, 3999))
     up_to = replace(drive.ratings, repeated_peak=rated, T2=0.5 * rated)
     loop = torque_loop(replace(drive, ratings=up_to))
     slope = float(drive.coefficients(0.0, 2)[0, 0])
-    damped = damping * np.abs(found[[749, 999], 3]).sum() / slope
+    damped = damping * np.abs(found[[2999, 3999], 3]).sum() / slope
     expected = loop.hysteresis_loss() + damped
     assert abs(falling - rising) == pytest.approx(expected, rel=0.01)
 

@@ -138,7 +138,7 @@ class Bench:
             q = q + h * v
             rates = {"timestep": h, "theta_rate": v[0], "psi_rate": v[1]}
             state = other_acceleration(drive, motion, f, **rates)
-            rest, limit = rest_after(drive, motion, f, timestep=h), f.reach
+            rest, limit = rest_after(drive, motion, f, **rates), f.reach
             if drive.friction is not None:
                 relaxed = relax_state(drive, motion, f, **rates)
                 rubs.append(f.friction)

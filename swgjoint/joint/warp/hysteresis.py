@@ -44,6 +44,72 @@ def reach_at(drive: WarpDrive, maps: Maps, j: int, elastic: real):
 
 
 @wp.func
+def begin_at(torsion: real, rest: real, limit: real, reach: real):
+    """Stretch of an element at the beginning of a step [rad].
+
+    Args:
+        torsion: Torsion at the beginning of the step [rad].
+        rest: Torsion at which the element is relaxed [rad].
+        limit: Yield torsion in the last step [rad]; zero if there was none.
+        reach: Yield torsion in this step [rad].
+    """
+    begin = torsion - rest
+    if limit > ZERO:
+        begin = wp.clamp(begin, -limit, limit)
+    return wp.clamp(begin, -reach, reach)
+
+
+@wp.func
+def sticking_part(begin: real, change: real, reach: real):
+    """Fraction of the change of the torsion over which an element sticks [-].
+
+    Args:
+        begin: Stretch at the beginning of the step [rad].
+        change: Change of the torsion [rad].
+        reach: Yield torsion in this step [rad].
+    """
+    free = begin + change
+    end = wp.clamp(free, -reach, reach)
+    sticks = real(1.0)
+    if end != free:
+        sticks = (end - begin) / change
+    return sticks
+
+
+@wp.func
+def mean_stretch(begin: real, change: real, reach: real, sticks: real):
+    """Mean torque of an element over a step, divided by its stiffness [rad].
+
+    Args:
+        begin: Stretch at the beginning of the step [rad].
+        change: Change of the torsion [rad].
+        reach: Yield torsion in this step [rad].
+        sticks: Result of :func:`sticking_part` [-].
+    """
+    end = wp.clamp(begin + change, -reach, reach)
+    return HALF * (begin + end) * sticks + end * (ONE - sticks)
+
+
+@wp.func
+def passive_rate(begin: real, change: real, mean: real, sticks: real):
+    """Rate of the applied torque, divided by the stiffness [-].
+
+    Args:
+        begin: Stretch at the beginning of the step [rad].
+        change: Predicted change of the torsion [rad].
+        mean: Result of :func:`mean_stretch` [rad].
+        sticks: Result of :func:`sticking_part` [-].
+    """
+    rate = HALF * sticks * sticks
+    if sticks != ONE:
+        work, stored = mean * change, begin * begin
+        total = work + stored + wp.abs(begin) * wp.sqrt(real(2.0) * work + stored)
+        if total > ZERO:
+            rate = wp.max(rate, mean * mean / total)
+    return rate
+
+
+@wp.func
 def slip(
     s: Secant,
     drive: WarpDrive,
@@ -53,6 +119,7 @@ def slip(
     elastic: real,
     rest: real,
     limit: real,
+    applied: bool,
 ):
     """Secant with the mean torque of one hysteresis element over the step added.
 
@@ -65,20 +132,18 @@ def slip(
         elastic: Mean elastic torque of the step [N·m].
         rest: Torsion at which the element is relaxed [rad].
         limit: Yield torsion in the last step [rad]; zero if there was none.
+        applied: Whether the torque must be passive for any change of the torsion.
     """
     stiffness = losses * maps.element[j, 0]
     reach = reach_at(drive, maps, j, elastic)
-    begin = s.begin - rest
-    if limit > ZERO:
-        begin = wp.clamp(begin, -limit, limit)
-    begin = wp.clamp(begin, -reach, reach)
-    free = begin + s.change
-    end = wp.clamp(free, -reach, reach)
-    sticks = real(1.0)
-    if end != free:
-        sticks = (end - begin) / s.change
-    s.torque += stiffness * (HALF * (begin + end) * sticks + end * (ONE - sticks))
-    s.slope += HALF * stiffness * sticks * sticks
+    begin = begin_at(s.begin, rest, limit, reach)
+    sticks = sticking_part(begin, s.change, reach)
+    mean = mean_stretch(begin, s.change, reach, sticks)
+    rate = HALF * sticks * sticks
+    if applied:
+        rate = passive_rate(begin, s.change, mean, sticks)
+    s.torque += stiffness * mean
+    s.slope += stiffness * rate
     s.k0 += stiffness * sticks
     s.k1 += stiffness * sticks
     return s
@@ -90,6 +155,8 @@ def relax(
     maps: Maps,
     world: int,
     torsion: real,
+    predicted: real,
+    change: real,
     elastic: real,
     state: wp.array2d(dtype=real),
 ):
@@ -100,6 +167,8 @@ def relax(
         maps: Maps of all drives.
         world: Index of the world.
         torsion: Torsion at the beginning of the step [rad].
+        predicted: Predicted change of the torsion [rad].
+        change: Actual change of the torsion [rad].
         elastic: Mean elastic torque of the step [N·m].
         state: State of all elements, see above [rad].
     """
@@ -107,10 +176,21 @@ def relax(
     for j in range(drive.element, drive.element + drive.elements):
         rest = real(state[world, j])
         limit = real(state[world, count + j])
+        reach = reach_at(drive, maps, j, elastic)
+        begin = begin_at(torsion, rest, limit, reach)
         if limit > ZERO:
             rest = wp.clamp(rest, torsion - limit, torsion + limit)
-        reach = reach_at(drive, maps, j, elastic)
-        state[world, j] = wp.clamp(rest, torsion - reach, torsion + reach)
+        rest = wp.clamp(rest, torsion - reach, torsion + reach)
+        sticks = sticking_part(begin, predicted, reach)
+        end = wp.clamp(begin + change, -reach, reach)
+        if sticks != ONE:
+            # an element stores at most its previous energy plus the work of the step
+            mean = mean_stretch(begin, predicted, reach, sticks)
+            rate = passive_rate(begin, predicted, mean, sticks)
+            work = (mean - rate * predicted + rate * change) * change
+            most = wp.sqrt(wp.max(ZERO, begin * begin + real(2.0) * work))
+            end = wp.clamp(end, -most, most)
+        state[world, j] = rest + (begin + change - end)
         if maps.element[j, 3] > maps.element[j, 2]:
             # positive even without reach, because zero means that there was no step
             state[world, count + j] = wp.max(reach, real(1e-300))

@@ -51,6 +51,8 @@ class WarpStep:
     force: real
     metric: real
     torsion: real
+    predicted: real
+    """Predicted change of the torsion [rad]."""
     elastic: real
     """Mean elastic torque [N·m]."""
     a_rotor: real
@@ -210,7 +212,18 @@ def law(
         last.a_rotor = rm / h + last.w_rotor * on_rotor
         last.a_link = rl / h + last.w_link * on_link
         torque[world, index] = float(-on_link)
-        relax(drive, maps, world, last.torsion, last.elastic, rest)
+        moved = last.g_theta * (last.v_rotor + HALF * rm)
+        moved = h * (moved + last.g_psi * (last.v_link + HALF * rl))
+        relax(
+            drive,
+            maps,
+            world,
+            last.torsion,
+            last.predicted,
+            moved,
+            last.elastic,
+            rest,
+        )
     if time[world] < last.time:
         last.a_rotor = ZERO
         last.a_link = ZERO
@@ -253,7 +266,7 @@ def law(
     speed = drive.b_theta * vm + drive.b_psi * vl
     last.rotation = drive.b_theta * theta + drive.b_psi * psi
     turned = wp.where(last.known == 1, last.rotation - last.relaxed, ZERO)
-    for _ in range(PASSES):
+    for pass_ in range(PASSES):
         s = secant_over(
             drive,
             maps,
@@ -267,7 +280,17 @@ def law(
         last.elastic = s.torque
         for j in range(drive.element, drive.element + drive.elements):
             limit = rest[world, maps.element.shape[0] + j]
-            s = slip(s, drive, maps, j, losses, last.elastic, rest[world, j], limit)
+            s = slip(
+                s,
+                drive,
+                maps,
+                j,
+                losses,
+                last.elastic,
+                rest[world, j],
+                limit,
+                pass_ + 1 == PASSES,
+            )
         k = wp.max(ZERO, HALF * (s.k0 + s.k1))
         w = s.g_theta * s.g_theta * wm + s.g_psi * s.g_psi * wl
         ka = h * h * k * w
@@ -338,5 +361,6 @@ def law(
     last.force = force
     last.metric = p
     last.torsion = s.begin
+    last.predicted = s.change
     last.rub = rub
     steps[world, index] = last
