@@ -89,7 +89,7 @@ def load_plugin() -> Path:
 
 def _text(values: np.ndarray) -> str:
     # repr gives the shortest text that converts back to the same bits
-    return " ".join(repr(float(v)) for v in np.ravel(values))
+    return " ".join(map(repr, np.ravel(values).astype(float).tolist()))
 
 
 def config(

@@ -16,6 +16,8 @@ import numpy as np
 from swgjoint.errors import SwgError
 from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
 from swgjoint.maps.sheet.validity_marks import joint_doubt
+from swgjoint.sim.figures.metrics import torque_ripple
+from swgjoint.sim.figures.signals import error_figures, ripple_figures
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg
 from swgjoint.view.run import run_scene
@@ -64,17 +66,14 @@ def step_error(run: Run) -> dict[str, Any]:
         )
     except SwgError as exc:
         return {"step_s": step, "reason": f"not run: {exc}"}
-    coarse, finer = run.metrics()["joints"], fine.metrics()["joints"]
-    return {
-        "step_s": step,
-        "joints": {
-            joint: {
-                key: abs(_at(coarse[joint], path) - _at(finer[joint], path))
-                for key, path in STEP_KEYS.items()
-            }
-            for joint in run.joints
-        },
-    }
+    joints = {}
+    for j, joint in enumerate(run.joints):
+        coarse, finer = _step_figures(run, j), _step_figures(fine, j)
+        joints[joint] = {
+            key: abs(_at(coarse, path) - _at(finer, path))
+            for key, path in STEP_KEYS.items()
+        }
+    return {"step_s": step, "joints": joints}
 
 
 def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
@@ -87,6 +86,13 @@ def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
         sections[joint] = section.with_drive(name)
         drives[name] = transmission.attached.drive
     return scene.model_copy(update={"joints": sections}), drives
+
+
+def _step_figures(run: Run, j: int) -> dict[str, Any]:
+    """The metrics of a joint that :data:`STEP_KEYS` names."""
+    rated = run.assembly.transmissions[j].drive.ratings.rated_torque
+    ripple = torque_ripple(run, j)
+    return {**ripple_figures(ripple, rated), **error_figures(run, j)}
 
 
 def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:

@@ -9,10 +9,10 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.figures.metrics import (
     against_rigid,
     orders_untold,
-    signal_statistics,
     torque_ripple,
 )
 from swgjoint.sim.figures.rating_use import cubed_mean
+from swgjoint.sim.figures.signals import signal_statistics
 from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
 

@@ -27,6 +27,7 @@ from swgjoint.sim.figures.ripple_validity import (
     map_label,
     ripple_label,
 )
+from swgjoint.sim.figures.signals import error_figures, ripple_figures
 from swgjoint.sim.figures.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.figures.verdict import PHASE_STEP, judge_run
 from swgjoint.sim.gauges import gauge_figures
@@ -91,8 +92,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "level": transmission.level,
         "drive": drive.name,
         "source": drive.level,
-        "ripple_rms_percent": float(100.0 * np.sqrt(np.mean(ripple**2)) / rated),
-        "ripple_pp_percent": float(100.0 * np.ptp(ripple) / rated),
+        **ripple_figures(ripple, rated),
         **label,
         **map_label(run, j, told=label["ripple_missing"] is None),
         "orders": [
@@ -119,8 +119,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         ],
         "highest_resolved_order": highest,
         "phase_step_rad": phase_step(run, j),
-        "transmission_error_arcmin": signal_statistics(error),
-        "torsion_arcmin": signal_statistics(run.torsion[window, j] / arcmin),
+        **error_figures(run, j),
         "off_command_deg": _off_command(run, j),
         "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
         "ratings": use_of_ratings(run, j),
@@ -348,15 +347,6 @@ def strongest_left_out(transmission: Transmission) -> bool:
     strength = strength + np.hypot(*kept.coefficients(torsion, 1).T) / stiffness
     lost = max(left.error + left.torque / stiffness for left in attached.unresolved)
     return bool(lost > strength[1:].max(initial=0.0))
-
-
-def signal_statistics(values: Array) -> dict[str, float]:
-    """Mean, root mean square and peak-to-peak value of a signal, in its unit."""
-    return {
-        "mean": float(np.mean(values)),
-        "rms": float(np.sqrt(np.mean(values**2))),
-        "pp": float(np.ptp(values)),
-    }
 
 
 def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
