@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import lcm, pi
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.gear.design.design import Design, MemberName
@@ -44,7 +45,11 @@ def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
     # a turning wave generator advances to the next teeth; at a fixed one the preceding
     # teeth arrive
     onwards = -pitches if layout == "wave_generator_fixed" else pitches
-    return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
+    # the shifts twice in a row contain those after any number of pitches
+    twice = np.concatenate([errors.shift, errors.shift]).ravel()
+    first = 2 * (np.asarray(onwards) % count)
+    shifts = sliding_window_view(twice, 2 * count)[first]
+    return np.asarray(shifts.reshape(-1, count, 2))
 
 
 def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
