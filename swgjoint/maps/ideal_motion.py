@@ -1,13 +1,15 @@
-r"""A map linearised about its ideal motion, for many positions and harmonics.
+r"""A map expanded about its ideal motion, for many positions and harmonics.
 
 The output angle psi stays within about a milliradian of theta/i, so the phases of the
 harmonics change very little over the distance s = psi - psi_0 from psi_0 = theta/i.
-Their effect is linearised in s at each theta:
+Their effect is of second degree in s at each theta:
 
-.. math:: V = V_0(\Delta) + s V_1(\Delta), \quad e_0 = a + s b, \quad
+.. math:: V = V_0(\Delta) + s V_1(\Delta) + \tfrac12 s^2 V_2(\Delta), \quad
+    e_0 = a + s b + \tfrac12 s^2 c, \quad
     \Delta = \theta/i - \psi_0 + e_0 - s, \quad T = -\frac{dV}{ds} .
 
-Where the highest harmonics change more, psi_0 is the solution found so far.
+Under load, psi_0 = theta/i minus the mean torsion is closer. Where the highest
+harmonics change more, psi_0 is the solution found so far.
 
 The sums over the harmonics are then matrix products or, at equal steps over the whole
 period of a map, Fourier transforms. They are computed once per position and interval of
@@ -28,14 +30,14 @@ from swgjoint.typing import Array, Index
 
 _NEWTON = 12
 _CLOSER = 3
-"""Largest number of linearisations about the solution found so far."""
+"""Largest number of expansions about the solution found so far."""
 _BEND = 1e-3
-"""Largest second-order term (q s)^2/2 that is neglected; q is the largest order of psi
-[-]."""
+"""Largest second-order term (q s)^2/2; q is the largest order of psi [-]. The neglected
+term (q s)^3/6 is then at most 1.5e-5."""
 _FLAT = 1e-8
-"""The same where the map is linearised about the solution found so far [-]."""
+"""The same where the map is expanded about the solution found so far [-]."""
 _CHUNK = 256
-"""Number of positions that are linearised again at once."""
+"""Number of positions that are expanded again at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,9 +50,9 @@ class Polynomials:
     interval: Index
     """Number of the interval between two knots (n,)."""
     coefficients: Array
-    """Coefficients of V_0 [J/rad^k] and V_1 [J/rad^(k+1)], as in a map.
+    """Coefficients of V_0, V_1 and V_2 [J/rad^k, J/rad^(k+1), J/rad^(k+2)].
 
-    Shape (2, n, 5).
+    Shape (3, n, 5).
     """
 
 
@@ -63,17 +65,17 @@ class IdealMotion:
     theta: Array
     """Input angles [rad]. Shape (n,)."""
     about: Array
-    """Output angles psi_0 about which the map is linearised [rad]. Shape (n,)."""
+    """Output angles psi_0 about which the map is expanded [rad]. Shape (n,)."""
     error: Array
-    """a [rad] and b [-], which are e0 and de0/dpsi at psi_0. Shape (2, n)."""
+    """a [rad], b [-] and c [1/rad]: e0 and its derivatives by psi at psi_0. (3, n)."""
     sums: Callable[[Array, Index | slice], Array]
     """Function of amplitudes (n_harmonics, 2, m) and of positions (n_there,). It
-    returns the sums over the harmonics and their derivatives by psi (2, n_there, m).
+    returns the sums over the harmonics and two derivatives by psi (3, n_there, m).
     """
     ends: Array
-    """V_0'' [N·m/rad] and V_1'' [N·m/rad²] below and above the knots.
+    """Second derivatives of V_0, V_1 and V_2 by Delta below and above the knots.
 
-    Shape (2, n, 2).
+    Shape (3, n, 2).
     """
 
     @classmethod
@@ -91,34 +93,41 @@ class IdealMotion:
             about = theta / drive.ratio
         phases = drive.phases(theta, about)
         n_psi = drive.angle_orders[:, 1]
-        factors = np.empty((2, *phases.shape, 2))
-        value, slope = factors
+        factors = np.empty((3, *phases.shape, 2))
+        value, slope, bend = factors
         np.cos(phases, out=value[..., 0])
         np.sin(phases, out=value[..., 1])
         np.multiply(-n_psi, value[..., 1], out=slope[..., 0])
         np.multiply(n_psi, value[..., 0], out=slope[..., 1])
-        both = factors.reshape(2, theta.size, -1)
+        np.multiply(-(n_psi[:, None] ** 2), value, out=bend)
+        every = factors.reshape(3, theta.size, -1)
 
         def sums(amplitudes: Array, there: Index | slice) -> Array:
-            return both[:, there] @ amplitudes.reshape(both.shape[2], -1)
+            return every[:, there] @ amplitudes.reshape(every.shape[2], -1)
 
         return cls._summed(drive, theta, about, sums)
 
     @classmethod
-    def over_period(cls, drive: Potential, turns: float, count: int) -> IdealMotion:
-        """The harmonics of a map, summed at psi_0 = theta/i over its whole period.
+    def over_period(
+        cls, drive: Potential, turns: float, count: int, lag: float = 0.0
+    ) -> IdealMotion:
+        """The harmonics of a map, summed over its period at psi_0 = theta/i - lag.
 
         Args:
             drive: The map.
             turns: Period of the map [input turns].
             count: Number of equal steps of theta, more than two per shortest wave.
+            lag: Distance of psi_0 from theta/i [rad].
         """
         theta = 2.0 * np.pi * turns * np.arange(count) / count
         n_theta, n_psi = drive.angle_orders.T
         waves = np.rint((n_theta + n_psi / drive.ratio) * turns).astype(np.int64)
+        cos, sin = np.cos(n_psi * lag)[:, None], np.sin(n_psi * lag)[:, None]
 
         def transform(amplitudes: Array) -> Array:
             a, b = amplitudes[:, 0], amplitudes[:, 1]
+            if lag:
+                a, b = a * cos - b * sin, a * sin + b * cos
             # cosines are even and sines are odd in the number of waves
             terms = a - 1j * np.where(waves < 0, -1.0, 1.0)[:, None] * b
             spectrum = np.zeros((count // 2 + 1, terms.shape[1]), dtype=complex)
@@ -127,10 +136,12 @@ class IdealMotion:
             return np.asarray(np.fft.irfft(spectrum, count, axis=0))
 
         def sums(amplitudes: Array, there: Index | slice) -> Array:
-            turned = amplitudes[:, ::-1] * (n_psi[:, None] * [1, -1])[..., None]
-            return np.stack([transform(part)[there] for part in (amplitudes, turned)])
+            slope = amplitudes[:, ::-1] * (n_psi[:, None] * [1, -1])[..., None]
+            bend = amplitudes * -(n_psi**2)[:, None, None]
+            parts = (amplitudes, slope, bend)
+            return np.stack([transform(part)[there] for part in parts])
 
-        return cls._summed(drive, theta, theta / drive.ratio, sums)
+        return cls._summed(drive, theta, theta / drive.ratio - lag, sums)
 
     @classmethod
     def _summed(
@@ -151,7 +162,7 @@ class IdealMotion:
         )
 
     def polynomials(self, interval: Index, known: Polynomials | None) -> Polynomials:
-        """Polynomials of V_0 and V_1 in one interval of the torsion per position.
+        """Polynomials of V_0 to V_2 in one interval of the torsion per position.
 
         The positions of an interval are summed at once.
 
@@ -163,7 +174,7 @@ class IdealMotion:
         table = self.drive.potential  # (n_harmonics, 2, n_knots - 1, 5)
         if known is None:
             changed = np.arange(interval.size)
-            coefficients = np.empty((2, interval.size, table.shape[-1]))
+            coefficients = np.empty((3, interval.size, table.shape[-1]))
         else:
             changed = np.flatnonzero(interval != known.interval)
             if not changed.size:
@@ -188,27 +199,34 @@ class IdealMotion:
             Torque, stiffness, and the polynomials for the next call.
         """
         knots = self.drive.torsion_knots
-        a, b = self.error
-        x = self.theta / self.drive.ratio - self.about + a + (b - 1.0) * shift
+        a, b, c = self.error
+        from_ideal = self.theta / self.drive.ratio - self.about
+        x = from_ideal + a + shift * (b - 1.0 + 0.5 * shift * c)
+        dx = b - 1.0 + shift * c
         inside = np.clip(x, knots[0], knots[-1])
         j = np.clip(np.searchsorted(knots, inside, "right") - 1, 0, knots.size - 2)
         there = self.polynomials(j, known)
-        c = np.moveaxis(there.coefficients, -1, 0)  # (5, 2, n)
+        p = np.moveaxis(there.coefficients, -1, 0)  # (5, 3, n)
         d, out = inside - knots[j], x - inside
-        v = c[0] + d * (c[1] + d * (c[2] + d * (c[3] + d * c[4])))
-        v1 = c[1] + d * (2 * c[2] + d * (3 * c[3] + d * 4 * c[4]))
-        v2 = 2 * c[2] + d * (6 * c[3] + d * 12 * c[4])
+        v = p[0] + d * (p[1] + d * (p[2] + d * (p[3] + d * p[4])))
+        v1 = p[1] + d * (2 * p[2] + d * (3 * p[3] + d * 4 * p[4]))
+        v2 = 2 * p[2] + d * (6 * p[3] + d * 12 * p[4])
         end = np.where(out < 0.0, self.ends[..., 0], self.ends[..., 1])
         v, v1 = v + out * (v1 + 0.5 * out * end), v1 + out * end
         v2 = np.where(out == 0.0, v2, end)
-        torque = (1.0 - b) * (v1[0] + shift * v1[1]) - v[1]
-        stiffness = (1.0 - b) ** 2 * (v2[0] + shift * v2[1]) - 2.0 * (1.0 - b) * v1[1]
+        # derivatives of V by Delta at fixed s, and by s at fixed Delta
+        by_x, by_xx = (
+            part[0] + shift * (part[1] + 0.5 * shift * part[2]) for part in (v1, v2)
+        )
+        by_s, by_xs = (part[1] + shift * part[2] for part in (v, v1))
+        torque = -(dx * by_x + by_s)
+        stiffness = dx * (dx * by_xx + 2.0 * by_xs) + c * by_x + v[2]
         return torque, stiffness, there
 
     def output_angle(self, torque: float) -> Array:
         """Output angle psi at which the drive exerts a torque [rad]. Shape (n,).
 
-        Where the second-order term exceeds :data:`_BEND`, the map is linearised again.
+        Where the second-order term exceeds :data:`_BEND`, the map is expanded again.
         The full map is solved where this does not converge.
 
         Args:
@@ -220,7 +238,8 @@ class IdealMotion:
         """
         drive = self.drive
         twist = drive.mean_torsion(torque) if torque else 0.0
-        psi, near = self._solve(torque, self.error[0] - twist, _BEND)
+        first = self.theta / drive.ratio - self.about + self.error[0] - twist
+        psi, near = self._solve(torque, first, _BEND)
         for _ in range(_CLOSER):
             again = np.flatnonzero(np.isfinite(psi) & ~near)
             if not again.size:
@@ -242,11 +261,11 @@ class IdealMotion:
         Args:
             torque: Torque T on the output [N·m].
             shift: First distance s [rad]. Shape (n,).
-            bend: Largest second-order term (q s)^2/2 of a valid linearisation [-].
+            bend: Largest second-order term (q s)^2/2 of a valid expansion [-].
 
         Returns:
             Output angles [rad], NaN where the method does not converge, and whether
-            the linearisation holds there. Shapes (n,).
+            the expansion holds there. Shapes (n,).
         """
         drive = self.drive
         settled = 1e-12 * float(np.ptp(drive.torsion_knots))

@@ -18,7 +18,8 @@ def test_polynomials_are_those_of_the_sums_in_all_intervals(synthetic_map):
         synthetic_map.angle_orders.T[1],
     )
     cos, sin = np.cos(phases), np.sin(phases)
-    factors = np.array([[cos, sin], [-n_psi * sin, n_psi * cos]])
+    slope = [-n_psi * sin, n_psi * cos]
+    factors = np.array([[cos, sin], slope, [-(n_psi**2) * cos, -(n_psi**2) * sin]])
     every = np.einsum("abtk,kb...->at...", factors, table)
     intervals = np.random.default_rng(3).integers(0, table.shape[2], (3, theta.size))
     # the last third stays in the intervals of the call before
@@ -34,7 +35,7 @@ def test_polynomials_are_those_of_the_sums_in_all_intervals(synthetic_map):
 
 
 def test_torque_and_stiffness_are_those_of_the_full_map(synthetic_map):
-    """At psi_0 itself nothing is linearised; the torque has the slope -stiffness."""
+    """At psi_0 itself nothing is left out; the torque has the slope -stiffness."""
     theta = np.linspace(0.0, 400.0, 101)
     about = theta / synthetic_map.ratio + np.linspace(-0.004, 0.004, theta.size)
     at = IdealMotion.from_map(synthetic_map, theta, about)
@@ -87,3 +88,20 @@ def test_transforms_over_the_period_equal_sums_at_single_angles(synthetic_map):
         whole.torque(shift)[:2], at.torque(shift[some]), strict=False
     ):
         np.testing.assert_allclose(long[some], short, rtol=1e-11, atol=1e-9)
+
+
+def test_signals_are_those_of_the_full_map(synthetic_map):
+    """Also under load, where the output is 5 mrad from theta/i."""
+    load = synthetic_map.ratings.rated_torque
+    turns = measure_turns(synthetic_map, {"error": load}, {"ripple": load})
+    count = turns["error"].signal.size
+    some = np.arange(0, count, max(1, count // 50))
+    theta = 2.0 * np.pi * float(turns["error"].period_turns) * some / count
+    ideal = theta / synthetic_map.ratio
+    twist = synthetic_map.mean_torsion(load)
+    wanted = synthetic_map.forces(theta, ideal - twist)[1]
+    found = turns["ripple"].signal[some]
+    assert np.abs(found - wanted).max() < 1e-9 * np.ptp(wanted)
+    angle = ideal + turns["error"].signal[some]
+    torque = synthetic_map.forces(theta, angle)[1]
+    assert np.abs(torque - load).max() < 1e-6 * np.ptp(wanted)

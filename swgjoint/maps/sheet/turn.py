@@ -183,22 +183,26 @@ def measure_turns(
     """
     period, theta = _input_angles(drive)
     signals = {key: np.empty(theta.size) for key in (*error, *ripple)}
-    back = {key: -drive.mean_torsion(torque) for key, torque in ripple.items()}
+    # signals at the same torque share the sums about its mean torsion
+    torques = {*error.values(), *ripple.values()}
+    lags = {t: drive.mean_torsion(t) if t else 0.0 for t in sorted(torques)}
     name = f"{drive.name}: output turn"
     progress(name, 0, theta.size)
     whole = theta.size <= WHOLE
     size = theta.size if whole else CHUNK
     for k in range(0, theta.size, size):
         part = slice(k, k + size)
-        at = (
-            IdealMotion.over_period(drive, float(period), theta.size)
-            if whole
-            else IdealMotion.from_map(drive, theta[part])
-        )
-        for key, torque in error.items():
-            signals[key][part] = at.output_angle(torque) - theta[part] / drive.ratio
-        for key, shift in back.items():
-            signals[key][part] = at.torque(np.full(at.theta.shape, shift))[0]
+        ideal = theta[part] / drive.ratio
+        for torque, lag in lags.items():
+            at = (
+                IdealMotion.over_period(drive, float(period), theta.size, lag)
+                if whole
+                else IdealMotion.from_map(drive, theta[part], ideal - lag)
+            )
+            for key in (key for key in error if error[key] == torque):
+                signals[key][part] = at.output_angle(torque) - ideal
+            for key in (key for key in ripple if ripple[key] == torque):
+                signals[key][part] = at.torque(np.zeros(at.theta.shape))[0]
         progress(name, min(k + size, theta.size), theta.size)
     return {
         key: Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
