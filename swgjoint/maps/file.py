@@ -51,8 +51,9 @@ fields for display, 5 the yield curve of the hysteresis. A file of an older vers
 is read as a map without these parts. A map without yield curves is written as version
 4."""
 _READABLE = (1, 2, 3, 4, SCHEMA_VERSION)
-MAX_BYTES = 64_000_000
-"""Largest file that is read [B]; 1000 harmonics with 100 knots take about 10 MB."""
+MAX_BYTES = 1_000_000_000
+"""Largest file that is read or written [B]. 1000 harmonics with 100 knots take about 10
+MB, the 16,439 harmonics of ``size-25-100-bought`` in 2D with 205 knots 276 MB."""
 
 _ARRAYS: dict[str, tuple[str, int, str]] = {
     "torsion_knots": ("<f8", 1, "rad"),
@@ -151,13 +152,19 @@ def write_map(drive: Potential, path: str | Path) -> None:
 
     Raises:
         InputError: If the file cannot be written.
-        MapFileError: If the map is not valid, so that it could not be read again.
+        MapFileError: If the map is not valid or too large, so that it could not be read
+            again.
     """
     try:
         check_map(drive)
     except ValueError as exc:
         raise MapFileError(f"map {drive.name!r} is not valid: {exc}") from None
-    write_whole(path, map_bytes(drive))
+    data = map_bytes(drive)
+    if len(data) > MAX_BYTES:
+        raise MapFileError(
+            f"map {drive.name!r}: {len(data)} bytes; accepted: at most {MAX_BYTES}"
+        )
+    write_whole(path, data)
 
 
 def read_map(path: str | Path, cls: type[Map]) -> Map:
@@ -243,7 +250,8 @@ def _content(path: Path) -> bytes:
     if status.st_size > MAX_BYTES:
         raise MapFileError(f"{status.st_size} bytes; accepted: at most {MAX_BYTES}")
     with path.open("rb") as file:
-        return file.read(MAX_BYTES)
+        # the buffer has the size that is passed
+        return file.read(status.st_size)
 
 
 def _members(data: bytes) -> dict[str, bytes]:

@@ -20,6 +20,7 @@ from messages import names, naming
 
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.json_text import plain
+from swgjoint.maps import file as map_file
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import MAX_BYTES, map_bytes, map_from_bytes
 from swgjoint.maps.friction import Friction
@@ -106,6 +107,20 @@ def test_round_trip_is_bitwise(synthetic_map, tmp_path):
 def test_same_map_same_bytes(synthetic_map):
     """The content depends on the map alone, not on the clock."""
     assert map_bytes(synthetic_map) == map_bytes(replace(synthetic_map))
+
+
+def test_a_map_too_large_to_be_read_is_not_written(
+    synthetic_map, tmp_path, monkeypatch
+):
+    """The message states both sizes, and no file is left."""
+    size = len(map_bytes(synthetic_map))
+    monkeypatch.setattr(map_file, "MAX_BYTES", size - 1)
+    with pytest.raises(MapFileError, match=naming(f"{size} bytes", f"{size - 1}")):
+        synthetic_map.save(tmp_path / "large.swg")
+    assert not os.listdir(tmp_path)
+    monkeypatch.setattr(map_file, "MAX_BYTES", size)
+    synthetic_map.save(tmp_path / "large.swg")
+    assert same(DriveMap.load(tmp_path / "large.swg"), synthetic_map)
 
 
 def test_numpy_reads_the_file_without_pickle(synthetic_map, tmp_path):
@@ -260,8 +275,8 @@ def test_zip_bomb(synthetic_map, tmp_path):
     try:
         said = refusal(tmp_path, out.getvalue())
         assert names(said, "header.npy", "compressed")
-        # of the buffer into which any file is read
-        assert tracemalloc.get_traced_memory()[1] < 1.1 * MAX_BYTES
+        # the member would take 100 MB
+        assert tracemalloc.get_traced_memory()[1] < 70_000_000
     finally:
         tracemalloc.stop()
 
