@@ -2,19 +2,23 @@
 
     python tests/golden/guide_tables.py
 
-Writes every table between its two comments, with a caption that names the command, the
-date and the commit of the result. A test compares the pages with what this would write.
+Writes every table between its two comments, with a caption that names the commands, the
+date and the commit of the results. A test compares the pages with what this would
+write.
 """
 
 from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from golden import load
+
+from swgjoint.units import arcsec
 
 PAGES = Path(__file__).parents[2] / "notebooks" / "guide" / "validation"
 Row = dict[str, Any]
@@ -78,12 +82,158 @@ def resonance(rows: list[Row]) -> list[list[str]]:
     return table
 
 
-TABLES: dict[str, tuple[str, Callable[[list[Row]], list[list[str]]], str]] = {
-    "study-catalogue": ("catalogue", losses, "Losses at ratio 100"),
-    "study-thesis": ("thesis", wave_generators, "Table 5.6 of the thesis"),
-    "study-response": ("joint", resonance, "Resonance with a free motor"),
+def back_driving(results: Sequence[Row]) -> list[list[str]]:
+    """Back-driving torque of catalogue drives of ratio 100, by size."""
+    key = "back_driving_torque_Nm"
+    sizes = [one["design"].split("-")[1] for one in results]
+    return [
+        ["CSG, ratio 100, size", *sizes],
+        [
+            "back-driving torque, predicted [N·m]",
+            *(f"{one[key]:.2f}" for one in results),
+        ],
+        [
+            "back-driving torque, stated [N·m]",
+            *(f"{one['stated'][key]:.2f}" for one in results),
+        ],
+    ]
+
+
+def efficiencies(results: Sequence[Row]) -> list[list[str]]:
+    """Efficiency [%] at 2000 rpm by torque up to the rated one, and temperature."""
+    flooded, run_in = results
+    loads = [f"{load:.4g}" for load in flooded["efficiency"]["load_Nm"]]
+    table = [["output torque [N·m]", *loads[:-1], f"{loads[-1]} (rated)"]]
+    for result, grease, temperature in (
+        (flooded, "flooded", 0.0),
+        (flooded, "flooded", 20.0),
+        (flooded, "flooded", 40.0),
+        (run_in, "run in", 20.0),
+    ):
+        found = result["efficiency"]
+        k = found["temperature_C"].index(temperature)
+        row = found["efficiency_percent"][k][found["speed_rpm"].index(2000.0)]
+        table.append([f"{grease}, {temperature:.0f} °C", *map(digits, row)])
+    share = flooded["losses"]["bending_share"][1:]
+    name = "share of bending in the losses, flooded, 20 °C [%]"
+    return [*table, [name, *(f"{100.0 * one:.2f}" for one in share)]]
+
+
+def radial_stiffness(results: Sequence[Row]) -> list[list[str]]:
+    """Radial stiffness [N/mm] of a cup by mesh and load."""
+    (result,) = results
+    found = result["radial_stiffness"]
+    large = found["large_rotations"]
+    values = {
+        "loads at mid-face, half of the elements per direction": "half_the_elements",
+        "loads at the open edge": "open_edge",
+        "loads spread over the face width": "spread_over_face_width",
+        "smooth cup in closed form": "smooth_shell",
+    }
+    rows = {name: found[f"{key}_N_mm"] for name, key in values.items()}
+    rows = {
+        "loads at mid-face, mesh of the thesis": result["radial_stiffness_N_mm"],
+        **rows,
+        "pulled apart by 0.4 mm with large rotations": large["outward_N_mm"],
+        "pressed together by 0.4 mm with large rotations": large["inward_N_mm"],
+    }
+    return [
+        ["case", "radial stiffness [N/mm]"],
+        *([name, f"{value:.1f}"] for name, value in rows.items()),
+    ]
+
+
+def kinematic_errors(results: Sequence[Row]) -> list[list[str]]:
+    """Peak to peak of the kinematic error [µrad] by wave generator and torque."""
+
+    def cell(result: Row) -> str:
+        error = result["per_step"]["output_error_arcsec"]
+        return f"{1e6 * arcsec * (max(error) - min(error)):.2f}"
+
+    cells = [cell(one) for one in results]
+    return [
+        ["wave generator", "unloaded", "20 N·m"],
+        ["elliptical", *cells[:2]],
+        ["simplified", *cells[2:]],
+    ]
+
+
+def of_rows(
+    table: Callable[[list[Row]], list[list[str]]],
+) -> Callable[[Sequence[Row]], list[list[str]]]:
+    """A table of the rows of a single study."""
+    return lambda results: table(results[0]["rows"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table of a page."""
+
+    page: str
+    """Name of the page without its ending."""
+    title: str
+    """What the table shows."""
+    cells: Callable[[Sequence[Row]], list[list[str]]]
+    """Head and rows from the results, in the order of ``frozen``."""
+    frozen: tuple[str, ...]
+    """Names of the frozen results."""
+
+
+TABLES: dict[str, Table] = {
+    "study-catalogue": Table(
+        page="catalogue",
+        title="Losses at ratio 100",
+        cells=of_rows(losses),
+        frozen=("study-catalogue",),
+    ),
+    "study-thesis": Table(
+        page="thesis",
+        title="Table 5.6 of the thesis",
+        cells=of_rows(wave_generators),
+        frozen=("study-thesis",),
+    ),
+    "study-response": Table(
+        page="joint",
+        title="Resonance with a free motor",
+        cells=of_rows(resonance),
+        frozen=("study-response",),
+    ),
+    "back-driving": Table(
+        page="joint",
+        title="Back-driving torque",
+        cells=back_driving,
+        frozen=(
+            "spec-back-driving-14",
+            "spec-back-driving-17",
+            "spec-back-driving-20",
+            "spec-back-driving",
+        ),
+    ),
+    "efficiency": Table(
+        page="joint",
+        title="Efficiency in percent at 2000 rpm",
+        cells=efficiencies,
+        frozen=("spec-flooded", "spec-run-in"),
+    ),
+    "radial-stiffness": Table(
+        page="articles",
+        title="Radial stiffness",
+        cells=radial_stiffness,
+        frozen=("spec-radial",),
+    ),
+    "kinematic-error": Table(
+        page="gear",
+        title="Kinematic error, peak to peak over one pitch [µrad]",
+        cells=kinematic_errors,
+        frozen=(
+            "error-elliptical-0",
+            "error-elliptical-20",
+            "error-simplified-0",
+            "error-simplified-20",
+        ),
+    ),
 }
-"""Page, table and title by the name of the frozen result."""
+"""Tables by the name that their place in the page has."""
 
 
 def between(name: str) -> re.Pattern[str]:
@@ -94,19 +244,23 @@ def between(name: str) -> re.Pattern[str]:
 
 def table_text(name: str) -> str:
     """Caption and rows of a table."""
-    frozen = load(name)
-    _, rows_of, title = TABLES[name]
-    head, *rows = rows_of(frozen["result"]["rows"])
-    date, commit = frozen["frozen"]["date"], frozen["frozen"]["commit"]
-    command = shlex.join(["swgjoint", *frozen["command"]])
+    table = TABLES[name]
+    stored = [load(one) for one in table.frozen]
+    head, *rows = table.cells([one["result"] for one in stored])
+    commands: dict[str, list[str]] = {}
+    for one in stored:
+        when = f"on {one['frozen']['date']} at commit {one['frozen']['commit']}"
+        command = shlex.join(["swgjoint", *one["command"]])
+        commands.setdefault(when, []).append(f"`{command}`")
+    made = "; ".join(f"{', '.join(run)} {when}" for when, run in commands.items())
     lines = [head, ["---"] * len(head), *rows]
-    caption = f"*{title}; `{command}` on {date} at commit {commit}:*"
-    return "\n".join([caption, "", *(f"| {' | '.join(row)} |" for row in lines), ""])
+    text = [f"| {' | '.join(row)} |" for row in lines]
+    return "\n".join([f"*{table.title}; {made}:*", "", *text, ""])
 
 
 def page_text(name: str) -> tuple[Path, str]:
-    """A page, and its content with the table of a frozen result."""
-    path = PAGES / f"{TABLES[name][0]}.md"
+    """A page, and its content with a table."""
+    path = PAGES / f"{TABLES[name].page}.md"
     before = path.read_text(encoding="utf-8")
     text = table_text(name)
     after, count = between(name).subn(lambda m: f"{m[1]}{text}{m[2]}", before)
@@ -116,6 +270,6 @@ def page_text(name: str) -> tuple[Path, str]:
 
 
 if __name__ == "__main__":
-    for table in TABLES:
-        page, content = page_text(table)
+    for place in TABLES:
+        page, content = page_text(place)
         page.write_text(content, encoding="utf-8")
