@@ -5,8 +5,9 @@ loop on every motor (``--bare``: no actuators and no gravity), slowly enough for
 step to carry all harmonics, as `attach` sees to. One thread, `mj_step` in C, CPU time
 of the process; per level the median over interleaved pairs rigid, level of the ratio of
 their steps per second. ``+friction`` is a level with friction that slips,
-``+hysteresis`` one with three elements, ``+corners`` one with the three lines of a
-catalogue. Not a test: nothing is asserted.
+``+hysteresis`` one with three elements, ``+losses`` one with both, ``+corners`` one
+with the three lines of a catalogue. A temperature changes only the numbers of the
+friction, so it costs no step any time. Not a test: nothing is asserted.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ HYSTERESIS = (
     Jenkin(stiffness=4e3, yield_torque=0.8),
     Jenkin(stiffness=2e3, yield_torque=1.6),
 )
-LOSSES = ("hysteresis", "friction")
+LOSSES = ("hysteresis", "friction", "losses")
 START = (0.2, 0.5, -0.2, -1.2, 0.3, 0.8, 0.1)
 
 
@@ -120,7 +121,7 @@ def build(
         spec.option.gravity = [0, 0, 0]
     names = [joint.name for joint in spec.joints]
     base, _, lossy = level.partition("+")
-    elements = HYSTERESIS if lossy == "hysteresis" else ()
+    elements = HYSTERESIS if lossy in ("hysteresis", "losses") else ()
     shape = cornered if lossy == "corners" else drive
     drives = [
         attach(
@@ -132,7 +133,7 @@ def build(
             level=base,
             rotor_inertia=rotor,
             damping_ratio=0.02,
-            friction=lossy == "friction",
+            friction=lossy in ("friction", "losses"),
         )
         for name, stiffness, rotor in zip(names, STIFFNESS, ROTOR, strict=True)
     ]
