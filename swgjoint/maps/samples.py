@@ -171,6 +171,9 @@ class MapSamples:
     """Whether each torque was solved at every angle; None if all were. At the other
     torques the tables are interpolated along the load paths, the input torque linearly.
     Shape (n_torques,)."""
+    solved_angles: NDArray[np.bool_] | None = None
+    """Whether each angle was solved; None if all were. At the other angles the tables
+    are interpolated over the angle. Shape (n_angles,)."""
     unseen: FullSolves | None = None
     """Equilibria at other angles and torques, zero included; None without any."""
     worst: FullSolves | None = None
@@ -188,12 +191,13 @@ class MapSamples:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
         if (np.diff(torque) <= 0).any() or not (torque == 0.0).any():
             raise ValueError("torque [N·m] must increase and contain zero")
-        solved = np.ones(torque.size) if self.solved is None else self.solved
-        solved = np.array(solved, dtype=bool)
-        if solved.shape != torque.shape:
-            raise ValueError(f"solved has shape {solved.shape}, needs {torque.shape}")
-        solved.flags.writeable = False
-        object.__setattr__(self, "solved", solved)
+        for key, axis in (("solved", torque), ("solved_angles", angle)):
+            given = getattr(self, key)
+            solved = np.array(np.ones(axis.size) if given is None else given, bool)
+            if solved.shape != axis.shape:
+                raise ValueError(f"{key} has shape {solved.shape}, needs {axis.shape}")
+            solved.flags.writeable = False
+            object.__setattr__(self, key, solved)
         object.__setattr__(self, "input_angle", angle)
         object.__setattr__(self, "torque", torque)
         for key, unit in (

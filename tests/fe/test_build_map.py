@@ -14,7 +14,6 @@ from swgjoint.drives import build_map as building
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.common import sampling
-from swgjoint.fe.common.mesh_cycle import with_mirrored_torques
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.fe.plane.continuation import Continuation
@@ -23,6 +22,7 @@ from swgjoint.fe.tolerances.sampling import sample_tolerances
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
+from swgjoint.maps.fit.between_angles import with_mirrored_torques
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
 

@@ -226,6 +226,30 @@ def test_other_angles_are_missed_by_what_the_samples_cannot_know():
     assert columns.largest_miss(6, others, [PEAK]) < 1e-9
 
 
+def test_angles_are_added_where_a_contact_changes():
+    """Next to the two angles at which the event comes and goes, and not elsewhere."""
+    # at 2 N·m the event comes at sin(theta) = -0.5 and goes at the other one
+    drive = KnownDrive(drops=((2.2, 2e-4),), swing=0.4)
+    columns = grid(drive, count=48)
+    others = [columns.unseen_column(2 * k + 0.76) for k in range(24)]
+    before = columns.largest_miss(24, others, [2.0])
+    spent = columns.solves
+    assert not columns.divide_angles(24, spent, 0.005)
+    assert columns.divide_angles(24, spent + 200, 0.005)
+    cost = 1 + len(columns.levels)
+    assert columns.solves == spent + cost * len(columns.between)
+    assert 2 <= len(columns.between) <= 10
+    apart = np.sin(2.0 * pi * np.array(columns.between) / 48) + 0.5
+    assert np.abs(apart).max() < 0.4
+    assert columns.largest_miss(24, others, [2.0]) < 0.7 * before
+    tables, _ = columns.tables(24, 20)
+    assert all(table.shape == (4, 48) for table in tables.values())
+    # the additional angles enter unchanged
+    for place in columns.between:
+        known = drive.at(2.0, float(columns.columns[place].theta))
+        assert tables[2.0][0, int(place)] == pytest.approx(known.error, abs=1e-15)
+
+
 def test_the_torque_beyond_the_peak_turns_the_stiffest_angle_as_far_as_the_softest():
     """All torsions at the peak are below the least one at the torque beyond it."""
     drive = KnownDrive(drops=((4.0, 5e-4),), swing=0.6)

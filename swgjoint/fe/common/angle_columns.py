@@ -92,6 +92,8 @@ class SolvedColumns(Generic[AnyState]):
     """Torques between the levels whose solves failed [N·m]."""
     beyond: list[float] = field(default_factory=list)
     """Additional torques beyond the largest level, at most one of each sign [N·m]."""
+    between: list[float] = field(default_factory=list)
+    """Places of the columns between equally spaced ones, increasing."""
     solves: int = 0
     """Number of solves that count against the budget."""
     tried: int = 0
@@ -117,6 +119,15 @@ class SolvedColumns(Generic[AnyState]):
         """Iterate over ``count`` equally spaced columns with their numbers."""
         for k in range(count):
             yield k, self.columns[k * (self.finest // count)]
+
+    def all_columns(self, count: int) -> list[AngleColumn[AnyState]]:
+        """``count`` equally spaced columns and those between them."""
+        places = {*range(0, self.finest, self.finest // count), *self.between}
+        return [self.columns[place] for place in sorted(places)]
+
+    def parts(self, count: int) -> Array:
+        """Angles of the sampled columns as fractions of the period (n,)."""
+        return np.array([one.theta for one in self.all_columns(count)]) / self.period
 
     def states(
         self, count: int, torques: Iterable[float]

@@ -80,6 +80,32 @@ def with_onsets(table: Array, small: float, faint: float = FAINT) -> Array:
     return np.insert(table, zero, sides[0], axis=1)
 
 
+def add_clearance(
+    table: dict[float, Array], signs: list[float], small: float, faint: float
+) -> None:
+    """Add rows at the ends of the clearance to a table by torque, in place.
+
+    Args:
+        table: Output error [rad], energy [J], compliance [rad/(N·m)] and input torque
+            [N·m] (4, n_angles) by torque [N·m], with those that take up the clearance.
+        signs: Signs of the torques, 1.0, -1.0 or both.
+        small: Torque that takes up the clearance [N·m].
+        faint: Torque at its ends as a fraction of ``small`` [-].
+    """
+    rest = table[0.0]
+    for sign in signs:
+        begin, onset = across_clearance(rest, table[sign * small], sign * small, faint)
+        table[begin] = onset
+        # the same stiffness on both sides of the middle
+        rest[2] = onset[2]
+    if faint != FAINT:
+        begins = [sign * faint * small for sign in signs]
+        ends = [abs(t) * np.abs(table[t][0] - rest[0]) for t in begins]
+        # work of this torque up to the ends of the clearance
+        for t in (0.0, *begins):
+            table[t][1] -= 0.5 * np.mean(ends)
+
+
 def with_mean_clearance(table: Array, levels: Array) -> tuple[Array, Array]:
     r"""Table of a drive whose clearance has its mean width at all angles.
 

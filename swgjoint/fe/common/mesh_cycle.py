@@ -16,6 +16,7 @@ from swgjoint.fe.common.clearance import FAINT
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
+from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
@@ -33,6 +34,9 @@ STALLED = 0.7
 """Largest ratio of the errors after and before a doubling of the angles with which they
 are doubled again [-]. A larger ratio indicates mesh errors, which more angles do not
 remove."""
+CORNER_GOAL = 0.03
+"""Goal for the estimated error between the angles, as a fraction of the peak-to-peak
+value [-]."""
 TORQUE_GOAL = 0.04
 """Goal for the estimated error between the torques, as a fraction of the peak-to-peak
 value [-]."""
@@ -57,6 +61,9 @@ class Effort:
     [-]."""
     beyond: bool = False
     """Whether to solve, at the end, one torque of each sign beyond the largest one."""
+    corners: float = 0.0
+    """Fraction of the solves that may be added, beyond the budget, at angles where the
+    contact changes between the samples, if the goals are met otherwise [-]."""
     worst: bool = False
     """Whether to validate the map where it is likely to be least accurate, if need be
     beyond the budget."""
@@ -68,6 +75,9 @@ class Pattern(Generic[AnyState]):
 
     theta: Array
     """Input positions, equally spaced over the pitch (n_angles,) [rad]."""
+    solved_angles: NDArray[np.bool_]
+    """Whether each position was solved (n_angles,). All other values are interpolated
+    over the angle."""
     torque: Array
     """Torques T, increasing, including zero (n_torques,) [N·m]."""
     table: Array
@@ -162,8 +172,11 @@ def solve_mesh_cycle(
     if effort.beyond:
         grid.go_beyond(reached.count)
     used, table, solved = _table(grid, reached.count, effort, symmetric=symmetric)
+    own = grid.parts(reached.count)
+    theta = grid.angles(even_steps(own, reached.count))
     return Pattern(
-        theta=grid.angles(reached.count),
+        theta=theta,
+        solved_angles=np.isin(np.arange(theta.size), np.round(own * theta.size)),
         torque=used,
         table=table,
         solved=solved,
@@ -265,6 +278,12 @@ def _refine_at_unseen(
         missed = grid.largest_miss(count, others, torques)
         if missed > STALLED * before:
             break
+    # if larger errors are left, a few angles do not cure them
+    met = missed <= GOAL and doubt <= TORQUE_GOAL
+    before, more = grid.solves, effort.corners * grid.solves * met
+    if grid.divide_angles(count, int(before + 0.6 * more), CORNER_GOAL):
+        doubt = grid.divide(count, int(before + more), TORQUE_GOAL)
+        missed = grid.largest_miss(count, others, torques)
     return _Reached(count=count, missed=missed, doubt=doubt)
 
 
@@ -307,7 +326,7 @@ def _table(
     """Torques, table and mask of the solved torques, as in :class:`Pattern`."""
     tables, solved = grid.tables(count, effort.torques, effort.faint)
     if symmetric:
-        tables = with_mirrored_torques(tables)
+        tables = with_mirrored_torques(tables, count)
         solved |= {-t for t in solved}
     used = np.array(sorted(tables))
     table = np.array([tables[t] for t in used]).swapaxes(0, 1)
@@ -316,9 +335,10 @@ def _table(
 
 def _record(grid: ColumnGrid[AnyState], reached: _Reached) -> dict[str, Any]:
     """Record of the numbers of angles and solves and of the remaining errors."""
-    columns = [column for _, column in grid.chosen(reached.count)]
+    columns = grid.all_columns(reached.count)
     return {
         "angles": reached.count,
+        "angles_between": len(grid.between),
         "solves": grid.solves,
         "solves_per_angle": [len(column.states) + 1 for column in columns],
         "missed_at_unseen_angles": reached.missed,
@@ -363,28 +383,3 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
         wanted = -grid.figures(image.states[torque], image.theta)[0]
         difference = float(grid.figures(opposite, one.theta)[0] - wanted)
     return {"torque_Nm": -torque, "difference_rad": difference}
-
-
-def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
-    """Tables of positive torques together with their mirror images.
-
-    Without load the drive equals its mirror image except for round-off, which exceeds
-    the strain energy at the smallest torques. The tables of both signs are therefore
-    shifted to the mean of the unloaded table and its mirror image.
-    """
-    rest = tables[0.0]
-    middle = 0.5 * (rest + _mirrored(rest))
-    shift = np.zeros_like(rest)
-    shift[:2] = (middle - rest)[:2]
-    sides = {t: values + shift for t, values in tables.items() if t}
-    return sides | {-t: _mirrored(v) for t, v in sides.items()} | {0.0: middle}
-
-
-def _mirrored(values: Array) -> Array:
-    """Table of the mirrored drive, under the opposite torque.
-
-    At -T and -theta the output error and the input torque have the opposite sign, while
-    energy and compliance are equal.
-    """
-    back = np.roll(values[:, ::-1], 1, axis=1)
-    return np.asarray(back * np.array([-1.0, 1.0, 1.0, -1.0])[:, None])

@@ -55,6 +55,9 @@ SOLVES = 2700
 """Largest number of equilibria of a 2D map, doubled if both signs of torque are
 sampled. An elliptical wave generator needs about a fifth of it, a simplified one all of
 it."""
+CORNERS = 0.15
+"""Fraction of the equilibria of a 2D map that may be added at angles where the contact
+changes between the samples [-]."""
 TOLERANCED_SOLVES = 1050
 """The same for a map with tooth errors, whose accuracy is limited by the harmonics that
 it leaves out."""
@@ -175,6 +178,7 @@ def sample_map(
         tolerances=None,
         free=pattern.free,
         solved=pattern.solved,
+        solved_angles=pattern.solved_angles,
         worst=None,
         unseen=pattern.unseen.in_series(series),
         shortfall=pattern.shortfall,
@@ -351,6 +355,7 @@ def effort_of(
         # in 3D these solves are better spent on other torques, and a map with tooth
         # errors is extrapolated beyond its samples anyway
         beyond=not solid and not errors,
+        corners=CORNERS if chosen and not solid and not errors else 0.0,
         worst=chosen and not solid and not errors,
     )
 

@@ -9,11 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
-from swgjoint.fe.common.clearance import FAINT, across_clearance
+from swgjoint.fe.common.clearance import FAINT, add_clearance
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState
 from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.fe.common.torque_choice import common_torques, periodic, unseen_parts
+from swgjoint.maps.fit.between_angles import (
+    doubt_between,
+    even_steps,
+    finer_steps,
+    spread_evenly,
+    steps_to_divide,
+)
 from swgjoint.maps.samples import FullSolves
 from swgjoint.typing import Array
 
@@ -106,11 +113,13 @@ class ColumnGrid(SolvedColumns[AnyState]):
         the angle.
 
         Args:
-            count: Number of equally spaced columns that predict the others.
+            count: Number of equally spaced columns; they and those between them
+                predict the others.
             others: Columns at other angles.
             torques: Torques at which to compare [N·m].
         """
-        worst, columns = 0.0, [column for _, column in self.chosen(count)]
+        worst, columns, own = 0.0, self.all_columns(count), self.parts(count)
+        even = even_steps(own, count)
         parts = np.array([one.theta for one in others]) / self.period
         for torque in torques:
             if torque == 0.0 and self.free:
@@ -118,11 +127,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
             if torque and any(torque not in one.states for one in others):
                 continue
             error, energy = self._curves_at(columns, torque)
+            potential = spread_evenly(own, energy + torque * error, even)
+            error = spread_evenly(own, error, even)
             there, _, _, moment = self._row(others, torque)
             predicted, _ = periodic(error, parts)
-            _, slope = periodic(
-                energy + torque * error, np.concatenate([parts, self._parts(count)])
-            )
+            _, slope = periodic(potential, np.concatenate([parts, self._parts(even)]))
             moments = slope / self.period + torque / self.follow.ratio
             predicted_moment, own_moment = np.split(moments, [len(parts)])
             for sampled, truth, estimate in (
@@ -212,7 +221,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
             worst = max((part for part, _ in wanted), default=0.0)
             limit = max(goal, WORST * worst)
             chosen = sorted((w for w in wanted if w[0] > limit), reverse=True)
-            chosen = chosen[: max(0, (most - self.solves) // count)]
+            each = count + len(self.between)
+            chosen = chosen[: max(0, (most - self.solves) // each)]
             if not chosen:
                 return worst
             for _, torque in chosen:
@@ -228,20 +238,20 @@ class ColumnGrid(SolvedColumns[AnyState]):
             value [-], and the torque at which to divide the interval [N·m].
         """
         wanted: list[tuple[float, float]] = []
+        columns = self.all_columns(count)
+        wave_number = POTENTIAL_WAVES * (2.0 * np.pi / self.period)
+        waves = wave_number * finer_steps(self.parts(count), count)
         for sign in self.signs:
             at, error, moment = self.peaks(count, sign)
             parts, places = [], []
-            for _, column in self.chosen(count):
+            for column, wave in zip(columns, waves, strict=True):
                 curve, _ = self.path(column, sign)
                 of_error, of_potential = curve.doubt
                 there = curve.division
                 parts.append(
                     np.maximum(
                         of_error / np.interp(there, at, error),
-                        POTENTIAL_WAVES
-                        * (2.0 * np.pi / self.period)
-                        * of_potential
-                        / np.interp(there, at, moment),
+                        wave * of_potential / np.interp(there, at, moment),
                     )
                 )
                 places.append(there)
@@ -257,7 +267,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
 
     def _add_torque(self, count: int, torque: float) -> None:
         """Solve one more torque in every column; it is dropped if a column fails."""
-        columns = [column for _, column in self.chosen(count)]
+        columns = self.all_columns(count)
         for k, column in enumerate(columns):
             # start from the previous angle if there is one within the pitch
             self._more(column, [torque], columns[max(0, k - 1) : k])
@@ -265,6 +275,40 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 self.failed.append(torque)
                 return
         self.levels = sorted([*self.levels, torque])
+
+    def divide_angles(self, count: int, most: int, goal: float) -> bool:
+        """Add columns where contacts change between the angles.
+
+        Args:
+            count: Number of equally spaced columns.
+            most: Largest total number of solves.
+            goal: Goal for the largest estimated error between the angles, as a fraction
+                of the peak-to-peak value [-].
+
+        Returns:
+            Whether columns were added.
+        """
+        if most <= self.solves:
+            return False
+        while True:
+            columns, parts = self.all_columns(count), self.parts(count)
+            doubt = np.zeros(parts.size)
+            for sign in self.signs:
+                at, *heights = self.peaks(count, sign)
+                # between solved torques, errors of the curves would count as corners
+                for torque in (t for t in self.levels if t * sign > 0.0):
+                    error, energy, _, _ = self._row(columns, torque)
+                    values = np.stack([error, energy + torque * error])
+                    height = [np.interp(abs(torque), at, one) for one in heights]
+                    found = doubt_between(parts, self.period, values, height)
+                    doubt = np.maximum(doubt, found)
+            left = (most - self.solves) // (1 + len(self.levels))
+            divided = steps_to_divide(parts, doubt, goal, count, left)
+            if not divided:
+                return bool(self.between)
+            for place in np.round(np.array(divided) * self.finest, 6).tolist():
+                self.columns[place] = self._column(place)
+                self.between = sorted([*self.between, place])
 
     def go_beyond(self, count: int) -> None:
         """Solve one torque of each sign beyond the largest one in every column.
@@ -274,7 +318,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
         largest torque, so that the map covers all torques up to the largest one at
         every angle. If one of the solves fails, the map ends at the largest torque.
         """
-        columns = [column for _, column in self.chosen(count)]
+        columns = self.all_columns(count)
         for sign in self.signs:
             top = max((t for t in self.levels if t * sign > 0.0), key=abs)
             rest = self._row(columns, 0.0)[0]
@@ -315,10 +359,10 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def tables(
         self, count: int, most: int, faint: float = FAINT
     ) -> tuple[dict[float, Array], set[float]]:
-        """Tables of the map by torque.
+        """Tables of the map by torque, at equally spaced angles.
 
         If clearance leaves the output free, rows are added at its ends, see
-        :func:`across_clearance`.
+        :func:`~swgjoint.fe.common.clearance.add_clearance`.
 
         Args:
             count: Number of columns.
@@ -327,9 +371,9 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 takes it up [-].
 
         Returns:
-            Values (4, count) by torque [N·m], and the torques solved in all columns.
+            Values (4, n_angles) by torque [N·m], and the torques solved in all columns.
         """
-        columns = [column for _, column in self.chosen(count)]
+        columns, parts = self.all_columns(count), self.parts(count)
         rest = np.array([self.figures(c.rest.state, c.theta) for c in columns]).T
         table = {0.0: rest}
         for sign in self.signs:
@@ -346,21 +390,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
                     np.vstack([curve.evaluate_at(torque), np.interp(torque, *solved)])
                     for curve, solved in paths
                 ]
-            )  # (count, 4, n)
+            )  # (n_columns, 4, n)
             values *= np.array([sign, 1.0, 1.0, sign])[:, None]
             table |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
-            if self.free:
-                taken_up = table[sign * self.small]
-                begin, onset = across_clearance(
-                    rest, taken_up, sign * self.small, faint
-                )
-                table[begin] = onset
-                # the same stiffness on both sides of the middle
-                rest[2] = onset[2]
-        if self.free and faint != FAINT:
-            begins: list[float] = [s * faint * self.small for s in self.signs]
-            ends = [abs(t) * np.abs(table[t][0] - rest[0]) for t in begins]
-            # work of this torque up to the ends of the clearance
-            for t in (0.0, *begins):
-                table[t][1] -= 0.5 * np.mean(ends)
+        if self.free:
+            add_clearance(table, self.signs, self.small, faint)
+        even = even_steps(parts, count)
+        table = {t: spread_evenly(parts, row.T, even).T for t, row in table.items()}
         return table, {0.0, *self.levels, *self.beyond}

@@ -42,6 +42,9 @@ from swgjoint.typing import Array
 KEEP = 0.005
 """A harmonic is kept if its kinematic error, or its input-torque ripple at any load,
 reaches this fraction of the largest one."""
+NARROW = 0.5
+"""Factor of this threshold for samples at unequally spaced angles: many weak harmonics
+together follow the corners for which angles were added [-]."""
 
 BETWEEN = (0.05, 0.15, 0.35, 0.65)
 """Additional fractions of the repeated peak torque at which harmonics are compared. The
@@ -53,7 +56,8 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
 
     Args:
         samples: Equilibria over one period of the pattern, with tolerances or without.
-        keep: Threshold for harmonics [-], see :data:`KEEP`; zero keeps all.
+        keep: Threshold for harmonics [-], see :data:`KEEP`; zero keeps all. It is
+            multiplied by :data:`NARROW` for samples at unequally spaced angles.
     """
     if samples.tolerances is not None:
         samples = replace(samples, tolerances=register_by_torque(samples))
@@ -137,6 +141,8 @@ def _select_harmonics(
 ) -> tuple[DriveMap, dict[str, Any]]:
     """The map without its weak harmonics, and the record of the fit."""
     strength = harmonic_strength(full)
+    if not np.all(samples.solved_angles):
+        keep = keep * NARROW
     kept = np.ones(len(strength), dtype=bool)
     largest = strength[1:].max(axis=0, initial=0.0)
     kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)

@@ -32,16 +32,17 @@ def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
         Largest deviation of e0 without load [rad], and of the torque at the sampled
         positions inside the knots of the map [N·m].
     """
-    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    own = samples.solved_angles
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)[:, own]
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     offset = samples.output_error[zero].mean()
-    psi = theta / drive.ratio + samples.output_error - offset
+    psi = theta / drive.ratio + samples.output_error[:, own] - offset
     e0, _, _ = drive.error_at(drive.phases(theta, psi))
     x = drive.torsion(theta, psi)
     torque = drive.torque(x, theta, psi)
     inside = (x >= drive.torsion_knots[0]) & (x <= drive.torsion_knots[-1])
     wanted = np.broadcast_to(samples.torque[:, None], x.shape)
-    error = samples.output_error[zero] - offset
+    error = samples.output_error[zero, own] - offset
     return {
         "kinematic_error_rad": float(np.abs(e0[zero] - error).max()),
         "torque_Nm": float(np.abs(torque - wanted)[inside].max()),
@@ -130,12 +131,14 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
         same torque; ``strain_energy_relative``: largest deviation of the energy gained
         from the unloaded state, relative to the largest gain.
     """
-    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    own = samples.solved_angles
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)[:, own]
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
-    psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
+    offset = samples.output_error[zero].mean()
+    psi = theta / drive.ratio + samples.output_error[:, own] - offset
     on_input, on_output = drive.forces(theta, psi)
     # the ripple is the input torque in excess of the output torque over the ratio
-    simulated = samples.input_torque - samples.torque[:, None] / drive.ratio
+    simulated = samples.input_torque[:, own] - samples.torque[:, None] / drive.ratio
     error = np.abs(-on_input - on_output / drive.ratio - simulated)
     inside = (samples.torque > drive.torque_range[0]) & (
         samples.torque < drive.torque_range[1]
@@ -144,10 +147,10 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
         inside &= samples.solved
     if samples.free:  # exclude the corner at the end of the clearance
         inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
-    ripple = np.ptp(samples.input_torque, axis=1)
+    ripple = np.ptp(simulated, axis=1)
     inside &= ripple > 0.0
     energy = drive.energy(drive.torsion(theta, psi), theta, psi)
-    gain = samples.energy - samples.energy[zero]
+    gain = (samples.energy - samples.energy[zero])[:, own]
     wrong = (energy - energy[zero]) - gain
     return {
         "input_torque_pp_Nm": float(ripple[inside].max()),

@@ -65,9 +65,12 @@ def input_torque_at(
 
 
 def _continued(samples: MapSamples) -> tuple[Array, Index]:
-    """Angles [rad] beyond both ends of a period, and the samples that they repeat."""
+    """Solved angles [rad] beyond both ends of a period, and the samples repeated."""
     count = samples.input_angle.size
     # a single angle has neither corners nor a slope
     step = float(np.diff(samples.input_angle).mean()) if count > 1 else 1.0
-    around = np.arange(-_REACH, count + _REACH + 1)
-    return np.asarray(step * around), around % count
+    assert samples.solved_angles is not None
+    own = np.flatnonzero(samples.solved_angles)
+    around = np.arange(-_REACH, own.size + _REACH + 1)
+    turns, at = np.divmod(around, own.size)
+    return np.asarray(step * (own[at] + count * turns)), own[at]

@@ -29,7 +29,7 @@ APART = 0.03
 LEAST = 0.01
 """Smallest additional torque relative to the repeated peak torque [-]."""
 FINE = 4
-"""Number of angles that are compared per step between sampled angles."""
+"""Number of angles that are compared per step between solved angles."""
 
 
 def worst_positions(drive: Potential, samples: MapSamples) -> list[tuple[float, float]]:
@@ -103,9 +103,10 @@ def _doubts(
         Angles (n_angles,) [rad], and the magnitudes of the differences of output error
         and input torque relative to their peak to peak, each (n, n_angles) [-].
     """
-    n = samples.input_angle.size
-    step = float(samples.input_angle[1] - samples.input_angle[0])
-    theta = step * (np.arange(FINE * n) + 0.5) / FINE
+    own = samples.input_angle[samples.solved_angles]
+    period = samples.input_angle.size * (samples.input_angle[1] - own[0])
+    step = np.diff(np.append(own, own[0] + period))
+    theta = (own[:, None] + step[:, None] * (np.arange(FINE) + 0.5) / FINE).ravel()
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     offset = float(samples.output_error[zero].mean())
     output, moment = [], []
