@@ -192,6 +192,7 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         f"scene {result['scene']}, values of the {which}; K1 and stress of the drive",
         table([units, *rows], header=header),
+        *worst_joints(result["rows"]),
         rotor_line(result["assumed_rotors"]),
         *result["notes"],
     ]
@@ -205,6 +206,20 @@ def report(result: dict[str, Any]) -> str:
         passing = ", ".join(result["kept_by"])
         lines.append(f"all limits are met by: {passing or 'none'}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
+
+
+def worst_joints(rows: list[dict[str, Any]]) -> list[str]:
+    """Name the joints with the largest ripple, which may differ between the rows."""
+    shown = [row for row in rows if row["ripple_missing"] is None]
+    arguments: dict[str, list[str]] = {}
+    for row in shown:
+        arguments.setdefault(row["joint"], []).append(row["argument"])
+    every = len(arguments) == 1
+    where = [
+        joint + ("" if every else f" ({', '.join(names)})")
+        for joint, names in arguments.items()
+    ]
+    return [f"largest torque ripple: {', '.join(where)}"] if where else []
 
 
 def rotor_line(assumed: list[str]) -> str:

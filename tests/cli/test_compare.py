@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 from solved import coarse
 from validation_record import validated_map
 
+from swgjoint.cli.compare import worst_joints
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
 from swgjoint.explore.compare import compare
@@ -382,3 +383,16 @@ def test_a_ripple_that_is_not_valid_is_marked_and_misses_its_limit(
     marked = [line for line in lines if " ! " in line and "synthetic" not in line]
     assert len(marked) == 1 and marked[0].startswith(str(bad))
     assert any(line.startswith("! not valid") for line in lines)
+
+
+def test_the_joint_of_the_largest_ripple_is_named():
+    """One name if it is the same in all rows; rows without ripple have none."""
+
+    def row(argument, joint, missing=None):
+        return {"argument": argument, "joint": joint, "ripple_missing": missing}
+
+    rows = [row("a", "elbow"), row("rigid", "wrist", "none")]
+    assert worst_joints(rows) == ["largest torque ripple: elbow"]
+    rows.append(row("b", "wrist"))
+    assert worst_joints(rows) == ["largest torque ripple: elbow (a), wrist (b)"]
+    assert worst_joints(rows[1:2]) == []
