@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from swgjoint.drives.fidelity import default_model
-from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.common.sampling import sample_map
-from swgjoint.fe.plane import drive2d
-from swgjoint.fe.plane.figures.friction_loop import friction_loops
-from swgjoint.fe.rings import sampling as thin_ring
-from swgjoint.fe.rings.friction_loops import ring_friction_loops
-from swgjoint.fe.rings.losses import loss_model
-from swgjoint.fe.solid import drive3d
-from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit.fit import fit_map
-from swgjoint.maps.fit.friction_bending import without_friction
-from swgjoint.maps.fit.friction_fit import friction_of_losses
-from swgjoint.maps.fit.hysteresis_loops import with_hysteresis
-from swgjoint.maps.friction_temperature import KEY, at_temperature, friction_table
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
@@ -65,39 +49,31 @@ def build_map(
         ComputationError: If the solver converges at none of the torques.
     """
     model = model or default_model(design)
-    check_level(design, model)
     if design.losses is not None:  # not part of the finite elements
         plain = design.with_changes({"losses": None})
         drive = build_map(
             plain, model=model, angles=angles, progress=progress, cache=cache
         )
-        return _with_losses(design, drive, progress)
+        from swgjoint.drives.solve_map import with_losses
+
+        return with_losses(design, drive, progress)
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     keep = Unfinished.from_parts(parts) if cache else None
     perfect_keep = _perfect_store(design, angles) if cache and model == "ring" else None
 
     def build() -> DriveMap:
-        if model == "3d":
-            hint = "takes 7 to 15 min; 2d and ring are faster"
-            progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
-        if model == "ring":
-            samples = thin_ring.sample_thin_rings(
-                design,
-                angles=angles,
-                progress=progress,
-                keep=keep,
-                perfect_keep=perfect_keep,
-            )
-        else:
-            samples = sample_map(
-                design, model=model, angles=angles, progress=progress, keep=keep
-            )
-        drive = fit_map(samples)
-        if design.friction.tooth_coefficient:
-            store = perfect_keep if model == "ring" else keep
-            drive = _with_friction(design, drive, progress, store)
-        return _without_losses(design, drive)
+        # a map from the cache does without the finite elements
+        from swgjoint.drives.solve_map import solve_map
+
+        return solve_map(
+            design,
+            model,
+            angles,
+            progress=progress,
+            keep=keep,
+            perfect_keep=perfect_keep,
+        )
 
     if not cache:
         return build()
@@ -124,95 +100,3 @@ def _perfect_store(design: Design, angles: int | None) -> Unfinished | None:
             "flawed": has_errors(design),
         }
     )
-
-
-def check_level(design: Design, model: str) -> None:
-    """Reject designs without a map at a level.
-
-    A feature that a level lacks is no reason: it is left out, and the label of the map
-    names it, see :func:`swgjoint.fe.plane.drive2d.unmodelled_parts`.
-
-    Args:
-        design: The drive.
-        model: Level of the map: ``ring``, ``2d`` or ``3d``.
-
-    Raises:
-        DesignError: If the level is unknown, or the design lacks what the level
-            needs: a cup in 3D; for thin rings a bearing with a smooth cam and a fixed
-            circular spline.
-    """
-    if model == "3d":
-        drive3d.check_modelled(design)
-    elif model == "ring":
-        thin_ring.check_modelled(design)
-    else:
-        drive2d.check_modelled(design, model)
-
-
-def _with_friction(
-    design: Design, drive: DriveMap, progress: Progress, keep: Unfinished | None
-) -> DriveMap:
-    """The map with hysteresis from tooth friction, or the reason why it has none."""
-    top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
-    try:
-        if drive.level == "ring":
-            loops = ring_friction_loops(
-                design,
-                top=top,
-                rated=drive.ratings.rated_torque,
-                progress=progress,
-                keep=keep,
-            )
-        else:
-            loops = friction_loops(
-                design,
-                top=top,
-                rated=drive.ratings.rated_torque,
-                progress=progress,
-                keep=keep,
-            )
-    except ComputationError as failure:
-        reason = f"friction of the teeth gives no hysteresis: {failure}"
-        missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
-        return replace(drive, info={**drive.info, "missing": missing})
-    return with_hysteresis(drive, loops)
-
-
-def _with_losses(design: Design, drive: DriveMap, progress: Progress) -> DriveMap:
-    """The map with friction at speed from ``[losses]``, or the reason why not."""
-    assert design.losses is not None
-    info = {**drive.info, "design_hash": design.content_hash()}
-    try:
-        model = loss_model(design, progress=progress)
-        own = model.conditions
-        laws = {
-            temperature: friction_of_losses(
-                model.catalogue_losses(temperature),
-                design.ratio,
-                film=model.film(temperature),
-                source="bearing maker's model, teeth, race, bending and seals of the"
-                " design",
-            )
-            for temperature in sorted({*own.temperatures(), own.temperature})
-        }
-    except (ComputationError, DesignError) as failure:
-        why = "; ".join(str(failure).splitlines())
-        missing = {**info.get("missing", {}), **dict.fromkeys(LOSS_KEYS, why)}
-        return replace(drive, info={**info, "missing": missing})
-    missing = {k: v for k, v in info["missing"].items() if k not in LOSS_KEYS}
-    section = design.losses
-    table = friction_table(
-        laws,
-        lubricant=f"{section.grease.replace('_', ' ')} grease, base oil of"
-        f" {section.base_oil_40C_mm2_s:g} and {section.base_oil_100C_mm2_s:g} mm²/s at"
-        " 40 and 100 °C",
-    )
-    drive = replace(drive, info={**info, "missing": missing, KEY: table})
-    return at_temperature(drive, own.temperature, where=design.drive.name)
-
-
-def _without_losses(design: Design, drive: DriveMap) -> DriveMap:
-    """The map with the reason why it has no speed-dependent losses."""
-    missing = dict.fromkeys(LOSS_KEYS, without_friction(design))
-    missing |= drive.info.get("missing", {})
-    return replace(drive, info={**drive.info, "missing": missing})

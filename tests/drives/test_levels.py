@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from swgjoint.drives.build_map import check_level
+from swgjoint.drives.solve_map import check_level
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.gear.design.design import Design

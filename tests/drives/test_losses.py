@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from swgjoint.drives import build_map as builder
+from swgjoint.drives import solve_map as solving
 from swgjoint.drives.spec_sheet import measure_drive
 from swgjoint.errors import DesignError
 from swgjoint.fe.rings import losses as ring_losses
@@ -62,7 +63,7 @@ def without_elements(monkeypatch):
     missing = {"efficiency_percent": "none", "orders": "kept"}
     plain = replace(DriveMap.linear(2e4, rated_torque=87.0), info={"missing": missing})
     monkeypatch.setattr(builder, "cache_map", lambda parts, build, name: plain)
-    monkeypatch.setattr(builder, "loss_model", loss_model)
+    monkeypatch.setattr(solving, "loss_model", loss_model)
     monkeypatch.setattr(ring_losses, "loss_model", loss_model)
     return plain
 

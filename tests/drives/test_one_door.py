@@ -12,7 +12,7 @@ from messages import naming
 
 import swgjoint
 from swgjoint.cli.main import main
-from swgjoint.drives import build_map as building
+from swgjoint.drives import solve_map as solving
 from swgjoint.drives.references import load_drive
 from swgjoint.errors import InputError
 from swgjoint.gear.design.design import Design
@@ -28,7 +28,7 @@ def design(monkeypatch, tmp_path):
     design = Design.load("reference-2d")
     info = {"design_hash": design.content_hash()}
     samples = replace(samples_of(), name="reference-2d", info=info)
-    monkeypatch.setattr(building, "sample_map", lambda *_, **__: samples)
+    monkeypatch.setattr(solving, "sample_map", lambda *_, **__: samples)
     return design
 
 

@@ -10,7 +10,7 @@ import pytest
 from messages import names
 from solved import coarse, few_teeth
 
-from swgjoint.drives import build_map as building
+from swgjoint.drives import solve_map as solving
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.common import sampling
@@ -252,7 +252,7 @@ def test_a_map_in_3d_says_at_once_that_it_takes_long(monkeypatch):
     def stopped(*_: object, **__: object) -> None:
         raise ComputationError("stopped")
 
-    monkeypatch.setattr(building, "sample_map", stopped)
+    monkeypatch.setattr(solving, "sample_map", stopped)
     with pytest.raises(ComputationError, match="stopped"):
         build_map(
             Design.load("size-25-100"),

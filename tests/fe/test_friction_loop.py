@@ -10,7 +10,8 @@ import pytest
 from messages import naming
 from solved import kept
 
-import swgjoint.drives.build_map as building
+import swgjoint.drives.solve_map as solving
+from swgjoint.drives.build_map import build_map
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane.continuation import Continuation
@@ -184,10 +185,10 @@ def test_map_has_the_hysteresis_of_its_teeth(monkeypatch):
         given.append(sample_map(*args, **keys))
         return given[-1]
 
-    monkeypatch.setattr(building, "sample_map", sampled)
+    monkeypatch.setattr(solving, "sample_map", sampled)
     few = partial(friction_loops, positions=2)
-    monkeypatch.setattr(building, "friction_loops", few)
-    drive = building.build_map(design, angles=4, cache=False)
+    monkeypatch.setattr(solving, "friction_loops", few)
+    drive = build_map(design, angles=4, cache=False)
     smooth = fit_map(given[0])
     np.testing.assert_array_equal(drive.potential, smooth.potential)
     assert smooth.hysteresis == () and len(drive.hysteresis) > 0
@@ -219,8 +220,8 @@ def test_map_without_a_loop_says_why(monkeypatch, synthetic_map):
     def fails(*_: object, **__: object) -> None:
         raise ComputationError("no equilibrium at 3 N·m")
 
-    monkeypatch.setattr(building, "friction_loops", fails)
-    drive = building._with_friction(rubbing(0.1), synthetic_map, lambda *_: None, None)
+    monkeypatch.setattr(solving, "friction_loops", fails)
+    drive = solving._with_friction(rubbing(0.1), synthetic_map, lambda *_: None, None)
     sheet = drive.spec_sheet(only=["hysteresis_loss_arcmin"])
     assert sheet["hysteresis_loss_arcmin"] is None
     assert "no equilibrium at 3 N·m" in sheet["missing"]["hysteresis_loss_arcmin"]
