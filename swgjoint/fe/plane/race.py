@@ -156,6 +156,11 @@ class PlaneRace:
         """Angles of the sectors in the undeformed ring (N,) [rad]."""
         return self._pitch * np.arange(self.sectors, dtype=np.float64)
 
+    @property
+    def _outside(self) -> float:
+        """Distance of the outside of the race from its mean line [m]."""
+        return 0.5 * self.on_balls.bearing.race_thickness
+
     def initial_guess(self, alpha: float, rotation: float) -> Array:
         """Start of a search: a two-lobe race that presses on the balls at its lobes.
 
@@ -292,7 +297,7 @@ class PlaneRace:
             inside=False,
             own=below,
         )
-        gap = seen.distance - 0.5 * self.on_balls.bearing.race_thickness
+        gap = seen.distance - self._outside
         k = np.where(touching, self.press, 0.0).ravel()
         force = -k * gap
         rows = np.zeros((len(gap), 3, 2 + 2 * NODE))
@@ -325,7 +330,7 @@ class PlaneRace:
         native.race_contact(
             self.places,
             self.press,
-            0.5 * self.on_balls.bearing.race_thickness,
+            self._outside,
             self.per_sector,
             q,
             np.ascontiguousarray(points),
