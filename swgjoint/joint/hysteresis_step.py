@@ -23,6 +23,8 @@ mean torque or, if this is larger, the smallest rate with
 The work (offset + rate d) d is then at least :math:`-k u_0^2/2` for every d. The
 element ends with at most its initial energy plus that work. It therefore dissipates
 energy or returns only stored energy, even if an impact makes the prediction wrong.
+With this rate, the passes of the scheme also converge where Newton's method would
+alternate between sticking and slipping.
 
 A yield torque that depends on the load is constant within a step, with the mean elastic
 torque of the step. If it is smaller than in the step before, the slider first slips
@@ -106,8 +108,6 @@ def element_steps(
     reach: Sequence[float],
     torsion: float,
     change: float = 0.0,
-    *,
-    applied: bool = True,
 ) -> tuple[ElementStep, ...]:
     """Torque of each element over a predicted change of the torsion.
 
@@ -117,8 +117,6 @@ def element_steps(
         reach: Yield torsion of each element in this step [rad].
         torsion: Torsion at the start [rad].
         change: Predicted change of the torsion [rad].
-        applied: Whether the torque has to be passive for any change of the torsion;
-            otherwise the rate is the slope of the mean torque.
     """
     steps = []
     for element, r, d in zip(elements, rest, reach, strict=True):
@@ -128,7 +126,7 @@ def element_steps(
         part = 1.0 if end == begin + change else (end - begin) / change
         mean = k * (0.5 * (begin + end) * part + end * (1.0 - part))
         rate = 0.5 * k * part**2
-        if applied and part != 1.0:
+        if part != 1.0:
             # (mean - rate change)² = 2 k rate begin², the smaller solution
             work, stored = mean * change, k * begin**2
             total = work + stored + sqrt(stored * (2.0 * work + stored))

@@ -179,14 +179,12 @@ def scheme_force(
     beta, speed = float(b @ x), float(b @ v)
     rubs: FrictionStep | None = None
     dv: Array = np.zeros(2)
-    for remaining in reversed(range(passes)):
+    for _ in range(passes):
         dx = h * (v + 0.5 * dv)
         s = _secant(drive, x, dx)
-        elements = element_steps(
-            *(drive.hysteresis, rest, yield_torsions(drive.hysteresis, s.torque)),
-            *(start, float(s.g @ dx)),
-            applied=remaining == 0,
-        )
+        reach = yield_torsions(drive.hysteresis, s.torque)
+        change = float(s.g @ dx)
+        elements = element_steps(drive.hysteresis, rest, reach, start, change)
         sticking = sum(element.part * element.stiffness for element in elements)
         s = replace(
             s,

@@ -47,11 +47,11 @@ class Hysteresis {
   // they are those at the mean elastic torque `value->torque` throughout the change. All
   // torques of the elements are multiplied by `losses`.
   //
-  // The rate is the derivative of the mean torque or, if the torque is `applied`, the
-  // smallest rate at least as large that keeps the element passive, whatever the torsion
-  // does in the step: the work of offset + rate change is never less than minus the
-  // stored energy.
-  void Slip(double change, double losses, bool applied, DriveValue* value) {
+  // The rate is the derivative of the mean torque or, if this is larger, the smallest
+  // rate that keeps the element passive, whatever the torsion does in the step: the work
+  // of offset + rate change is never less than minus the stored energy. With it, the
+  // passes also converge where Newton's method alternates between sticking and slipping.
+  void Slip(double change, double losses, DriveValue* value) {
     if (varies()) Load(value->torque);
     for (size_t j = 0; j < reach_.size(); ++j) {
       const double k = losses * stiffness_[j];
@@ -62,16 +62,14 @@ class Hysteresis {
       const double f = end == free ? 1 : (end - begin) / change;
       const double mean = 0.5 * (begin + end) * f + end * (1 - f);
       double rate = 0.5 * f * f;
-      if (applied) {
-        if (f != 1) {
-          // (mean - rate change)^2 = 2 rate begin^2, the smaller solution
-          const double work = mean * change, stored = begin * begin;
-          const double root = std::fabs(begin) * std::sqrt(2 * work + stored);
-          const double sum = work + stored + root;
-          if (sum > 0) rate = std::max(rate, mean * mean / sum);
-        }
-        elements_[j] = {begin, mean - rate * change, rate, f == 1};
+      if (f != 1) {
+        // (mean - rate change)^2 = 2 rate begin^2, the smaller solution
+        const double work = mean * change, stored = begin * begin;
+        const double root = std::fabs(begin) * std::sqrt(2 * work + stored);
+        const double sum = work + stored + root;
+        if (sum > 0) rate = std::max(rate, mean * mean / sum);
       }
+      elements_[j] = {begin, mean - rate * change, rate, f == 1};
       value->torque += k * mean;
       value->slope += k * rate;
       value->stiffness_begin += k * f;

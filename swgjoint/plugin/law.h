@@ -105,7 +105,7 @@ class Law {
                 double* rubs) {
     map_.Gradient(q[0], q[1], value);
     hysteresis_.Place(map_.torsion(), state + kAccelerations, nullptr);
-    hysteresis_.Slip(0, losses_, false, value);
+    hysteresis_.Slip(0, losses_, value);
     *rubs = 0;
     if (friction_) {
       const double* bristle = Bristle(state);
@@ -137,9 +137,7 @@ class Law {
     for (int pass = 0; pass < passes_; ++pass) {
       const Pair dx = v * h + dv * (0.5 * h);
       map_.Secant(dx[0], dx[1], &g);
-      if (hysteresis_.size()) {
-        hysteresis_.Slip(Dot(g.g, dx), losses_, pass + 1 == passes_, &g);
-      }
+      if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, dx), losses_, &g);
       const double k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
       const double w = Dot(g.g * g.g, weight);
       const double ka = h * h * w * k;
@@ -204,7 +202,7 @@ class Law {
       DriveValue value;
       map_.Gradient(q[0], q[1], &value);
       hysteresis_.Place(map_.torsion(), rest, nullptr);
-      hysteresis_.Slip(0, losses_, false, &value);
+      hysteresis_.Slip(0, losses_, &value);
       const double reach = friction_->Reach(Rotation(v), value.torque);
       bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
       bristle[1] = 1;

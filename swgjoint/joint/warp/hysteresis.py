@@ -119,7 +119,6 @@ def slip(
     elastic: real,
     rest: real,
     limit: real,
-    applied: bool,
 ):
     """Secant with the mean torque of one hysteresis element over the step added.
 
@@ -132,16 +131,13 @@ def slip(
         elastic: Mean elastic torque of the step [N·m].
         rest: Torsion at which the element is relaxed [rad].
         limit: Yield torsion in the last step [rad]; zero if there was none.
-        applied: Whether the torque must be passive for any change of the torsion.
     """
     stiffness = losses * maps.element[j, 0]
     reach = reach_at(drive, maps, j, elastic)
     begin = begin_at(s.begin, rest, limit, reach)
     sticks = sticking_part(begin, s.change, reach)
     mean = mean_stretch(begin, s.change, reach, sticks)
-    rate = HALF * sticks * sticks
-    if applied:
-        rate = passive_rate(begin, s.change, mean, sticks)
+    rate = passive_rate(begin, s.change, mean, sticks)
     s.torque += stiffness * mean
     s.slope += stiffness * rate
     s.k0 += stiffness * sticks

@@ -266,7 +266,7 @@ def law(
     speed = drive.b_theta * vm + drive.b_psi * vl
     last.rotation = drive.b_theta * theta + drive.b_psi * psi
     turned = wp.where(last.known == 1, last.rotation - last.relaxed, ZERO)
-    for pass_ in range(PASSES):
+    for _ in range(PASSES):
         s = secant_over(
             drive,
             maps,
@@ -280,17 +280,7 @@ def law(
         last.elastic = s.torque
         for j in range(drive.element, drive.element + drive.elements):
             limit = rest[world, maps.element.shape[0] + j]
-            s = slip(
-                s,
-                drive,
-                maps,
-                j,
-                losses,
-                last.elastic,
-                rest[world, j],
-                limit,
-                pass_ + 1 == PASSES,
-            )
+            s = slip(s, drive, maps, j, losses, last.elastic, rest[world, j], limit)
         k = wp.max(ZERO, HALF * (s.k0 + s.k1))
         w = s.g_theta * s.g_theta * wm + s.g_psi * s.g_psi * wl
         ka = h * h * k * w
