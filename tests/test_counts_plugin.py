@@ -29,7 +29,7 @@ JOINTS = 6
 NATIVE_INSTRUCTIONS = 42_936
 """Of a step of six native drives, the engine's included; each has three tendons."""
 FULL_INSTRUCTIONS = 60_730
-EVALUATION_TABLES = 8.6
+EVALUATION_TABLES = 1.57
 """Memory of an evaluation in Python over that of a table of all its cos and sin."""
 PROGRAM = r"""
 #include <dlfcn.h>

@@ -180,7 +180,7 @@ def report(result: dict[str, Any]) -> str:
         f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
-        *(rotor_lines(contains) if result["rotors_assumed"] else []),
+        *(rotor_lines(contains) if result.get("rotors_assumed") else []),
         *assumed_lines(contains),
         *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],

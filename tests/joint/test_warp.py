@@ -370,7 +370,10 @@ def test_every_world_has_its_own_specimen(drive):
     want = np.concatenate([one.d.qpos.numpy() for one in alone])
     assert np.ptp(ends, axis=0).min() > 3e-5  # the worlds differ
     np.testing.assert_allclose(ends, want, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(ends[0], both.data.qpos, rtol=0, atol=1e-6)
+    # rounding of the states to single precision: at most 7 units in the last place over
+    # 32 starts, a drive without losses included
+    last = float(np.spacing(np.abs(ends[0]).max()))
+    np.testing.assert_allclose(ends[0], both.data.qpos, rtol=0, atol=10.0 * last)
 
 
 def test_deviations_in_the_model_hold_in_every_world(synthetic_map):
