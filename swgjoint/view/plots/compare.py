@@ -194,6 +194,7 @@ def _bars(
         ax.set_xlim(0.4 * min(seen), 25.0 * max(seen))
     else:
         ax.set_xlim(0.0, 1.35 * max(seen))
+        ax.locator_params(axis="x", nbins=3)  # more labels may overlap
     left = ax.get_xlim()[0]
     for k, row in enumerate(rows):
         text = f" {cell(row.to_json(), key)}"

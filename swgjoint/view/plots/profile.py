@@ -55,6 +55,7 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
     axes[0].set_title("one tooth of each member, dots at segment junctions")
     axes[1].set_title("flexspline tooth in a tooth space, pitch circles touching")
     for ax in axes:
+        ax.title.set_fontsize("medium")
         ax.set_aspect("equal")
         ax.axhline(0.0, color="0.7", lw=0.8, ls="--")
         ax.set_xlabel("across the tooth [mm]")
