@@ -137,7 +137,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "scene": scene.name,
         "arm": {"file": str(arm.path), "held": arm.held, "pose": scene.pose},
-        "drives_by_rule": of_arm and args.drive is None,
+        "drives_by_rule": bool(choice),
         "rotors_assumed": of_arm,
         "strict": args.strict,
         "drive_choice": choice or {},

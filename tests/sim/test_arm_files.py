@@ -15,7 +15,7 @@ from swgjoint.cli.main import main
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.gentle_sweep import MARGIN, SWEEP, gentle_sweep
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.arm.scene import is_arm, scene_of_arm
+from swgjoint.sim.arm.scene import assumed_rotor_inertia, is_arm, scene_of_arm
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import deg
 from swgjoint.view.run import run_scene
@@ -300,10 +300,15 @@ def test_drives_by_rule_are_the_smallest_that_carry_the_arm(tmp_path):
     )
     rotors = [changed.joint_settings(name).rotor_inertia_kgm2 for name in arm.joints]
     assert rotors == [6.6e-6, 8.26e-5, 8.26e-5, 2e-4, 6.6e-6, 6.6e-6]
-    chosen = scene_of_arm("ur5e", drive="reference-2d")
-    assert {chosen.joint_settings(name).drive for name in arm.joints} == {
-        "reference-2d"
-    }
+    for stated in (
+        {"drive": "CSG-20-100"},
+        {"overrides": ["defaults.drive=CSG-20-100"]},
+    ):
+        chosen = scene_of_arm("ur5e", **stated)
+        sections = [chosen.joint_settings(name) for name in arm.joints]
+        assert {one.drive for one in sections} == {"CSG-20-100"}
+        (rotor,) = {one.rotor_inertia_kgm2 for one in sections}
+        assert rotor == assumed_rotor_inertia("CSG-20-100")
 
 
 def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):

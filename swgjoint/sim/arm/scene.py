@@ -120,7 +120,8 @@ def arm_scene(
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
-        drive: Drive of all joints: design, map or catalogue name.
+        drive: Drive of all joints: design, map or catalogue name;
+            ``defaults.drive`` of the overrides takes precedence.
         joints: Names or patterns of the hinges that move. A string may contain several,
             separated by commas. If empty, all hinges move. The others are held in the
             start pose.
@@ -141,6 +142,7 @@ def arm_scene(
         InputError: If the arm cannot be used.
     """
     changes = _as_mapping(overrides)
+    drive = changes.get("defaults.drive", drive)
     kind = str(changes.get("trajectory.kind", motion or "sweep"))
     reading = ArmReading(
         driven=patterns_of(list(joints)), balance_inertia=balance_inertia
