@@ -135,7 +135,7 @@ def parse_toml(
         raise error(f"{where}: {_too_deep()}") from None
     except ValueError as exc:  # Python also raises it for integers of many digits
         raise error(f"{where}: not valid TOML: {exc}") from None
-    fault = _first_fault(data)
+    fault = first_fault(data)
     if fault is not None:
         raise error(f"{where}: {fault}")
     return data
@@ -164,7 +164,7 @@ def parse_value(text: str, *, where: str) -> Any:
         value = text.strip()
     except ValueError as exc:
         raise InputError(f"{where}: not a valid value: {exc}") from None
-    fault = _first_fault({where: value})
+    fault = first_fault({where: value})
     if fault is not None:
         raise InputError(fault)
     return value
@@ -174,7 +174,7 @@ def _too_deep() -> str:
     return f"TOML tables or lists nested too deeply; accepted: {MAX_DEPTH} levels"
 
 
-def _first_fault(data: dict[str, Any]) -> str | None:
+def first_fault(data: dict[str, Any]) -> str | None:
     """First fault of the parsed data; None if they are valid. No recursion is used."""
     todo: list[tuple[str, Any, int]] = [("", data, 0)]
     while todo:

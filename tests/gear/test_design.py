@@ -389,6 +389,12 @@ def test_many_values_are_accepted_or_refused_in_lines(changes):
     assert_accepted_or_refused(changes)
 
 
+def test_text_that_no_file_can_hold_is_refused(reference):
+    """A control character, as in a file."""
+    with pytest.raises(DesignError, match=r"drive\.name = .*: a control character"):
+        reference.with_changes(drive__name="\x1f")
+
+
 def assert_accepted_or_refused(changes):
     """A whole design, or lines with a key each."""
     design = Design.preset("reference-2d")

@@ -35,7 +35,7 @@ from swgjoint.gear.design.sections import (
 )
 from swgjoint.gear.wave_generators.sections import WaveGenerator
 from swgjoint.models_path import bundled_names, find
-from swgjoint.toml_file import parse_toml, read_toml
+from swgjoint.toml_file import first_fault, parse_toml, read_toml
 from swgjoint.toml_text import toml_text
 from swgjoint.units import GPa, MPa, mm
 
@@ -237,6 +237,9 @@ class Design(Section):
                 table.pop(last, None)
             else:
                 table[last] = value
+        if (fault := first_fault(data)) is not None:
+            # a file with these values could not be read
+            raise DesignError(f"{where}: {fault}")
         return validate(type(self), data, where=where, error=DesignError)
 
     # -- text and identity ------------------------------------------------------

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from swgjoint.drives import build_map as building
+from swgjoint.drives import solve_map as solving
+from swgjoint.drives.build_map import build_map
 
 pytestmark = [pytest.mark.fe, pytest.mark.slow]
 
@@ -14,12 +15,11 @@ def test_friction_of_the_teeth_gives_hysteresis(
 ):
     """Elements as those of the 2D map, on the potential of the drive in space."""
     monkeypatch.setattr(
-        building, "sample_map", lambda design, **_: small_pattern(design)
+        solving, "sample_map", lambda design, **_: small_pattern(design)
     )
     rubbing = small_design.with_changes({"friction.tooth_coefficient": 0.1})
     smooth, found = (
-        building.build_map(design, model="3d", cache=False)
-        for design in (small_design, rubbing)
+        build_map(design, model="3d", cache=False) for design in (small_design, rubbing)
     )
     assert found.hysteresis and not smooth.hysteresis
     assert (found.potential == smooth.potential).all()
