@@ -100,22 +100,14 @@ def _with_friction(
     """The map with hysteresis from tooth friction, or the reason why it has none."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
-        if drive.level == "ring":
-            loops = ring_friction_loops(
-                design,
-                top=top,
-                rated=drive.ratings.rated_torque,
-                progress=progress,
-                keep=keep,
-            )
-        else:
-            loops = friction_loops(
-                design,
-                top=top,
-                rated=drive.ratings.rated_torque,
-                progress=progress,
-                keep=keep,
-            )
+        solve = ring_friction_loops if drive.level == "ring" else friction_loops
+        loops = solve(
+            design,
+            top=top,
+            rated=drive.ratings.rated_torque,
+            progress=progress,
+            keep=keep,
+        )
     except ComputationError as failure:
         reason = f"friction of the teeth gives no hysteresis: {failure}"
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
