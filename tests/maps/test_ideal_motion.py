@@ -47,6 +47,28 @@ def test_torque_and_stiffness_are_those_of_the_full_map(synthetic_map):
     assert np.abs(0.5 * change / step / stiffness - 1.0).max() < 1e-5  # differences
 
 
+def test_no_term_of_second_degree_is_missing(synthetic_map):
+    """At twice the distance from psi_0, the torque misses about 8 times as much.
+
+    A wrong term of second degree would make it 2 to 4 times. There, too, the torque has
+    the slope -stiffness.
+    """
+    theta = np.linspace(0.0, 400.0, 101)
+    about = theta / synthetic_map.ratio + np.linspace(-0.004, 0.004, theta.size)
+    at = IdealMotion.from_map(synthetic_map, theta, about)
+    highest = np.abs(synthetic_map.angle_orders[:, 1]).max()
+    missed = []
+    for part in (0.002, 0.004):
+        shift = np.full(theta.size, part / highest)
+        torque, stiffness, _ = at.torque(shift)
+        wanted = synthetic_map.forces(theta, about + shift)[1]
+        missed.append(np.abs(torque - wanted).max())
+        step = 1e-9
+        change = at.torque(shift - step)[0] - at.torque(shift + step)[0]
+        assert np.abs(0.5 * change / step / stiffness - 1.0).max() < 1e-5
+    assert missed[1] / missed[0] > 6.0
+
+
 def test_signals_measured_at_once_are_those_measured_one_by_one(synthetic_map):
     """Bit for bit, with the number of finished positions reported."""
     seen = []
