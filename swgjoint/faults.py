@@ -27,6 +27,8 @@ _UNITS = {
     "mm2_s": "mm²/s",
     "Nms_rad": "N·m·s/rad",
     "Nm_rad": "N·m/rad",
+    "Nm_arcmin": "N·m/arcmin",
+    "N_mm": "N/mm",
     "Nm_A": "N·m/A",
     "deg_s": "deg/s",
     "deg_s2": "deg/s²",

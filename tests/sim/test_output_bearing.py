@@ -264,7 +264,10 @@ def test_ur5e_feels_its_bearings_at_the_tool(synthetic_map):
     [
         ({"damping_ratio": 0.1}, "tilt_stiffness_Nm_arcmin"),
         ({"unit": "CSG-99"}, "unit"),
-        ({"tilt_stiffness_Nm_arcmin": -1.0}, "tilt_stiffness_Nm_arcmin"),
+        (
+            {"tilt_stiffness_Nm_arcmin": -1.0},
+            "tilt_stiffness_Nm_arcmin = -1 N·m/arcmin",
+        ),
         ({"unit": "CSG-25", "load_factor": 0.5}, "load_factor"),
         ({"unit": "CSG-25", "stiffness": 1.0}, "stiffness"),
     ],
