@@ -130,6 +130,11 @@ double Profile::signed_distance(Vec point, Vec* normal, double* curvature) const
   return best;
 }
 
+double Profile::distance_of_ends(Vec point) const {
+  const Vec from = point - pieces_.front().start, to = point - pieces_.back().end;
+  return std::min(size(from), size(to));
+}
+
 double interpolate(const double* at, const double* value, std::size_t n, double x) {
   if (x <= at[0]) return value[0];
   if (x >= at[n - 1]) return value[n - 1];

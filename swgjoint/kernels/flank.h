@@ -61,6 +61,9 @@ class Profile {
   // point has a foot neither on a piece nor at an edge.
   double signed_distance(Vec point, Vec* normal, double* curvature) const;
 
+  // Distance of a point from the closer end of the profile
+  double distance_of_ends(Vec point) const;
+
   double side() const { return side_; }
 
  private:

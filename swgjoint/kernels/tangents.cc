@@ -68,44 +68,59 @@ SWGJOINT_WIDE void contact_compliance(const std::int64_t* block_of, std::size_t 
                         const std::int64_t* after, const double* blocks, std::size_t size,
                         const std::int64_t* tooth, const double* weight, std::size_t n,
                         double* result) {
-  std::vector<double> moved(size);
-  // a point moves one flank of its tooth, half of the entries: range of those that the
-  // points from j on with the tooth of j move
-  std::vector<std::size_t> begin(n, size), end(n, 0);
-  for (std::size_t j = n; j-- > 0;) {
+  // runs of points on one tooth; a point moves one flank of its tooth, half of the
+  // entries: range of those that the points of a run move
+  struct Run {
+    std::int64_t tooth;
+    std::size_t from, to, begin, end;
+    std::ptrdiff_t other;  // another run on the same tooth; -1 for none
+  };
+  std::vector<Run> runs;
+  std::vector<std::ptrdiff_t> run_of(teeth, -1);
+  const auto count = static_cast<std::int64_t>(teeth);
+  for (std::size_t j = 0; j < n; ++j) {
+    if (!j || tooth[j] != tooth[j - 1]) {
+      std::ptrdiff_t& last = run_of[static_cast<std::size_t>((tooth[j] % count + count) % count)];
+      runs.push_back({tooth[j], j, j, size, 0, last});
+      last = static_cast<std::ptrdiff_t>(runs.size()) - 1;
+    }
+    Run& run = runs.back();
+    run.to = j + 1;
     const double* own = weight + size * j;
     for (std::size_t b = 0; b < size; ++b) {
       if (own[b] == 0.0) continue;
-      begin[j] = std::min(begin[j], b);
-      end[j] = b + 1;
-    }
-    if (j + 1 < n && tooth[j + 1] == tooth[j]) {
-      begin[j] = std::min(begin[j], begin[j + 1]);
-      end[j] = std::max(end[j], end[j + 1]);
+      run.begin = std::min(run.begin, b);
+      run.end = std::max(run.end, b + 1);
     }
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    const double* own = weight + size * i;
-    for (std::size_t j = 0; j < n; ++j) {
-      // points of one tooth follow one another: keep what moves it
-      const bool again = j > 0 && tooth[j] == tooth[j - 1];
-      const auto count = static_cast<std::int64_t>(teeth);
-      const std::int64_t apart = ((tooth[i] - tooth[j]) % count + count) % count;
-      if (!again) {
-        moved.assign(size, 0.0);
-        for (std::int64_t k = block_of[apart]; k >= 0; k = after[k]) {
-          const double* rows = blocks + size * size * static_cast<std::size_t>(k);
-          for (std::size_t a = 0; a < size; ++a) {
-            if (own[a] == 0.0) continue;
-            const double* row = rows + size * a;
-            for (std::size_t b = begin[j]; b < end[j]; ++b) moved[b] += own[a] * row[b];
+  // all pairs at one offset together, because a block is larger than the fast memory
+  std::vector<double> moved(size);
+  for (std::int64_t apart = 0; apart < count; ++apart) {
+    for (const Run& run : runs) {
+      const std::int64_t at = ((run.tooth + apart) % count + count) % count;
+      for (std::ptrdiff_t r = run_of[static_cast<std::size_t>(at)]; r >= 0;
+           r = runs[static_cast<std::size_t>(r)].other) {
+        const Run& responds = runs[static_cast<std::size_t>(r)];
+        for (std::size_t i = responds.from; i < responds.to; ++i) {
+          const double* own = weight + size * i;
+          moved.assign(size, 0.0);
+          for (std::int64_t k = block_of[apart]; k >= 0; k = after[k]) {
+            const double* rows = blocks + size * size * static_cast<std::size_t>(k);
+            for (std::size_t a = 0; a < size; ++a) {
+              if (own[a] == 0.0) continue;
+              const double* row = rows + size * a;
+              for (std::size_t b = run.begin; b < run.end; ++b)
+                moved[b] += own[a] * row[b];
+            }
+          }
+          for (std::size_t j = run.from; j < run.to; ++j) {
+            const double* other = weight + size * j;
+            double sum = 0.0;
+            for (std::size_t b = run.begin; b < run.end; ++b) sum += moved[b] * other[b];
+            result[n * i + j] = sum;
           }
         }
       }
-      const double* other = weight + size * j;
-      double sum = 0.0;
-      for (std::size_t b = begin[j]; b < end[j]; ++b) sum += moved[b] * other[b];
-      result[n * i + j] = sum;
     }
   }
 }

@@ -80,6 +80,16 @@ void FlankShapes::fit(std::size_t flank) const {
   fitted_[flank] = 1;
 }
 
+double FlankShapes::largest(std::size_t flank) const {
+  const double* nodes = nodes_ + 2 * spline_.nodes * flank;
+  double square = 0.0;
+  for (std::size_t k = 0; k < spline_.nodes; ++k, nodes += 2) {
+    square = std::max(square, nodes[0] * nodes[0] + nodes[1] * nodes[1]);
+  }
+  // a spline through smooth values overshoots by less than they are
+  return 2.0 * std::sqrt(square);
+}
+
 void FlankShapes::evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const {
   if (!fitted_[flank]) fit(flank);
   const std::size_t j = interval_of(spline_.breaks, spline_.intervals + 1, s);
@@ -221,12 +231,11 @@ void ToothSearch::refine(std::size_t n, double* station, const double* mirrored,
   }
 }
 
-// Gaps at samples of a flank; none if no sample reaches a radius.
-std::vector<double> ToothSearch::gaps(const double* mirrored, const Pose& pose,
-                                      bool rigid, const Samples& samples,
-                                      double radius) const {
+// Displaced samples of a flank; false if none of them reaches a radius.
+bool ToothSearch::place(const double* mirrored, const Samples& samples, double radius,
+                        std::vector<Vec>* points) const {
   const std::size_t n = samples.stations.size(), nodes = spline_.nodes;
-  std::vector<Vec> points(n);
+  points->resize(n);
   bool deep = false;
   for (std::size_t i = 0; i < n; ++i) {
     const double* weights = samples.weights.data() + nodes * i;
@@ -235,15 +244,67 @@ std::vector<double> ToothSearch::gaps(const double* mirrored, const Pose& pose,
       moved.x += weights[k] * mirrored[2 * k];
       moved.y += weights[k] * mirrored[2 * k + 1];
     }
-    points[i] = samples.at[i].point + moved;
-    deep |= size(points[i]) > radius;
+    (*points)[i] = samples.at[i].point + moved;
+    deep |= size((*points)[i]) > radius;
+  }
+  return deep;
+}
+
+// A sample cannot be closer to the circular spline than its neighbour is, less the
+// distance between the two. Samples that are thus known to be farther than the largest
+// gap of interest get a gap of infinity.
+std::vector<double> ToothSearch::rigid_gaps(const std::vector<Vec>& points,
+                                            const Samples& samples, const Pose& pose,
+                                            double limit,
+                                            std::vector<double>* clear) const {
+  std::vector<double> gaps;
+  clear->clear();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double known = i ? clear->back() - size(points[i] - points[i - 1]) : 0.0;
+    if (known > limit) {
+      gaps.push_back(kInfinity);
+      clear->push_back(known);
+      continue;
+    }
+    const Vec outward = samples.at[i].normal;
+    gaps.push_back(see(points[i], outward, pose, true, nullptr, 2).foot.gap);
+    const Vec there = mirror(rotate(points[i], pose.cos, pose.sin));
+    clear->push_back(std::min(gaps.back(), circular_.distance_of_ends(there)));
+  }
+  return gaps;
+}
+
+std::vector<double> ToothSearch::elastic_gaps(const std::vector<Vec>& points,
+                                              const Samples& samples, const Pose& pose,
+                                              double limit, const Coarse& coarse) const {
+  double moved = 0.0, corner = 0.0;
+  Vec ends[2] = {};
+  if (!rigid()) {
+    moved = flanks_.largest(static_cast<std::size_t>(2 * pose.tooth + 1 - pose.side));
+    corner = limits_.corner * (flanks_.high() - flanks_.low()) + moved;
+    ends[0] = circular_.evaluate(flanks_.low()).point;
+    ends[1] = circular_.evaluate(flanks_.high()).point;
   }
   std::vector<double> gaps;
-  if (!deep) return gaps;
-  gaps.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    gaps.push_back(
-        see(points[i], samples.at[i].normal, pose, rigid, nullptr, 2).foot.gap);
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    while (k + 2 < coarse.points.size() &&
+           coarse.stations[k + 1] <= samples.stations[i])
+      ++k;
+    double known = -kInfinity;
+    for (const std::size_t j : {k, k + 1}) {
+      known = std::max(known, coarse.clear[j] - size(points[i] - coarse.points[j]));
+    }
+    const Vec there = mirror(rotate(points[i], pose.cos, pose.sin));
+    // an end of an elastic flank may touch beside its normal
+    const bool beside =
+        !rigid() && std::min(size(there - ends[0]), size(there - ends[1])) <= corner;
+    if (!beside && known > limit + moved) {
+      gaps.push_back(kInfinity);
+      continue;
+    }
+    const Vec outward = samples.at[i].normal;
+    gaps.push_back(see(points[i], outward, pose, rigid(), nullptr, 2).foot.gap);
   }
   return gaps;
 }
@@ -256,16 +317,20 @@ std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
   const Samples& used = fine.empty() ? coarse : fine.front();
   std::vector<Place> found;
   std::vector<double> mirrored(2 * spline_.nodes), of_found, stations;
+  Coarse known{coarse.stations, {}, {}};
+  std::vector<Vec> points;
   std::vector<std::int64_t> sector, side;
   for (std::int64_t s = 0; s < static_cast<std::int64_t>(sectors); ++s) {
     for (std::int64_t f = 0; f < 2; ++f) {
       to_mirrored(flank, spline_.nodes, s, f, mirrored.data());
       const Pose pose = pose_of(s, f);
-      std::vector<double> gap = gaps(mirrored.data(), pose, true, coarse, sampling.radius);
-      if (gap.empty()) continue;
+      if (!place(mirrored.data(), coarse, sampling.radius, &known.points)) continue;
+      std::vector<double> gap =
+          rigid_gaps(known.points, coarse, pose, sampling.limit, &known.clear);
       if (!(*std::min_element(gap.begin(), gap.end()) < sampling.limit)) continue;
       if (!fine.empty()) {
-        gap = gaps(mirrored.data(), pose, rigid(), used, sampling.radius);
+        if (!place(mirrored.data(), used, sampling.radius, &points)) continue;
+        gap = elastic_gaps(points, used, pose, sampling.limit, known);
       }
       for (std::size_t k = 0; k < gap.size(); ++k) {
         const double before = k > 0 ? gap[k - 1] : kInfinity;

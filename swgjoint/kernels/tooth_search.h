@@ -36,6 +36,9 @@ class FlankShapes {
   double low() const { return spline_.breaks[0]; }
   double high() const { return spline_.breaks[spline_.intervals]; }
 
+  // Upper bound of the displacement of a flank
+  double largest(std::size_t flank) const;
+
   // Displacement of a flank and its derivative with respect to the arc length.
   void evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const;
 
@@ -150,8 +153,26 @@ class ToothSearch {
   void displaced(double s, const double* mirrored, Vec* point, Vec* tangent,
                  double* curvature) const;
 
-  std::vector<double> gaps(const double* mirrored, const Pose& pose, bool rigid,
-                           const struct Samples& samples, double radius) const;
+  // Samples of a flank on the rigid circular spline: arc lengths, displaced points, and
+  // lower bounds of their distances from it
+  struct Coarse {
+    const std::vector<double>& stations;
+    std::vector<Vec> points;
+    std::vector<double> clear;
+  };
+
+  bool place(const double* mirrored, const struct Samples& samples, double radius,
+             std::vector<Vec>* points) const;
+
+  // Gaps of samples on the rigid circular spline, with bounds as in Coarse
+  std::vector<double> rigid_gaps(const std::vector<Vec>& points,
+                                 const struct Samples& samples, const Pose& pose,
+                                 double limit, std::vector<double>* clear) const;
+
+  // Gaps of samples on the elastic one; coarse: samples whose bounds spare some of them
+  std::vector<double> elastic_gaps(const std::vector<Vec>& points,
+                                   const struct Samples& samples, const Pose& pose,
+                                   double limit, const Coarse& coarse) const;
 
   const Profile& flexspline_;
   NodeSpline spline_;

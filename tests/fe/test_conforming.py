@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.common.sampling import SOLVER, follower_in_plane
+from swgjoint.fe.plane import equilibrium
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
@@ -43,3 +44,27 @@ def test_equilibria_of_conforming_flanks_are_converged():
     output, moment = np.abs(found - exact).max(axis=0)
     assert output < 1e-9
     assert moment < 5e-6
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("name", ["dca-80-to-1", "reference-2d-simplified"])
+def test_a_short_reach_after_small_steps_omits_no_contact(name, monkeypatch):
+    """Equilibria are those of a search with the long reach at every step."""
+    design = Design.load(name)
+    peak = ratings_of(design).repeated_peak
+    theta = 2.0 * pi / design.periodicity * PLACES[:3]
+    rows = []
+    for followed in (equilibrium.FOLLOWED, np.inf):
+        monkeypatch.setattr(equilibrium, "FOLLOWED", followed)
+        follow = follower_in_plane(design)
+        state = follow.engage(follow.deflect(float(theta[0])))
+        for part in (PART, 0.4):
+            state = follow.to_torque(state, part * peak)
+            for angle in theta:
+                state = follow.to_angle(state, float(angle))
+                assert state.outcome.ok
+                rows.append((follow.output_angle(state), follow.input_torque(state)))
+    found, exact = np.split(np.array(rows), 2)
+    output, moment = np.abs(found - exact).max(axis=0)
+    assert output < 1e-12
+    assert moment < 1e-8

@@ -33,6 +33,10 @@ CIRCULAR_SPLINE_RANGE = 0.2
 in lobe heights [-]. At half of it the input torque still agrees with the derivative of
 the energy to seven digits."""
 
+FOLLOWED = 100.0
+"""Reach of the search for contacts after a small step, in this step [-]. No flank moves
+by as many of the next steps, which are smaller."""
+
 TOUCH = 1e-15
 """Largest gap that counts as zero [m]."""
 
@@ -91,6 +95,8 @@ class NewtonSolver:
                 # after three iterations or a small step only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
+                if thorough:
+                    reach = min(reach, FOLLOWED * history[-1])
                 contacts = linear.no_contacts
                 if load.teeth:
                     contacts = linear.search.search(
