@@ -225,6 +225,14 @@ def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...
 def respond(offsets: Index, blocks: Array, force: Array, result: Array) -> None: ...
+def follow_path(
+    matrix: Array,
+    slack: Array,
+    by_torque: Array,
+    by_value: Array,
+    reach: float,
+    most: int,
+) -> list[tuple[int, float, float]] | None: ...
 def contact_compliance(
     block_of: Index,
     after: Index,

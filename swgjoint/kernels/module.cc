@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "complementarity.h"
+#include "contact_path.h"
 #include "contact_step.h"
 #include "flank_arrays.h"
 #include "motions.h"
@@ -105,6 +106,32 @@ void contact_compliance(Index block_of, Index after, In<3> blocks, Index tooth, 
   const nb::gil_scoped_release release;
   swgjoint::contact_compliance(block_of.data(), teeth, after.data(), blocks.data(), size,
                                tooth.data(), weight.data(), n, result.data());
+}
+
+// Rows of contact number, torque from the start and slope before the change; the last row
+// has the slope after them and the number -1. None if contacts become singular.
+nb::object follow_path(In<2> matrix, In<1> slack, In<1> by_torque, In<1> by_value,
+                       double reach, std::size_t most) {
+  const std::size_t n = slack.shape(0);
+  require(matrix.shape(0) == n && matrix.shape(1) == n && by_torque.shape(0) == n &&
+              by_value.shape(0) == n,
+          "matrix: (n, n), vectors: (n,)");
+  const swgjoint::PathProblem problem{n, matrix.data(), slack.data(), by_torque.data(),
+                                      by_value.data()};
+  std::vector<swgjoint::PathChange> changes;
+  double slope;
+  bool solved;
+  {
+    const nb::gil_scoped_release release;
+    solved = swgjoint::follow_path(problem, reach, most, &changes, &slope);
+  }
+  if (!solved) return nb::none();
+  changes.push_back({-1, reach, slope});
+  nb::list rows;
+  for (const swgjoint::PathChange& one : changes) {
+    rows.append(nb::make_tuple(one.contact, one.away, one.slope));
+  }
+  return rows;
 }
 
 // What complementarity problems of one linearised drive share. It holds references to
@@ -303,6 +330,9 @@ NB_MODULE(compiled, m) {
   m.def("contact_compliance", &contact_compliance, nb::arg("block_of").noconvert(),
         nb::arg("after").noconvert(), nb::arg("blocks").noconvert(), nb::arg("tooth").noconvert(),
         nb::arg("weight").noconvert(), nb::arg("result").noconvert());
+  m.def("follow_path", &follow_path, nb::arg("matrix").noconvert(),
+        nb::arg("slack").noconvert(), nb::arg("by_torque").noconvert(),
+        nb::arg("by_value").noconvert(), nb::arg("reach"), nb::arg("most"));
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
   m.def("grow_oscillation", &grow_oscillation, nb::arg("sin").noconvert(),

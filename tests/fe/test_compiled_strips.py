@@ -9,6 +9,7 @@ import pytest
 
 from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
+from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.common.pivot_base import next_to, similar_parts
 from swgjoint.fe.common.pivoting import exchange
 from swgjoint.fe.common.strip_problems import FEW, PART, StripProblems
@@ -230,3 +231,57 @@ def test_factors_are_kept_over_many_changes_of_contact(teeth):
     size = np.sqrt(np.diag(problems.matrix))
     residual = np.abs(np.where(ours.active, slack, 0.0) / size).max(axis=1)
     assert (residual <= 1e-12 * np.abs(offset / size).max(axis=1)).all()
+
+
+def path_problem(seed: int, contacts: int = 30) -> Influence:
+    """A linearised drive, half of whose contacts carry force."""
+    rng = np.random.default_rng(seed)
+    mixed = rng.normal(size=(contacts, contacts))
+    compliance = 1e-9 * (np.eye(contacts) + 0.1 * mixed @ mixed.T)
+    closed = np.arange(contacts) % 2 == 0
+    force = np.where(closed, rng.uniform(1.0, 50.0, contacts), 0.0)
+    gap = np.where(closed, 0.0, rng.uniform(1e-9, 2e-7, contacts))
+    matrix, forward = exchange(compliance, np.flatnonzero(closed))
+    return Influence(
+        sector=np.arange(contacts),
+        tooth=np.arange(contacts),
+        direction=np.zeros((2, contacts, 2)),
+        by_tilt=np.zeros((contacts, 2)),
+        closed=closed,
+        torque=0.0,
+        matrix=matrix,
+        slack=forward @ (gap - compliance @ force),
+        by_gap=forward,
+        by_torque=forward @ compliance @ rng.normal(size=contacts) * 2.0,
+        angle=0.0,
+        angle_by_value=rng.normal(size=contacts),
+        angle_by_gap=np.zeros(contacts),
+        angle_by_torque=-1e-4,
+    )
+
+
+@pytest.mark.skipif(kernels() is None, reason="no compiled loops")
+@pytest.mark.parametrize("seed", range(20))
+def test_the_compiled_path_over_torque_is_that_of_numpy(seed, monkeypatch):
+    """The same contacts change at the same torques, with the same compliances."""
+    drive, numbers = path_problem(seed), np.arange(30)
+    found = drive.changes(-60.0, 60.0, numbers)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    twin = drive.changes(-60.0, 60.0, numbers)
+    assert len(found.contact) > 10
+    np.testing.assert_array_equal(found.contact, twin.contact)
+    np.testing.assert_allclose(found.torque, twin.torque, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.compliance, twin.compliance, rtol=1e-9)
+
+
+def test_a_path_of_contacts_that_hold_nothing_is_refused():
+    """Two contacts that do the same cannot both carry force."""
+    drive = path_problem(1)
+    same = replace(
+        drive,
+        matrix=np.zeros_like(drive.matrix),
+        slack=np.zeros(30),
+        by_torque=np.where(np.arange(30) == 3, -1.0, 1.0),
+    )
+    with pytest.raises(np.linalg.LinAlgError):
+        same.changes(-1.0, 1.0, np.arange(30))

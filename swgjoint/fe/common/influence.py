@@ -28,6 +28,7 @@ from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.common.pivoting import exchange
 from swgjoint.fe.common.strip_problems import StripProblems
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 MOST_CHANGES = 60
@@ -237,6 +238,19 @@ class Influence:
             Contacts that change, each with the change of torque [N·m], and the
             compliances before, between and after the changes [rad/(N·m)].
         """
+        if (native := kernels()) is not None:
+            path = native.follow_path(
+                *map(np.ascontiguousarray, (self.matrix, self.slack)),
+                sign * self.by_torque,
+                np.ascontiguousarray(self.angle_by_value),
+                reach,
+                MOST_CHANGES,
+            )
+            if path is None:
+                raise np.linalg.LinAlgError("singular contacts")
+            events = [(contact, away) for contact, away, _ in path[:-1]]
+            slopes = [sign * slope for _, _, slope in path]
+            return events, [-float(self.angle_by_torque + s) for s in slopes]
         offset = np.stack([self.slack, sign * self.by_torque], axis=1)
         active = np.zeros(len(offset), bool)
         changes, compliances, away = list[tuple[int, float]](), list[float](), 0.0
