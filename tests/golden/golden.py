@@ -71,7 +71,10 @@ def run(name: str, argv: list[str], folder: Path) -> dict[str, Any]:
         else:
             os.environ["SWGJOINT_CACHE"] = cache
     result = json.loads(out.getvalue()) if out.getvalue() else None
-    frozen = {"command": argv, "status": status, "result": stable(result, str(folder))}
+    if whole := name in CASES["tables"]:
+        result = {k: v for k, v in result.items() if k not in ("computations", "files")}
+    kept = stable(result, str(folder), whole)
+    frozen = {"command": argv, "status": status, "result": kept}
     for path in sorted(folder.glob("*.swg")):
         frozen[path.name] = map_content(path)
     for path in sorted(folder.glob("out/*.csv")) + sorted(folder.glob("out/*.dxf")):
@@ -79,25 +82,25 @@ def run(name: str, argv: list[str], folder: Path) -> dict[str, Any]:
     return frozen
 
 
-def stable(value: Any, folder: str) -> Any:
-    """A result without times, versions, places and sentences."""
+def stable(value: Any, folder: str, whole: bool = False) -> Any:
+    """A result without the folder and, unless whole, times, versions and sentences."""
     if isinstance(value, dict):
         timed = {"cost", "efficiency"} if {"cost", "work_s"} & set(value) else set()
         return {
-            key: stable(item, folder)
+            key: stable(item, folder, whole)
             for key, item in value.items()
-            if key not in timed and not any(part in key for part in VOLATILE)
+            if whole or (key not in timed and not any(part in key for part in VOLATILE))
         }
     if isinstance(value, list):
         if any(isinstance(item, dict) and "cost" in item for item in value):
             # a search by cost: the timing decides what else is tried, and its order
             value = [item for item in value if item.get("within", True)]
             value.sort(key=lambda item: [str(item.get(k)) for k in SETTING])
-        items = [stable(item, folder) for item in value]
-        return summed(items) if len(items) > LONG_TABLE else items
+        items = [stable(item, folder, whole) for item in value]
+        return summed(items) if len(items) > LONG_TABLE and not whole else items
     if isinstance(value, str):
         # sentences may improve; what they must name is tested where they arise
-        if value.count(" ") > 2:
+        if value.count(" ") > 2 and not whole:
             return "(prose)"
         return value.replace(folder, "FOLDER").replace(str(models_path()), "MODELS")
     return value
@@ -202,7 +205,8 @@ def command_line() -> int:
     FROZEN.mkdir(exist_ok=True)
     changed = 0
     cases = {name: argv for tier in CASES.values() for name, argv in tier.items()}
-    for name in given.only.split(",") if given.only else [*cases, "designs"]:
+    compared = [name for name in cases if name not in CASES["tables"]]
+    for name in given.only.split(",") if given.only else [*compared, "designs"]:
         start = time.process_time()
         if name == "designs":
             now = design_hashes()
