@@ -50,8 +50,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write run.rrd (and scene.toml for an arm) to this folder; default: write"
-        " no files",
+        help="write run.rrd, the picture run.png (and scene.toml for an arm) to this"
+        " folder; default: write no files",
     )
     parser.add_argument(
         "--model",
@@ -113,9 +113,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result = run_scene(scene, recording=recording, progress=args.progress)
     files: list[str] = []
     if folder is not None:
+        from swgjoint.view.run_picture import run_png
+
         outputs = Outputs(folder)
         if result.recording is not None:
             outputs.files.append(str(result.recording))
+        outputs.write("run.png", lambda: run_png(result))
         if of_arm:
             from swgjoint.sim.scene.text import scene_toml
 

@@ -327,7 +327,8 @@ def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):
     assert first.err.count("held at the reference position") == 1
     names = {k: v["drive"] for k, v in result["contains"]["joints"].items()}
     assert names == {"lift": "CSG-17-100", "elbow": "CSG-20-100"}
-    assert [Path(f).name for f in result["files"]] == ["run.rrd", "scene.toml"]
+    names = [Path(f).name for f in result["files"]]
+    assert names == ["run.rrd", "run.png", "scene.toml"]
     assert result["arm"]["held"] == {"finger": "slide"}
     assert result["tool"]["path_rms_mm"] > 0
     assert again["joints"] == result["joints"]

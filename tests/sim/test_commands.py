@@ -29,7 +29,7 @@ def test_run_gives_one_json_object_and_a_recording(tmp_path, capsys):
     assert joint["torsion_arcmin"]["mean"] == pytest.approx(
         50 / 2e4 * 10800 / 3.14159265
     )
-    assert [Path(f).name for f in result["files"]] == ["run.rrd"]
+    assert [Path(f).name for f in result["files"]] == ["run.rrd", "run.png"]
     assert all(Path(f).is_file() for f in result["files"])
 
 

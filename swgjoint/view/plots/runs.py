@@ -135,15 +135,42 @@ def draw_ripple(
     part = turns >= turns[-1] - 0.5  # half a turn is short enough to show single teeth
     over_turns.plot(turns[part], ripple[part], **style)
     over_turns.margins(x=0)
-    spectrum, highest = order_spectrum(angle, ripple), highest_resolved_order(run, j)
+    draw_orders(over_order, run, j, style, line=line)
+
+
+def draw_orders(
+    axis: Any,
+    run: Run,
+    j: int,
+    style: Mapping[str, Any],
+    *,
+    line: Callable[..., Any] | None = None,
+) -> None:
+    """Draw the order spectrum of the ripple up to the highest order that is resolved.
+
+    Nothing is drawn for a joint without constant speed or with less than half an input
+    turn.
+
+    Args:
+        axis: Axes of the spectrum, in percent of rated torque.
+        run: The run.
+        j: Index of the joint.
+        style: Keyword arguments of the line.
+        line: Function that draws the spectrum; it takes the axes and then the arguments
+            of their ``plot`` method, which is the default.
+    """
+    scale = 100.0 / run.assembly.transmissions[j].drive.ratings.rated_torque
+    angle = run.motor_position[run.steady, j]
+    spectrum = order_spectrum(angle, scale * torque_ripple(run, j))
+    highest = highest_resolved_order(run, j)
     if spectrum is None or highest is None:
         return
     inside = (spectrum.order >= 0.5) & (spectrum.order <= highest)
-    draw = over_order.plot if line is None else partial(line, over_order)
-    over_order.autoscale(axis="y")  # after the limit of another run
+    draw = axis.plot if line is None else partial(line, axis)
+    axis.autoscale(axis="y")  # after the limit of another run
     draw(spectrum.order[inside], spectrum.amplitude[inside], **style)
-    over_order.set_xlim(0.0, highest)
-    over_order.set_ylim(bottom=0.0)
+    axis.set_xlim(0.0, highest)
+    axis.set_ylim(bottom=0.0)
 
 
 def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None:
