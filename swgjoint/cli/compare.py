@@ -190,7 +190,8 @@ def report(result: dict[str, Any]) -> str:
     if result["joints"]:
         which += f" of {', '.join(result['joints'])}"
     lines = [
-        f"scene {result['scene']}, values of the {which}; K1 and stress of the drive",
+        f"scene {result['scene']}, values of the {which}; torque ripple of the moving"
+        " arm, as by run; K1 and stress of the drive",
         table([units, *rows], header=header),
         *worst_joints(result["rows"]),
         rotor_line(result["assumed_rotors"]),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.cli.run import joint_table, notes, verdict_lines
+from swgjoint.cli.shared.ripple_text import ripple_line
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 
@@ -135,7 +136,7 @@ def report(result: dict[str, Any]) -> str:
         verdict, *reasons = verdict_lines(metrics)
         lines += ["", f"UR5e, {label}: {verdict}", *reasons]
         lines.append(joint_table(metrics["joints"]))
-        lines += notes(metrics["joints"])
+        lines += [*notes(metrics["joints"]), ripple_line(metrics)]
     rows = [
         (
             label,

@@ -196,10 +196,18 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+_CHECKED = {
+    "energy check input torque pp": "input torque, largest peak to peak at one load",
+    "energy check input torque error": "largest error of the input torque",
+}
+"""Displayed names of rows whose key does not say which quantity they mean."""
+
+
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
     """Rows of a table for a nested object, named by the path of keys with the unit."""
     if isinstance(value, dict):
         return [row for key, v in value.items() for row in _flat(f"{name} {key}", v)]
     text, unit = split_unit(name)
-    label = text.replace("_", " ") + (f" [{unit}]" if unit else "")
+    label = text.replace("_", " ")
+    label = _CHECKED.get(label, label) + (f" [{unit}]" if unit else "")
     return [] if value is None else [(label, value)]

@@ -195,16 +195,18 @@ def report(result: dict[str, Any]) -> str:
     ]
     steps = result["per_step"]
     for key, text in (
-        ("wave_generator_torque_Nm", "mean wave-generator torque [N·m]"),
-        ("pairs_in_contact", "mean pairs in contact"),
+        ("wave_generator_torque_Nm", "wave-generator (input) torque [N·m]: mean"),
+        ("pairs_in_contact", "pairs in contact: mean"),
     ):
         values = [v for v in steps.get(key) or [] if v is not None]
         if values:
-            lines.append(f"{text}: {sum(values) / len(values):.5g}")
+            spread = f", peak to peak {max(values) - min(values):.4g}"
+            lines.append(f"{text} {sum(values) / len(values):.5g}{spread}")
     error = [v for v in steps.get("output_error_arcsec") or [] if v is not None]
     if error:
         lines.append(
-            f"output error, peak to peak{where}: {max(error) - min(error):.4g} arcsec"
+            f"output error under this torque, peak to peak{where}:"
+            f" {max(error) - min(error):.4g} arcsec"
         )
     for state in result.get("coning_mm") or []:
         cone = "; ".join(

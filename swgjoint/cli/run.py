@@ -12,6 +12,7 @@ from swgjoint.cli.shared.arm_arguments import (
     scene_of,
 )
 from swgjoint.cli.shared.life_text import bearing_lines, gauge_lines, life_lines
+from swgjoint.cli.shared.ripple_text import ripple_line
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
@@ -170,9 +171,7 @@ def report(result: dict[str, Any]) -> str:
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
-        ""
-        if result["window_of"] == "constant speed"
-        else f"ripple: {result['ripple_of']}",
+        ripple_line(result),
         tool_line(result["tool"], random="sensors" in contains),
         *life_lines(result),
         *bearing_lines(result),

@@ -123,12 +123,13 @@ def report(result: dict[str, Any]) -> str:
                 ],
                 header=(
                     "order",
-                    "no load [arcmin]",
-                    "rated load [arcmin]",
-                    "ripple [%]",
+                    "output error, no load [arcmin]",
+                    "at rated torque [arcmin]",
+                    "output torque ripple [% of rated torque]",
                 ),
             )
         )
+    lines += turn_lines(result)
     error = result["validity"].get("kinematic_error", "none")
     if error not in ("none", "given") and any(key in result for key in TURN_KEYS):
         lines.append(f"kinematic error (determines accuracy and ripple): {error}")
@@ -150,6 +151,24 @@ def report(result: dict[str, Any]) -> str:
     lines += [f"- {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join(lines)
+
+
+def turn_lines(result: dict[str, Any]) -> list[str]:
+    """State under which conditions the figures of the output turn are computed."""
+    lines = []
+    accuracies = ("transmission_accuracy_arcmin", "transmission_accuracy_rated_arcmin")
+    if any(result.get(key) is not None for key in accuracies):
+        lines.append(
+            "transmission accuracy: peak to peak of the output error over one output"
+            " turn at constant output torque, zero unless stated otherwise"
+        )
+    if any(result.get(key) for key in ("ripple_rms_percent", "ripple_pp_percent")):
+        lines.append(
+            "output torque ripple: at rated torque, with both shafts turning at a"
+            " constant ratio; in an arm the output gives way, and swgjoint run computes"
+            " the ripple that is left"
+        )
+    return lines
 
 
 def _details(result: dict[str, Any]) -> list[str]:

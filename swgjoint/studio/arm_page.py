@@ -18,8 +18,8 @@ from swgjoint.view.words import format_figure
 
 _COLUMNS = {
     "joint": "joint",
-    "ripple_rms_percent": "ripple rms [%]",
-    "ripple_pp_percent": "ripple pp [%]",
+    "ripple_rms_percent": "torque ripple rms [% of rated]",
+    "ripple_pp_percent": "torque ripple pp [% of rated]",
     "transmission": "transmission error pp [arcmin]",
     "torsion": "torsion [arcmin]",
     "peak": "peak torque [N·m]",

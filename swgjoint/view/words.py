@@ -14,6 +14,17 @@ _UNITS = {
 """Units by the last part of a key; ``mm`` is the end of ``N_mm``."""
 
 
+_NAMES = {
+    "ripple_rms_percent": ("output torque ripple, rms", "% of rated torque"),
+    "ripple_pp_percent": ("output torque ripple, pp", "% of rated torque"),
+    "transmission_accuracy_rated_arcmin": (
+        "transmission accuracy at rated torque",
+        "arcmin",
+    ),
+}
+"""Name and unit of keys that do not say which quantity they mean."""
+
+
 def words(key: str) -> tuple[str, str]:
     """Split a key of a spec sheet into its name in words and its unit.
 
@@ -21,7 +32,11 @@ def words(key: str) -> tuple[str, str]:
 
     >>> words("lost_motion_arcmin")
     ('lost motion', 'arcmin')
+    >>> words("ripple_pp_percent")
+    ('output torque ripple, pp', '% of rated torque')
     """
+    if key in _NAMES:
+        return _NAMES[key]
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if key.endswith(f"_{suffix}"):
             text = key.removesuffix(f"_{suffix}").removesuffix("_N")

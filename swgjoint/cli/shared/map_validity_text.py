@@ -28,7 +28,8 @@ def validation_table(result: dict[str, Any]) -> list[str]:
     from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS
 
     names = {
-        key: f"{name}, % of peak-to-peak value" for key, name in QUANTITIES.items()
+        key: f"{name}, % of its peak to peak at that torque"
+        for key, name in QUANTITIES.items()
     }
     rows = []
     for key, name in (names | {STIFFNESS: "secant stiffness"}).items():
@@ -41,8 +42,8 @@ def validation_table(result: dict[str, Any]) -> list[str]:
     more = ", ..." if len(torques) > _SHOWN_TORQUES else ""
     return [
         f"validation: map compared with {record['solves']} finite-element solves that"
-        f" were not used to build it, at {shown}{more} N·m; differences at the torque"
-        " where each quantity is worst:",
+        f" were not used to build it, at {shown}{more} N·m; errors of the map (not"
+        " ripples of the drive) at the torque where each quantity is worst:",
         table(rows, header=("", "largest [%]", "rms [%]", "at [N·m]")),
         *result["validation_notes"],
     ]

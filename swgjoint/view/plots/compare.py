@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from swgjoint.explore.compare.compare import Compared
 
 HEADER = {
-    "ripple_rms_percent": ("torque ripple rms", "% of rated torque"),
-    "ripple_pp_percent": ("torque ripple pp", "% of rated torque"),
-    "transmission_error_ripple_arcmin": ("transmission error ripple", "arcmin, pp"),
+    "ripple_rms_percent": ("output torque ripple", "% of rated, rms"),
+    "ripple_pp_percent": ("output torque ripple", "% of rated, pp"),
+    "transmission_error_ripple_arcmin": (
+        "transmission error, strongest order",
+        "arcmin, pp",
+    ),
     "transmission_error_arcmin": ("transmission error", "arcmin, pp"),
     "torsion_arcmin": ("torsion", "arcmin, mean"),
     "tool_path_rms_mm": ("tool path error", "mm, rms"),
@@ -113,8 +116,8 @@ def comparison_table(
         header=[("argument", ""), ("level", ""), *shown_keys.values(), *verdict],
         rows=lines,
         notes=[
-            "Joint figures are those of the worst joint of the scene. The transmission"
-            " error ripple is the strongest line at an order of the drive. K1 and the"
+            "Joint figures are those of the worst joint of the scene. The torque ripple"
+            " is that of the output torque of the moving arm. K1 and the"
             " von Mises stress (largest stress at rated torque, averaged over a pitch)"
             " are those of the drive. Levels without compliance have no K1.",
             *([f"Limits of the spec: {', '.join(limits)}."] if limits else []),
