@@ -328,9 +328,10 @@ def format_fixed(value: float, digits: int = 3) -> str:
 def notes(joints: dict[str, Any]) -> list[str]:
     """Explain the marks in the table of joints, and list warnings on the validity."""
     from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
+    from swgjoint.view.ratings_text import joint_rule_lines
     from swgjoint.view.validity import warnings_of
 
-    lines = warnings_of(joints)
+    lines = [*warnings_of(joints), *joint_rule_lines(joints)]
     whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
     marks = {joint_mark(joint) for joint in joints.values()}
     marks |= {

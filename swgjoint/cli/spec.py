@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.cli.shared.map_validity_text import doubts, mark_figure
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
+from swgjoint.gear.ratings import rule_of
+from swgjoint.view.ratings_text import sheet_words
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
@@ -98,16 +100,19 @@ def report(result: dict[str, Any]) -> str:
     from swgjoint.maps.sheet.spec_sheet import KEYS, TURN_KEYS
 
     keys = [key for key in KEYS if key in result and key != "orders"]
+    ratings = result["validity"]["ratings"]
     stated = result.get("stated") or {}
     header = ("", "predicted", *(["stated"] if stated else []), "")
     rows = []
     for key in keys:
-        name, unit = words(key)
+        name, unit = sheet_words(key, ratings)
         more = [stated.get(key)] if stated else []
         rows.append((name, mark_figure(result, key), *more, unit))
     lines = [f"spec sheet of {result['design']} ({_source(result)})"]
     if rows:
         lines.append(table(rows, header=header))
+    if set(keys) & set(rule_of(ratings)[0]):
+        lines.append(f"by rule: {rule_of(ratings)[1]}")
     if result.get("orders"):
         columns = (
             "kinematic_error_arcmin",

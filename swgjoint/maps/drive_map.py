@@ -70,6 +70,8 @@ class DriveMap(Potential):
                 momentary_peak=4.0 * rated_torque,
                 T1=0.2 * rated_torque,
                 T2=0.6 * rated_torque,
+                source="default (repeated_peak_Nm, momentary_peak_Nm, T1_Nm, T2_Nm):"
+                " multiples of the rated torque",
             ),
         )
 

@@ -109,7 +109,10 @@ def map_from_numbers(
             f" than {LOST_MOTION_TORQUE * rated:g} N·m (4 % of the rated torque),"
             " increasing"
         )
-    r = Ratings(rated_torque=rated, source="stated, or multiples of it", **torques)
+    absent = [f"{key}_Nm" for key, (value, _) in given.items() if value is None]
+    rule = f"default ({', '.join(absent)}): multiples of the rated torque"
+    source = rule if absent else "given"
+    r = Ratings(rated_torque=rated, source=source, **torques)
     orders, error = _harmonics(kinematic_error or {})
     teeth = LOBES * ratio
     drive = cls(

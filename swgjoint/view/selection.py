@@ -10,6 +10,7 @@ from typing import Any
 from swgjoint.pictures import png
 from swgjoint.sim.figures.keys import LOWER
 from swgjoint.view.plots.compare import HEADER
+from swgjoint.view.ratings_text import rule_lines
 from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.words import format_figure, format_named, short, words
 
@@ -111,8 +112,14 @@ def _selected(result: Result) -> Table:
 
 
 def _remarks(result: Result) -> list[str]:
-    """What the selection assumes about encoders and masses."""
-    remarks = []
+    """What the selection assumes about ratings, encoders and masses."""
+    chosen = [
+        (one["drive"], one["ratings"])
+        for drives in result["joints"].values()
+        for one in drives
+        if one["selected"]
+    ]
+    remarks = rule_lines(chosen)
     if result["motor_feedback_failure"] is not None:
         remarks.append(
             "the controller holds the link angles, which needs an encoder at every link"

@@ -20,6 +20,7 @@ from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.figures.signals import error_figures, ripple_figures
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg
+from swgjoint.view.ratings_text import rule_mark
 from swgjoint.view.run import run_scene
 
 if TYPE_CHECKING:
@@ -179,14 +180,15 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
                 f" constant speed; the drive accounts for at most {share:.2g} deg of"
                 " this, the control loop for the rest (friction, gains, motor limits)"
             )
-        ratings = joint["ratings"]
+        ratings, source = joint["ratings"], joint["ratings"]["source"]
         if not ratings["within"]:
             lines.append(
                 f"{name}: ratings exceeded: cubic mean torque"
                 f" {ratings['cubed_mean_Nm']:.3g} N·m (rated"
-                f" {ratings['rated_Nm']:.3g} N·m), peak torque"
-                f" {ratings['peak_Nm']:.3g} N·m (repeated peak"
-                f" {ratings['repeated_peak_Nm']:.3g} N·m)"
+                f" {ratings['rated_Nm']:.3g} N·m{rule_mark('rated_torque_Nm', source)}"
+                f"), peak torque {ratings['peak_Nm']:.3g} N·m (repeated peak"
+                f" {ratings['repeated_peak_Nm']:.3g} N·m"
+                f"{rule_mark('repeated_peak_Nm', source)})"
             )
         bearing = joint.get("output_bearing")
         if bearing is not None and bearing["within"] is False:

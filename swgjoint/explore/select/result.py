@@ -84,6 +84,7 @@ class DriveSelection:
                         "drive": one.option.drive,
                         "cost": float(one.option.cost),
                         "mass_kg": one.option.mass,
+                        "ratings": one.option.map.ratings.source,
                         "selected": chosen.get(name) == one.option.drive,
                         "checks": [check.to_json() for check in one.checks],
                         "dropped": describe_drop(

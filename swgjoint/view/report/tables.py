@@ -26,8 +26,9 @@ from swgjoint.maps.sheet.validity_marks import (
 )
 from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.view.plots.spec import spec_picture
+from swgjoint.view.ratings_text import sheet_words
 from swgjoint.view.validity import left_out_share, map_error, omissions_of, warnings_of
-from swgjoint.view.words import format_figure, short, words
+from swgjoint.view.words import format_figure, short
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -303,7 +304,7 @@ def sheet_table(drive: DriveMap) -> dict[str, Any]:
     for key, value in sheet.figures.items():
         if key == "orders":
             continue
-        name, unit = words(key)
+        name, unit = sheet_words(key, drive.ratings.source)
         doubt = sheet.uncertain.get(key) if value is not None else None
         sign = "" if doubt is None else mark(doubt.largest)
         why = "" if doubt is None else f"the map {doubt}"
@@ -382,8 +383,7 @@ def provenance_table(drives: Sequence[DriveMap]) -> Table:
 def versions_table() -> Table:
     """Versions of Python, swgjoint and the packages in :data:`PACKAGES`."""
     versions = {"python": platform.python_version(), "swgjoint": __version__}
-    for name in PACKAGES:
-        versions[name] = metadata.version(name)
+    versions |= {name: metadata.version(name) for name in PACKAGES}
     return Table(
         title="Versions",
         header=[(name, "") for name in versions],
