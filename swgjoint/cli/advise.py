@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.explore.advise.bound import parse_bound
 
     bound = parse_bound(args.error)
-    scene, _ = scene_of(args, args.overrides)
+    scene, _, _ = scene_of(args, args.overrides)
     return advise(scene, bound, progress=args.progress)
 
 

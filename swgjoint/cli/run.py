@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from typing import Any
 
 from swgjoint.cli.shared.arm_arguments import (
@@ -87,7 +88,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         ``scene``, ``arm``, ``drives_by_rule`` (whether the drives of an arm were
         selected by rule, as listed in ``drive_choice``), ``rotors_assumed`` (whether
-        rotor inertias are assumed unless ``--set`` states them), ``strict``,
+        rotor inertias are assumed, for the joints in ``assumed_rotors``), ``strict``,
         ``contains``,
         ``files``, ``live`` (address of the viewer, or null) and the keys of
         :meth:`swgjoint.sim.run.Run.metrics`, such as ``joints``, ``tool`` and
@@ -106,7 +107,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.view.run import run_scene
 
-    scene, choice = scene_of(args, args.overrides)
+    scene, choice, assumed_rotors = scene_of(args, args.overrides)
     of_arm = choice is not None
     if args.model is not None:
         scene = scene.with_model(args.model)
@@ -142,7 +143,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "scene": scene.name,
         "arm": {"file": str(arm.path), "held": arm.held, "pose": scene.pose},
         "drives_by_rule": bool(choice),
-        "rotors_assumed": of_arm,
+        "rotors_assumed": bool(assumed_rotors),
+        "assumed_rotors": list(assumed_rotors),
         "strict": args.strict,
         "drive_choice": choice or {},
         **result.metrics(),
@@ -182,7 +184,7 @@ def report(result: dict[str, Any]) -> str:
         f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
-        *(rotor_lines(contains) if result.get("rotors_assumed") else []),
+        *rotor_lines(contains, result.get("assumed_rotors", ())),
         *assumed_lines(contains),
         *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],
@@ -202,28 +204,32 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     ]
 
 
-def rotor_lines(contains: dict[str, Any]) -> list[str]:
-    """Format the rotor inertias of an arm, grouped by joints that share them."""
+def rotor_lines(contains: dict[str, Any], assumed: Collection[str]) -> list[str]:
+    """Format the assumed rotor inertias, grouped by joints that share them."""
     names_by_inertia: dict[float, list[str]] = {}
     for name, joint in contains["joints"].items():
+        if name not in assumed:
+            continue
         names_by_inertia.setdefault(joint["rotor_inertia_kgm2"], []).append(name)
-    every = len(names_by_inertia) == 1
+    if not names_by_inertia:
+        return []
+    every = len(names_by_inertia) == 1 and len(assumed) == len(contains["joints"])
     values = "; ".join(
         f"{inertia:g} kg·m²" + ("" if every else f" ({', '.join(names)})")
         for inertia, names in names_by_inertia.items()
     )
     return [
-        f"rotor inertia: {values}; assumed for the drive of the joint unless --set"
-        " states another"
+        f"rotor inertia: {values}; assumed for the drive of the joint; another:"
+        " --set joints.JOINT.rotor_inertia_kgm2=VALUE"
     ]
 
 
 def assumed_lines(contains: dict[str, Any]) -> list[str]:
-    """Format assumed kinematic errors, grouped by joints that share them."""
+    """Format kinematic errors with assumed parts, grouped by joints that share them."""
     names_by_error: dict[str, list[str]] = {}
     for name, joint in contains["joints"].items():
         error, _, _ = str(joint["kinematic_error"]).partition(", joint ")
-        if error.startswith("assumed"):
+        if "assumed:" in error:
             names_by_error.setdefault(error, []).append(name)
     return [
         f"kinematic error {error}"

@@ -164,13 +164,15 @@ def with_stated_error(
     Raises:
         InputError: If an option is out of range.
     """
-    wanted = kinematic_error_arcmin
+    wanted, stated = kinematic_error_arcmin, kinematic_error_arcmin is not None
     if wanted is None:
         wanted = drive.info["stated"]["transmission_accuracy_arcmin"]
     if wanted is None:
         label = f"none: the tables state no transmission accuracy for {drive.name}"
         return replace(drive, info={**drive.info, "kinematic_error": label})
-    return with_assumed_error(drive, wanted * arcmin, seed=seed, joint=joint)
+    return with_assumed_error(
+        drive, wanted * arcmin, seed=seed, joint=joint, stated=stated
+    )
 
 
 def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:

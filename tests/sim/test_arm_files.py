@@ -335,6 +335,32 @@ def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):
     assert again["tool"] == result["tool"]
 
 
+def test_only_assumed_values_are_called_assumed(tmp_path, capsys):
+    """A stated rotor inertia and the stated size of an error are not."""
+    file = urdf(tmp_path)
+
+    def assumed(*changes):
+        stated = [word for change in changes for word in ("--set", change)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("default")
+            assert main(["run", file, *QUICK, *stated]) == 0
+        return [
+            line for line in capsys.readouterr().out.splitlines() if "assumed" in line
+        ]
+
+    rotor, *errors = assumed()
+    assert names(rotor, "rotor inertia", "lift", "elbow")
+    assert all(line.startswith("kinematic error assumed: ") for line in errors)
+    rotor, *errors = assumed(
+        "joints.lift.rotor_inertia_kgm2=1e-4", "joints.lift.kinematic_error_arcmin=0.5"
+    )
+    assert names(rotor, "elbow") and not names(rotor, "lift")
+    (stated,) = [line for line in errors if "lift" in line]
+    assert names(stated, "0.5 arcmin stated", "assumed: at 2 and 4 per turn")
+    first, *_ = assumed("defaults.rotor_inertia_kgm2=1e-4")
+    assert not names(first, "rotor inertia")
+
+
 def test_a_drive_for_all_joints_of_a_scene(capsys):
     """Option --drive replaces that of a scene, too."""
     keys = ["--set", "simulation.duration_s=1.0", "--set", "defaults.level=linear"]

@@ -145,7 +145,7 @@ def _scene_of(
             )
         args.scene = args.task
         changes.insert(0, f"arm={args.arm}")
-    scene, _ = scene_of(args, changes)
+    scene, _, _ = scene_of(args, changes)
     stepped = any(text.startswith("simulation.step_s") for text in changes)
     if is_arm(args.scene) and not stepped:
         scene = resolve_step(scene, [option.drive for option in options])

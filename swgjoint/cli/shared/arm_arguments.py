@@ -75,7 +75,9 @@ def add_overrides(
     )
 
 
-def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
+def scene_of(
+    args: argparse.Namespace, changes: list[str]
+) -> tuple[Scene, Any, tuple[str, ...]]:
     """Load the scene named on the command line, or build one for an arm.
 
     Args:
@@ -84,8 +86,9 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
         changes: Changes of the scene, each as ``KEY=VALUE``.
 
     Returns:
-        The scene, and for an arm the JSON object of the automatically selected drives
-        by joint; None in place of it if ``args.scene`` is a scene.
+        The scene, for an arm the JSON object of the automatically selected drives by
+        joint (None if ``args.scene`` is a scene), and the joints whose rotor inertia is
+        assumed.
 
     Raises:
         InputError: If an option for an arm is combined with a scene.
@@ -105,7 +108,8 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
             overrides=changes,
         )
         choice: dict[str, DriveChoice] = made.drive_choice
-        return made.scene, {name: one.as_json() for name, one in choice.items()}
+        selected = {name: one.as_json() for name, one in choice.items()}
+        return made.scene, selected, made.assumed_rotors
     arm_options = [option for name, option in OF_AN_ARM.items() if getattr(args, name)]
     if arm_options:
         raise InputError(
@@ -114,8 +118,8 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
         )
     if drive:
         scene = Scene.load_file(args.scene).with_drive(drive)
-        return scene.with_changes(changes), None
-    return Scene.load_file(args.scene, changes), None
+        return scene.with_changes(changes), None, ()
+    return Scene.load_file(args.scene, changes), None, ()
 
 
 def choice_lines(choice: dict[str, Any]) -> list[str]:

@@ -101,7 +101,12 @@ def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
 
 
 def with_assumed_error(
-    drive: Map, peak_to_peak: float, *, seed: int = 0, joint: str = ""
+    drive: Map,
+    peak_to_peak: float,
+    *,
+    seed: int = 0,
+    joint: str = "",
+    stated: bool = True,
 ) -> Map:
     """A drive without kinematic error, completed by the assumed error of one specimen.
 
@@ -115,6 +120,8 @@ def with_assumed_error(
         seed: Seed for the amplitude ratio and the phases of the two orders, >= 0.
         joint: Name of the joint that the drive is for. It is combined with the seed, so
             joints with the same seed get different errors.
+        stated: Whether the user stated the size; its orders and phases are assumed in
+            any case.
 
     Raises:
         InputError: If the map already has an error, or a value is out of range.
@@ -143,7 +150,9 @@ def with_assumed_error(
     size = size * peak_to_peak / float(np.ptp(wave))
     # a cos(n x + phase) as cosine and sine amplitudes
     pairs = size[:, None] * np.stack([np.cos(phase), -np.sin(phase)], axis=-1)
-    label = f"assumed: {wanted:g} arcmin at 2 and 4 per turn, seed {seed}"
+    first, second = f"{wanted:g} arcmin", "assumed:"
+    label = f"{first} stated; {second}" if stated else f"{second} {first}"
+    label += f" at 2 and 4 per turn, seed {seed}"
     label += f", joint {joint}" if joint else ""
     missing = dict(drive.info.get("missing") or {})
     missing = {key: why for key, why in missing.items() if key not in _ABSENT}
