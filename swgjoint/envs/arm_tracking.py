@@ -1,14 +1,14 @@
-"""An arm tracks the path of a scene; actions add torques or shift its set-points."""
+"""An arm tracks a path; actions add torques or shift its set-points."""
 
 from __future__ import annotations
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.arm_core import ArmCore
-from swgjoint.envs.arm_settings import ArmSettings
+from swgjoint.envs.arm.core import ArmCore
+from swgjoint.envs.arm.settings import ArmSettings
 
 
 class ArmTrackingEnv(SingleEnv):
-    """An arm with a drive in every joint tracks the path of a scene.
+    """An arm with a drive in every joint tracks the path of a scene, or drawn paths.
 
     The scene is assembled as by ``swgjoint run``: arm, drives, payload, path (joint or
     Cartesian), step and controller. The controller is PD control of every motor angle
@@ -53,18 +53,46 @@ class ArmTrackingEnv(SingleEnv):
 
         1/(1 + (d/error_scale)^2) - effort_weight mean(a^2)
 
+    Drawn paths begin at rest at the start of the scene. Joint motions are those of
+    ``JointTracking-v0``, independent for every joint. Curves of the tool (``line``,
+    ``arc`` of a circle of 90 to 360 degrees, ``spline``) have random directions; the
+    tool moves along the curve and half the way back, and arms with six or more joints
+    keep its orientation. 40 to 100 % of the largest size that the limits allow is
+    drawn; curves are cut off where a joint would exceed its limits. Paths do not leave
+    the ranges of the joints and are smaller where bodies would touch.
+
     An episode starts at rest at the start of the scene, and the drives carry weight and
-    load. It is ``truncated`` after ``episode_s`` or the scene's duration, whichever is
-    shorter, and ``terminated`` when a limit is exceeded (``info["broken_limit"]``, see
+    load. It is ``truncated`` after ``episode_s``, or at the end of the scene if it is
+    earlier and the path is that of the scene. It is ``terminated`` when a limit is
+    exceeded (``info["broken_limit"]``, see
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`): a link 0.3 rad beyond the
     range of the path, a motor 20 rad/s beyond twice the largest speed of the path, or a
-    drive above its momentary peak or ratcheting torque. ``info`` is the same as there,
-    with arrays over the joints and with ``tool_error_mm`` in addition.
+    drive above its momentary peak or ratcheting torque. With drawn paths, the limits of
+    their angles and speeds take the place of the path. ``info`` is the same as there,
+    with arrays over the joints, and also contains ``tool_error_mm`` and, if payloads
+    are drawn, ``payload_kg``.
 
     Args (all by keyword):
         scene: Name or path of a scene that starts at rest, or of an arm, whose joints
             are then swept with motor loops without integral terms. Default:
             ``ur5e-circle``.
+        reference: ``scene`` for the path of the scene, or one or several of
+            ``sinusoid``, ``multisine``, ``point_to_point`` (joint motions), ``line``,
+            ``arc`` and ``spline`` (curves of the tool), of which every episode draws
+            one. Default: ``scene``.
+        max_speed_rad_s: Largest joint speed of drawn paths [rad/s]. The largest
+            acceleration is this speed divided by 12 ms. Default: 0.6.
+        max_angle_rad: Largest deviation of a joint angle from the start on drawn paths
+            [rad]. Default: 0.5.
+        max_distance_mm: Largest distance of the tool from its start on drawn curves of
+            the tool [mm]. Default: 100.
+        payload_kg: Payload at the tool, a point mass that replaces the payload of the
+            scene [kg]. With a range (smallest, largest), every episode draws a mass;
+            ``task`` and feed-forward then know the mean of the range, and the episode
+            starts where the motor loops carry the drawn mass. Default: None, which uses
+            the payload of the scene.
+        payload_centre_mm: Centre of mass of ``payload_kg`` in the frame of the tool
+            [mm]. Default: (0, 0, 0).
         level: ``full`` or ``linear``. Default: ``full``.
         friction: Whether drives have the friction of their maps; overrides the scene.
             Default: True.
@@ -77,8 +105,8 @@ class ArmTrackingEnv(SingleEnv):
         episode_s: Duration of an episode [s]. Default: 2.
         sensors: As in ``JointTracking-v0``.
         randomise: As in ``JointTracking-v0``, but ``load_inertia`` has no effect
-            because the scene sets the payload. With level ``linear``, True therefore
-            varies nothing.
+            because ``payload_kg`` changes the load. With level ``linear``, True
+            therefore varies nothing.
         normalise: As in ``JointTracking-v0``. Default: True.
         error_scale_mm: Error scale of the reward [mm]. Default: 1.
         effort_weight: Effort weight of the reward [-]. Default: 0.1.

@@ -68,6 +68,7 @@ class Core(ABC):
         normalise: bool,
         gauges: Mapping[int, JointGauges] | None = None,
         shared: bool = False,
+        plan_rows: int = 5,
     ) -> None:
         """Prepare episodes.
 
@@ -83,6 +84,7 @@ class Core(ABC):
             normalise: Whether observations are divided by :attr:`units`.
             gauges: Strain gauges on flexsplines, by number of the joint.
             shared: Whether all episodes follow the same plan.
+            plan_rows: Number of rows of a plan, see :meth:`draw`.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
@@ -102,6 +104,7 @@ class Core(ABC):
             count=count,
             instants=steps + 1,
             joints=n,
+            rows=plan_rows,
             channels=self.readout.channels,
             shared=shared,
         )
@@ -135,14 +138,14 @@ class Core(ABC):
     def draw(self, rng: np.random.Generator) -> tuple[Any, Array]:
         """Draw the coefficients of the plan of one episode, and compute the plan.
 
-        It consists of position, velocity, acceleration, load torque and known torque of
-        the links. The known torque is that of load, inertia and weight. Shape (steps +
-        1, 5, n_joints).
+        Its rows are position, velocity, acceleration, load torque and known torque of
+        the links, and further ones of some environments. The known torque is that of
+        load, inertia and weight. Shape (steps + 1, n_rows, n_joints).
         """
 
     @abstractmethod
     def sample(self, drawn: Any, part: slice) -> Array:
-        """Part of a plan. Shape (number of instants, 5, n_joints).
+        """Part of a plan. Shape (number of instants, n_rows, n_joints).
 
         Args:
             drawn: Coefficients of the plan.
@@ -173,6 +176,13 @@ class Core(ABC):
             shares: Changes relative to the nominal inertia [-]. Shape (n_joints,).
         """
 
+    def start_of(self, rows: Rows) -> tuple[Array, Array] | None:
+        """Motor angles [rad] and drive torques [N·m] at the start of some episodes.
+
+        None if they are those of the plant. Shapes (m, n_joints).
+        """
+        return None
+
     def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
         """Begin episodes of some simulations.
 
@@ -191,10 +201,11 @@ class Core(ABC):
                     self.variations[k] = specimens = tuple(v for v, _ in drawn)
                     varied[m] = [v.numbers for v in specimens]
             self.plans.begin(k, rng)
-        self.plant.place(index, varied)
         # new arrays, because the arrays that the last step returned must not change
         self.output_torque = self.output_torque.copy()
-        self.output_torque[index] = self.plant.start_torque
+        self.output_torque[index] = self.plant.place(
+            index, varied, self.start_of(index)
+        )
         self._task = None
         self.instant[index] = 0
         self.action = _without(self.action, index)
@@ -237,7 +248,7 @@ class Core(ABC):
         self.remember()
 
     def next_plan(self) -> Array:
-        """Plan at the end of the next step. Shape (n, 5, n_joints)."""
+        """Plan at the end of the next step. Shape (n, n_rows, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
         return self.plans.plan_at(after)
 
@@ -248,7 +259,7 @@ class Core(ABC):
         self._here = np.minimum(self.instant, self.steps)
         if rows is None or rows.size == self.instant.size:
             self.now = self.plans.plan_at(self._here)
-            """Plan at the current instant. Shape (n, 5, n_joints)."""
+            """Plan at the current instant. Shape (n, n_rows, n_joints)."""
         else:
             self.now = self.now.copy()
             self.now[rows] = self.plans.plan_at(self._here[rows], rows)
@@ -336,7 +347,7 @@ class Core(ABC):
     def task(self) -> Task:
         """Motions of all episodes; the axis of episodes precedes that of joints."""
         if self._task is None:
-            # (5, steps + 1, n, n_joints); copied, as the next episodes overwrite it
+            # (n_rows, steps + 1, n, n_joints); copied, as further episodes overwrite it
             plan = self.plans.whole_plans().transpose(2, 1, 0, 3).copy()
             age = self.sensors.delay_periods * self.period
             self._task = Task(

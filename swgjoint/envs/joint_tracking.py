@@ -14,6 +14,7 @@ from swgjoint.envs.entries import Entry, ceiling
 from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.references import (
     KINDS,
+    QUICKEST,
     DrawnMotion,
     Instants,
     Motion,
@@ -31,9 +32,6 @@ LOAD_RAMP = 0.3
 """Time over which the load grows [s]."""
 MOTION_START = 0.1
 """Rest before the motion [s]."""
-SHORTEST = 0.012
-"""Ratio of the largest speed to the largest acceleration of references [s]. This
-acceleration limits only point-to-point moves in episodes shorter than 0.6 s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +67,7 @@ class TrackingSettings(BenchSettings):
     @property
     def max_acceleration(self) -> float:
         """Largest acceleration of references [rad/s²]."""
-        return self.max_speed_rad_s / SHORTEST
+        return self.max_speed_rad_s / QUICKEST
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

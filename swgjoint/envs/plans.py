@@ -33,6 +33,8 @@ class PlanSize:
     """Number of instants of an episode, including its start."""
     joints: int
     """Number of joints."""
+    rows: int = 5
+    """Number of values that the plan has for each joint."""
     channels: int
     """Number of channels of the sensors."""
     shared: bool
@@ -41,7 +43,7 @@ class PlanSize:
     @property
     def window(self) -> int:
         """Number of instants that are kept of every episode."""
-        values = self.channels + (0 if self.shared else 5 * self.joints)
+        values = self.channels + (0 if self.shared else self.rows * self.joints)
         fitting = MEMORY // (8 * values * self.count)
         return min(self.instants, max(fitting, SHORTEST_WINDOW))
 
@@ -50,8 +52,8 @@ class Plans:
     """Plan and noise of every episode at its current instant and the next ones.
 
     A plan consists of position, velocity, acceleration, load torque and known torque of
-    the links, shape (5, n_joints) at every instant. The noise consists of one standard
-    normal number per channel.
+    the links, and of further rows of some environments. Its shape is (n_rows, n_joints)
+    at every instant. The noise consists of one standard normal number per channel.
     """
 
     def __init__(
@@ -65,9 +67,9 @@ class Plans:
         Args:
             size: Numbers of episodes, instants, joints and channels.
             draw: Function that draws the coefficients of a plan, and the plan. Shape
-                (instants, 5, n_joints).
+                (instants, n_rows, n_joints).
             sample: Function that computes a part of a plan from its coefficients. Shape
-                (part, 5, n_joints).
+                (part, n_rows, n_joints).
         """
         self._size, self._draw, self._sample = size, draw, sample
         self._window = window = size.window
@@ -77,7 +79,7 @@ class Plans:
         self._rows = rows
         kept = size.instants if size.shared else window
         own = 1 if size.shared else size.count
-        self._plan = np.zeros((own, kept, 5, size.joints))
+        self._plan = np.zeros((own, kept, size.rows, size.joints))
         self._planned = np.zeros_like(rows) if size.shared else rows
         self._noise = np.zeros((size.count, window, size.channels))
         self._first = np.zeros(size.count, dtype=np.intp)
@@ -130,7 +132,7 @@ class Plans:
     def plan_at(
         self, instant: NDArray[np.intp], rows: NDArray[np.intp] | None = None
     ) -> Array:
-        """Plans of episodes. Shape (m, 5, n_joints).
+        """Plans of episodes. Shape (m, n_rows, n_joints).
 
         Args:
             instant: Instant of each of the episodes, in its window. Shape (m,).
@@ -167,7 +169,7 @@ class Plans:
         return self._plan[0, :, :, 0], self._noise[0]
 
     def whole_plans(self) -> Array:
-        """Copy of the whole plans. Shape (n, instants, 5, n_joints)."""
+        """Copy of the whole plans. Shape (n, instants, n_rows, n_joints)."""
         if self._size.shared or self._whole:
             return self._plan[self._planned]
         every = slice(0, self._size.instants)

@@ -46,7 +46,7 @@ class Plant:
             drives: Drives of the joints, of level ``linear`` or ``full``.
             count: Number of simulations.
             start: Motor angles [rad] and torques of the drives on the links [N·m] at
-                the start of every episode. Shapes (n_joints,).
+                the start of every episode without an own start. Shapes (n_joints,).
             sub_steps: Number of engine steps per control period.
             threads: Number of engine threads; 0: one per core.
             variable: Whether drives differ between simulations.
@@ -81,12 +81,7 @@ class Plant:
         self._start = start
         self._kept: Array | None = None
         self._one = int(self._link_v[0]), int(self._rotor_v[0])
-        self._nominal = self._balance(np.zeros((1, len(drives), SIZE)))
-
-    @property
-    def start_torque(self) -> Array:
-        """Torques of the drives on the links at the start [N·m]. Shape (n_joints,)."""
-        return self._start[1]
+        self._nominal = self._balance(np.zeros((1, len(drives), SIZE)), start)
 
     @property
     def motor_angle(self) -> Array:
@@ -169,29 +164,44 @@ class Plant:
         torsion, rate = theta / ratio - psi, speed / ratio - self._qvel.item(link)
         return theta, speed, psi, drive.stiffness * torsion + drive.damping * rate
 
-    def place(self, rows: Index, variations: Array | None) -> None:
+    def place(
+        self,
+        rows: Index,
+        variations: Array | None,
+        start: tuple[Array, Array] | None = None,
+    ) -> Array:
         """Set simulations to rest at the start, the drives with their torques there.
 
         Args:
             rows: Indices of the simulations. Shape (m,).
             variations: ``numbers`` of the drives' deviations in these simulations, or
                 None if drives and loads are nominal. Shape (m, n_joints, 5).
+            start: Own motor angles [rad] and torques of the drives on the links [N·m]
+                of these simulations; None: those of the plant. Shapes (m, n_joints).
+
+        Returns:
+            Torques of the drives on the links [N·m], shape (m, n_joints), or
+            (n_joints,) if all are the same.
         """
-        rests = self._nominal
-        if variations is not None and self._user is not None:
-            rests = self._balance(variations)
+        rests, nominal = self._nominal, variations is None and start is None
+        if variations is None:
+            variations = np.zeros((rows.size, len(self.drives), SIZE))
+        elif self._user is not None:
             self._user[rows[:, None], self._tendons, :SIZE] = variations
+        theta, torque = start or self._start
+        if not nominal:
+            rests = self._balance(variations, (theta, torque))
         batch = self.batch
         batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         for j, one in enumerate(rests):
             self._qpos[rows, self._link_q[j]] = one.link_angle
-        self._qpos[rows[:, None], self._rotor_q] = self._start[0]
+        self._qpos[rows[:, None], self._rotor_q] = theta
         if self._others is None:
-            return
+            return torque
         state, others = self._others
-        if variations is None and self._kept is not None:
+        if nominal and self._kept is not None:
             state[rows] = self._kept
-            return
+            return torque
         # initialise the plugin state as in equilibrium: the accelerations due to all
         # other forces cancel those due to the drive, and hysteresis is relaxed
         batch.forward(rows)
@@ -204,15 +214,17 @@ class Plant:
         for j, one in enumerate(rests):
             for k in range(len(self.drives[j].drive.hysteresis)):
                 state[rows, others[j] + 1 + k] = one.torsion
-        if variations is None:
+        if nominal:
             self._kept = state[rows[0]].copy()
+        return torque
 
-    def _balance(self, variations: Array) -> list[DriveRest]:
-        """Equilibria of the drives at the start. ``variations`` as in :meth:`place`."""
+    def _balance(
+        self, variations: Array, start: tuple[Array, Array]
+    ) -> list[DriveRest]:
+        """Equilibria of the drives at a start. Arguments as in :meth:`place`."""
         rests = []
-        for j, (attached, theta, torque) in enumerate(
-            zip(self.drives, *self._start, strict=True)
-        ):
+        for j, attached in enumerate(self.drives):
+            theta, torque = (one[..., j] for one in start)
             if attached.level == "full":
                 own = variations[:, j]
                 rests.append(balance_specimens(attached.drive, own, theta, torque))

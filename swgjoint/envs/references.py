@@ -31,6 +31,9 @@ HOLD = 0.05
 """Rest before and after a move from point to point [s]."""
 FREQUENCIES = (0.3, 2.0)
 """Frequency range of the oscillations [Hz], below the first mode of all arm joints."""
+QUICKEST = 0.012
+"""Ratio of the largest speed to the largest acceleration of motions [s]. This
+acceleration limits only point-to-point moves in episodes shorter than 0.6 s."""
 PARTS = 5
 """Number of oscillations in a multisine."""
 
@@ -133,6 +136,16 @@ class Move:
     end: float
     """Time at which it ends [s]."""
 
+    @classmethod
+    def draw(cls, end: float, rng: np.random.Generator) -> Move:
+        """Draw the time of the return.
+
+        Args:
+            end: Time at which it ends [s].
+            rng: Random generator.
+        """
+        return cls(turn=rng.uniform(0.3, 0.6) * end, end=end)
+
     def sample(self, instants: Instants, part: slice) -> Motion:
         """Motion of size 1 at some of the instants.
 
@@ -177,15 +190,10 @@ def _multisine(end: float, rng: np.random.Generator) -> Oscillation:
     return Oscillation(frequency=frequency, phase=phase, weight=1.0 / frequency)
 
 
-def _point_to_point(end: float, rng: np.random.Generator) -> Move:
-    """Draw a move and a return."""
-    return Move(turn=rng.uniform(0.3, 0.6) * end, end=end)
-
-
 KINDS: dict[str, Callable[[float, np.random.Generator], Oscillation | Move]] = {
     "sinusoid": _sinusoid,
     "multisine": _multisine,
-    "point_to_point": _point_to_point,
+    "point_to_point": Move.draw,
 }
 """Functions that draw a motion of some duration [s], by the name of its kind."""
 

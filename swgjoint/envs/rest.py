@@ -17,7 +17,7 @@ MAX_STEPS = 50
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveRest:
-    """Specimens of a drive at rest at one motor angle. Shapes (m,)."""
+    """Specimens of a drive at rest at given motor angles. Shapes (m,)."""
 
     link_angle: Array
     """Angles of the links [rad]."""
@@ -30,9 +30,9 @@ class DriveRest:
 
 
 def balance_specimens(
-    drive: DriveMap, variations: Array, motor_angle: float, torque: float
+    drive: DriveMap, variations: Array, motor_angle: Array, torque: Array
 ) -> DriveRest:
-    """Equilibria of specimens at one motor angle and one output torque.
+    """Equilibria of specimens at given motor angles and output torques.
 
     The specimens are those of :meth:`swgjoint.joint.variation.Variation.apply_to`,
     without a map for each of them. Newton's method ends for each specimen on its own,
@@ -42,11 +42,11 @@ def balance_specimens(
         drive: Map of the nominal drive.
         variations: ``numbers`` of the :class:`~swgjoint.joint.variation.Variation` of
             each specimen. Shape (m, 5).
-        motor_angle: Angle of the motors [rad].
-        torque: Torque of the drives on their outputs [N·m].
+        motor_angle: Angles of the motors [rad]. Shape (m,) or ().
+        torque: Torques of the drives on their outputs [N·m]. Shape (m,) or ().
     """
     specimens = _Specimens(drive, variations, motor_angle)
-    psi = np.full(len(variations), motor_angle / drive.ratio)
+    psi = np.full(len(variations), np.asarray(motor_angle) / drive.ratio)
     for _ in range(MAX_STEPS):
         on_input, on_output = specimens.forces(psi)
         missing = torque - on_output
@@ -69,7 +69,7 @@ class _Specimens:
     results are bit-identical to those of the specimens' maps.
     """
 
-    def __init__(self, drive: DriveMap, variations: Array, theta: float) -> None:
+    def __init__(self, drive: DriveMap, variations: Array, theta: Array) -> None:
         self._drive, self._theta = drive, theta
         self._size = 1.0 + variations[:, 0, None]
         self._orders = drive.angle_orders.astype(float)

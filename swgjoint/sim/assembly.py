@@ -144,6 +144,7 @@ def assemble(
     drives: Mapping[str, DriveMap] | None = None,
     controlled_by: str | None = None,
     variable: bool = False,
+    top_speed: float = 0.0,
     progress: Progress = silent,
 ) -> Assembly:
     """Build and compile the model of a scene.
@@ -155,6 +156,7 @@ def assemble(
             torques only; None if the scene's own controller runs.
         variable: Whether drives at level ``full`` can deviate from their maps, see
             :mod:`swgjoint.joint.variation`.
+        top_speed: Largest joint speed of other motions that will run [rad/s].
         progress: Called while maps are built and strains under gauges are solved.
 
     Returns:
@@ -185,7 +187,7 @@ def assemble(
     spec = _spec_at_step(scene, arm)
     fittings = _fittings(
         dict(zip(arm.joints, sections, strict=True)),
-        trajectory.top_speed,
+        np.maximum(trajectory.top_speed, top_speed),
         known=dict(drives or {}),
         variable=variable,
         progress=progress,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.envs import arm_core
+from swgjoint.envs.arm import scene as arm_scene
 from swgjoint.envs.arm_tracking import ArmTrackingEnv
 from swgjoint.errors import InputError
 from swgjoint.models_path import models_path
@@ -224,7 +224,7 @@ def test_a_path_that_starts_moving_is_refused(tmp_path):
 def test_a_start_in_motion_is_refused_before_drives_are_built(monkeypatch):
     """A scene that no episode can have costs no finite elements."""
     built = []
-    monkeypatch.setattr(arm_core, "load_drive_once", built.append)
+    monkeypatch.setattr(arm_scene, "load_drive_once", built.append)
     with pytest.raises(InputError, match=naming("'bench'", "starts moving", "at rest")):
         ArmTrackingEnv(scene="bench")
     assert built == []

@@ -54,6 +54,12 @@ ARGUMENTS = {
     },
     "swgjoint/ArmTracking-v0": {
         "scene": "two-link",
+        "reference": ("sinusoid", "multisine"),
+        "max_speed_rad_s": 0.3,
+        "max_angle_rad": 0.2,
+        "max_distance_mm": 50.0,
+        "payload_kg": (0.0, 1.5),
+        "payload_centre_mm": (10.0, 0.0, 30.0),
         "level": "linear",
         "friction": False,
         "kinematic_error_arcmin": 0.5,

@@ -310,6 +310,10 @@ class Scene(Section):
         """
         return self._with_all(kinematic_error_arcmin=arcmin)
 
+    def with_payload(self, payload: Payload | None) -> Self:
+        """A copy with this payload at the tool, or without one."""
+        return self._updated(payload=payload)
+
     def _with_all(self, **values: Any) -> Self:
         """A copy in which all joints have these settings."""
         defaults = self.defaults.model_copy(update=values)
@@ -317,7 +321,11 @@ class Scene(Section):
             name: joint.model_copy(update={key: None for key in values})
             for name, joint in self.joints.items()
         }
-        copy = self.model_copy(update={"defaults": defaults, "joints": joints})
+        return self._updated(defaults=defaults, joints=joints)
+
+    def _updated(self, **values: Any) -> Self:
+        """A copy with other values of checked keys, from the same file."""
+        copy = self.model_copy(update=values)
         copy._where = self._where
         return copy
 

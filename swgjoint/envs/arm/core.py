@@ -1,40 +1,41 @@
-"""Episodes of an arm that follows the path of a scene."""
+"""Episodes of an arm that follows the path of a scene or drawn paths."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.drives.references import names_catalogue
-from swgjoint.envs.arm_settings import ArmSettings
-from swgjoint.envs.core import Core, EpisodeLimits
+from swgjoint.envs.arm.paths import ArmPaths, JointPath, ToolPath, tool_slopes
+from swgjoint.envs.arm.payload import DrawnPayloads, start_of
+from swgjoint.envs.arm.scene import check_assembly, drives_of, scene_of
+from swgjoint.envs.arm.settings import ArmSettings
+from swgjoint.envs.core import Core, EpisodeLimits, Rows
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
+from swgjoint.envs.references import Instants, Motion
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import load_drive_once, tolerances_of
-from swgjoint.errors import InputError
+from swgjoint.envs.specimen import SpecimenTolerances, tolerances_of
+from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
-from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.arm.payload import arms_of
-from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.arm.scene import is_arm, scene_of_arm
 from swgjoint.sim.assembly import Assembly, assemble
-from swgjoint.sim.equilibrium import start_state
-from swgjoint.sim.motion.commanded import trajectory_of
-from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.control import feedforward
 from swgjoint.sim.scene.task import task_of
 from swgjoint.typing import Array
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, mm
 
 ANGLE_MARGIN = 0.3
 """Deviation of a link from the range of its path at which an episode ends [rad]."""
 SPEED_MARGIN = 20.0
 """Excess of a motor speed over twice the largest motor speed of the path at which an
 episode ends [rad/s]."""
+FEEDFORWARD, SLOPES, ROWS = 5, slice(6, 9), 9
+"""Further rows of a plan: feed-forward of the motors [N·m], and displacement of the
+tool per link angle [m/rad] in three rows. Then the number of all rows."""
 
 
 class ArmCore(Core):
@@ -51,41 +52,33 @@ class ArmCore(Core):
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise, s.level)
         variable = tolerances is not None and s.level == "full"
-        scene = _scene(s)
-        assembly = assemble(scene, drives=_drives(scene), variable=variable)
-        _check(scene, assembly)
-        task = task_of(assembly)
-        steps = min(round(s.episode_s / task.period), len(task.position) - 1)
+        scene = scene_of(s)
+        fastest = s.max_speed_rad_s if s.kinds else 0.0
+        assembly = assemble(
+            scene, drives=drives_of(scene), variable=variable, top_speed=fastest
+        )
+        check_assembly(scene, assembly)
+        self._assembly, task = assembly, task_of(assembly)
+        steps = round(s.episode_s / task.period)
         drives = [t.attached for t in assembly.transmissions]
-        if tolerances is not None and variable:
-            for one in drives:
-                for kind in tolerances.extremes():
-                    check_region(
-                        specimen(one, kind),
-                        timestep=assembly.step,
-                        integrator=scene.simulation.integrator,
-                    ).require(1)
+        self.payloads: DrawnPayloads | None = None
+        """Drawn payloads; None if all episodes have the same one."""
+        if s.draws_payload:
+            self.payloads = DrawnPayloads(assembly, s.payload_bounds)
+        _check_stability(
+            assembly, drives, tolerances if variable else None, self.payloads
+        )
         plant = Plant(
             assembly.model,
             drives,
             count,
-            start=_start(assembly),
+            start=start_of(assembly),
             sub_steps=round(task.period / assembly.step),
             threads=threads,
             variable=variable,
         )
-        load = np.broadcast_to(assembly.load, (steps + 1, len(drives)))
-        self._path = np.stack(
-            [
-                task.position[: steps + 1],
-                task.velocity[: steps + 1],
-                task.acceleration[: steps + 1],
-                load,
-                task.link_torque[: steps + 1],
-            ],
-            axis=1,
-        )
-        self._by_joint = _tool_slopes(assembly, self._path[:, 0])
+        if self.payloads is not None:
+            self.payloads.attach_to(plant.batch)
         maps = [t.drive for t in assembly.transmissions]
         rated, momentary, ratcheting = np.array(
             [
@@ -97,11 +90,39 @@ class ArmCore(Core):
                 for m in maps
             ]
         ).T
-        ratio = np.abs(task.joints.ratio)
-        path = self._path[:, 0]
+        ratio, start = np.abs(task.joints.ratio), task.position[0]
+        one = np.ones(len(drives))
         self._authority = s.authority_of_rated * rated / ratio
-        self._feedforward = assembly.feedforward[:: assembly.sub_steps][: steps + 1]
-        top = 2.0 * ratio * np.abs(self._path[:, 1]).max(axis=0) + SPEED_MARGIN
+        self._paths: ArmPaths | None = None
+        if s.kinds:
+            self._instants = Instants(task.period * np.arange(steps + 1.0))
+            self._paths = ArmPaths(
+                assembly.arm,
+                start,
+                self._instants,
+                kinds=s.kinds,
+                max_speed=s.max_speed_rad_s,
+                max_angle=s.max_angle_rad,
+                max_acceleration=s.max_acceleration,
+                max_distance=s.max_distance_mm * mm,
+            )
+            low, high = start - s.max_angle_rad, start + s.max_angle_rad
+            self._tops = s.max_speed_rad_s * one, s.max_acceleration * one
+            # an episode ends before a drive carries more
+            self._top_torque = float(momentary.max())
+        else:
+            steps = min(steps, len(task.position) - 1)
+            part = slice(0, steps + 1)
+            motion = task.position[part], task.velocity[part], task.acceleration[part]
+            self._path = self._rows(
+                motion,
+                task.link_torque[part],
+                assembly.feedforward[:: assembly.sub_steps][part],
+            )
+            path = self._path
+            low, high = path[:, 0].min(axis=0), path[:, 0].max(axis=0)
+            self._tops = np.abs(path[:, 1]).max(axis=0), np.abs(path[:, 2]).max(axis=0)
+            self._top_torque = float(np.abs(path[:, 4]).max())
         super().__init__(
             plant,
             joints=task.joints,
@@ -111,9 +132,9 @@ class ArmCore(Core):
                 ratio=task.joints.ratio,
             ),
             limits=EpisodeLimits(
-                angle=0.5 * np.ptp(path, axis=0) + ANGLE_MARGIN,
-                centre=0.5 * (path.max(axis=0) + path.min(axis=0)),
-                motor_speed=top,
+                angle=0.5 * (high - low) + ANGLE_MARGIN,
+                centre=0.5 * (high + low),
+                motor_speed=2.0 * ratio * self._tops[0] + SPEED_MARGIN,
                 momentary_peak=momentary,
                 ratcheting=ratcheting,
                 motor_torque=task.joints.torque_limit,
@@ -127,7 +148,8 @@ class ArmCore(Core):
                 task.joints.names.index(name): one
                 for name, one in assembly.gauges.items()
             },
-            shared=True,
+            shared=self._paths is None,
+            plan_rows=ROWS,
         )
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
@@ -141,8 +163,8 @@ class ArmCore(Core):
             [
                 error_bounds(
                     one,
-                    speed=float(np.abs(self._path[:, 1, j]).max()),
-                    acceleration=float(np.abs(self._path[:, 2, j]).max()),
+                    speed=float(self._tops[0][j]),
+                    acceleration=float(self._tops[1][j]),
                     age=self.sensors.delay_periods * self.period,
                     period=self.period,
                 )
@@ -154,8 +176,8 @@ class ArmCore(Core):
             top = ceiling(top)
             return Entry(meaning=meaning, unit=unit, low=-top, high=top, count=count)
 
-        link_speed = max(float(np.abs(self._path[:, 1]).max()), 0.01)
-        torque = max(float(np.abs(self._path[:, 4]).max()), 0.1)
+        link_speed = max(float(self._tops[0].max()), 0.01)
+        torque = max(self._top_torque, 0.1)
         further = []
         if self.sensors.link_encoder:
             top = 1.01 * float(reach.max())
@@ -186,37 +208,82 @@ class ArmCore(Core):
         ), (each(what, "1", 1.0),)
 
     def vary_load(self, index: int, shares: Array) -> None:
-        """Do nothing, because the scene sets the payload.
+        """Do nothing, because payloads change the load.
 
         Args:
             index: Index of the simulation.
             shares: Relative changes of the load inertia [-]. Shape (n_joints,).
         """
 
-    def draw(self, rng: np.random.Generator) -> tuple[None, Array]:
-        """Plan of every episode: the path of the scene."""
-        return None, self._path
-
-    def sample(self, drawn: None, part: slice) -> Array:
-        """Part of the path of the scene.
+    def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
+        """Begin episodes of some simulations, and draw their payloads.
 
         Args:
-            drawn: None.
+            rows: Indices of the simulations.
+            rngs: Random generators, one for each of them.
+        """
+        if self.payloads is not None:
+            self.payloads.draw(rows, rngs)
+        super().restart(rows, rngs)
+
+    def start_of(self, rows: Rows) -> tuple[Array, Array] | None:
+        """Motor angles [rad] and drive torques [N·m] with drawn payloads."""
+        return None if self.payloads is None else self.payloads.start_of(rows)
+
+    def draw(
+        self, rng: np.random.Generator
+    ) -> tuple[JointPath | ToolPath | None, Array]:
+        """Plan of an episode: the path of the scene, or a drawn one."""
+        if self._paths is None:
+            return None, self._path
+        drawn, motion = self._paths.draw(rng)
+        return drawn, self._plan(motion)
+
+    def sample(self, drawn: JointPath | ToolPath | None, part: slice) -> Array:
+        """Part of a plan.
+
+        Args:
+            drawn: Path in joint or tool space; None for that of the scene.
             part: Range of the instants.
         """
-        return self._path[part]
+        if drawn is None:
+            return self._path[part]
+        return self._plan(drawn.sample(self._instants, part))
+
+    def _plan(self, motion: Motion) -> Array:
+        """Plan of a drawn path, with the torques that the controller's model states."""
+        assembly, controller = self._assembly, self._assembly.scene.controller
+        known_arm, load = assembly.known_arm, assembly.load
+        torque = known = load + known_arm.torques(*motion)
+        if controller.feedforward == "gravity":
+            torque = load + known_arm.gravity(motion[0])
+        ahead = feedforward(
+            controller.feedforward,
+            link_torque=torque,
+            acceleration=motion[2],
+            ratio=assembly.ratio,
+            rotor_inertia=assembly.rotor_inertia,
+        )
+        return self._rows(motion, known, ahead)
+
+    def _rows(self, motion: Motion, known: Array, ahead: Array) -> Array:
+        """Plan of a motion with known torques of links and feed-forward of motors."""
+        plan = np.empty((len(known), ROWS, known.shape[1]))
+        for row, values in enumerate((*motion, self._assembly.load, known, ahead)):
+            plan[:, row] = values
+        plan[:, SLOPES] = tool_slopes(self._assembly.arm, motion[0])
+        return plan
 
     def command(self, action: Array) -> Array:
         """Input of the scene's motor loops with the action [N·m]. (n, n_joints)."""
         s, plan = self.settings, self.next_plan()
-        here = np.minimum(self.instant + 1, self.steps)
         if s.action == "torque":
             own = self.loop.command(plan[:, 0], plan[:, 1])
             own = own + action * self._authority
         else:
             shift = s.shift_arcmin * arcmin * action
             own = self.loop.command(plan[:, 0] + shift, plan[:, 1])
-        return np.asarray(own + self._feedforward[here])
+        return np.asarray(own + plan[:, FEEDFORWARD])
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""
@@ -236,7 +303,7 @@ class ArmCore(Core):
     def judge(self) -> None:
         """Set the errors of links [rad] and tool [m] from the current state."""
         super().judge()
-        slopes = self._by_joint[self._here]  # (n, 3, n_joints)
+        slopes = self.now[:, SLOPES]  # (n, 3, n_joints)
         # sum joint by joint: the order must not depend on the number of episodes
         offset = [np.zeros(len(slopes)) for _ in range(3)]
         for axis in range(3):
@@ -255,93 +322,28 @@ class ArmCore(Core):
         return np.asarray(1.0 / (1.0 + error * error) - s.effort_weight * mean)
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """True values, including the error of the tool [mm]."""
-        return super().info() | {"tool_error_mm": 1e3 * self.tool_error}
+        """True values, with the error of the tool [mm] and a drawn payload [kg]."""
+        values = super().info() | {"tool_error_mm": 1e3 * self.tool_error}
+        if self.payloads is not None:
+            values["payload_kg"] = self.payloads.mass
+        return values
 
 
-def _scene(settings: ArmSettings) -> Scene:
-    """The scene with level, friction and kinematic error of the settings."""
-    name = str(settings.scene)
-    if is_arm(name):
-        scene = scene_of_arm(name).with_changes({"controller.kind": "pd"})
-    else:
-        scene = Scene.load_file(name)
-    for section in (scene.defaults, *scene.joints.values()):
-        if section.output_bearing is not None:
-            raise InputError(f"scene {scene.name!r} has output_bearing; accepted: none")
-    scene = scene.with_level(settings.level)  # type: ignore[arg-type]
-    scene = scene.with_friction(bool(settings.friction))
-    return scene.with_kinematic_error(settings.kinematic_error_arcmin)
-
-
-def _drives(scene: Scene) -> dict[str, DriveMap]:
-    """Maps that need finite elements or a file, loaded once for all environments.
-
-    Unsuitable scenes are rejected before any map is built.
-    """
-    sections = [scene.defaults, *scene.joints.values()]
-    names = {s.drive for s in sections if s.drive is not None and s.model is None}
-    slow = sorted(name for name in names if not names_catalogue(name))
-    if slow:
-        arm, _ = arms_of(
-            scene.arm,
-            tool_site=scene.tool_site,
-            payload=scene.payload,
-            where=scene.where,
-            reading=scene.reading,
-        )
-        _check_motion(scene, arm, trajectory_of(scene, arm).velocity[0])
-    return {name: load_drive_once(name) for name in slow}
-
-
-def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
-    """Reject disturbances, an arm without a tool, and a start that is not at rest."""
-    where = f"scene {scene.name!r}"
-    if scene.disturbance:
-        raise InputError(f"{where} has disturbances; accepted: none")
-    if arm.tool < 0:
-        raise InputError(
-            f"{where}: the arm has no tool site; accepted: an arm with a tool site,"
-            " which the reward needs"
-        )
-    if np.abs(first).max() > 0.0:
-        raise InputError(f"{where} starts moving; accepted: a path that starts at rest")
-
-
-def _check(scene: Scene, assembly: Assembly) -> None:
-    """Reject scenes with features that episodes do not support."""
-    _check_motion(scene, assembly.arm, assembly.trajectory.velocity[0])
-    where, loops = f"scene {scene.name!r}", assembly.loops
-    if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
-        raise InputError(
-            f"{where}: controller {scene.controller.kind!r}; accepted: kind pd within"
-            " the engine's step, without sensors, control period or motor lines"
-        )
-    if scene.simulation.integrator != "discrete":
-        raise InputError(
-            f"{where}: integrator {scene.simulation.integrator!r}; accepted: discrete"
-        )
-
-
-def _start(assembly: Assembly) -> tuple[Array, Array]:
-    """Motor angles [rad] and drive torques [N·m] at the start of the scene."""
-    qpos, _ = start_state(assembly)
-    theta, psi = qpos[assembly.motor_position], qpos[assembly.link_position]
-    torque = [
-        float(t.law.forces(a, b)[1])
-        for t, a, b in zip(assembly.transmissions, theta, psi, strict=True)
-        if t.law is not None
-    ]
-    return theta, np.array(torque)
-
-
-def _tool_slopes(assembly: Assembly, path: Array) -> Array:
-    """Tool displacement per link angle along the path [m/rad]. (n, 3, n_joints)."""
-    arm, out = assembly.arm, np.empty((len(path), 3, path.shape[1]))
-    data = mujoco.MjData(arm.model)
-    for row, q in zip(out, path, strict=True):
-        data.qpos[:] = q
-        mujoco.mj_kinematics(arm.model, data)
-        mujoco.mj_comPos(arm.model, data)
-        mujoco.mj_jacSite(arm.model, data, row, None, arm.tool)
-    return out
+def _check_stability(
+    assembly: Assembly,
+    drives: Sequence[JointDrive],
+    tolerances: SpecimenTolerances | None,
+    payloads: DrawnPayloads | None,
+) -> None:
+    """Reject specimens and payloads with which a drive is too stiff for the step."""
+    missing = np.zeros(len(drives))
+    if payloads is not None:
+        missing = payloads.link_inertia_missing()
+    extremes = tolerances.extremes() if tolerances is not None else ()
+    for one, less in zip(drives, missing, strict=True):
+        for kind in (one, *(specimen(one, each) for each in extremes)):
+            check_region(
+                replace(kind, link_inertia=kind.link_inertia - float(less)),
+                timestep=assembly.step,
+                integrator=assembly.scene.simulation.integrator,
+            ).require(1)

@@ -1,0 +1,1 @@
+"""Episodes of an arm: scene, paths, payloads."""

@@ -1,0 +1,229 @@
+"""Drawn paths of ArmTracking-v0: within their limits, smooth, and those of the seed."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from messages import naming
+
+from swgjoint.envs import plans
+from swgjoint.envs.arm_tracking import ArmTrackingEnv, ArmTrackingVectorEnv
+from swgjoint.errors import InputError
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.units import mm
+
+JOINT = ("sinusoid", "multisine", "point_to_point")
+TOOL = ("line", "arc", "spline")
+LIMITS = {"max_speed_rad_s": 0.4, "max_angle_rad": 0.3, "max_distance_mm": 60.0}
+ROUND_OFF = 1.0 + 1e-9
+
+
+def drawn(**keys):
+    """Batch of 6 episodes on drawn paths, after a reset."""
+    keys = {**LIMITS, "episode_s": 1.0, "friction": False, **keys}
+    env = ArmTrackingVectorEnv(6, threads=1, **keys)
+    env.reset(seed=3)
+    return env
+
+
+@pytest.mark.parametrize("kind", JOINT + TOOL)
+def test_paths_keep_their_limits(kind):
+    """Speed, angle from the start and, on tool paths, distance; some of it is used."""
+    task = drawn(reference=kind).task
+    q, v = task.position, task.velocity
+    angle, speed = np.abs(q - q[0]).max(), np.abs(v).max()
+    assert 0.02 < angle <= 0.3 * ROUND_OFF
+    assert 0.05 < speed <= 0.4 * ROUND_OFF
+    assert not v[0].any() and not task.acceleration[0].any()
+    arm = RigidArm("ur5e")
+    for k in range(q.shape[1]):
+        tool = arm.tool_positions(q[:, k])
+        distance = np.linalg.norm(tool - tool[0], axis=1)
+        if kind in TOOL:
+            assert distance.max() <= 60.0 * mm * ROUND_OFF
+        assert distance.max() > 2.0 * mm
+
+
+@pytest.mark.parametrize("kind", JOINT + TOOL)
+def test_speeds_and_accelerations_are_derivatives(kind):
+    """Central differences of position and speed over two periods."""
+    task = drawn(reference=kind).task
+    for value, slope in (
+        (task.position, task.velocity),
+        (task.velocity, task.acceleration),
+    ):
+        found = (value[2:] - value[:-2]) / (2.0 * task.period)
+        # a quarter of the change of the slope over one period
+        bound = 0.26 * np.abs(np.diff(slope, n=2, axis=0)).max() + 1e-9
+        assert np.abs(found - slope[1:-1]).max() <= bound
+
+
+@pytest.mark.parametrize("kind", ["line", "arc"])
+def test_tool_paths_are_lines_and_arcs(kind):
+    """Points of a line have one direction; those of an arc lie on a circle."""
+    task, arm = drawn(reference=kind).task, RigidArm("ur5e")
+    for k in range(task.position.shape[1]):
+        tool = arm.tool_positions(task.position[::20, k])
+        moved = tool - tool[0]
+        sizes = np.linalg.svd(moved, compute_uv=False)
+        flat = 1 if kind == "line" else 2
+        np.testing.assert_allclose(sizes[flat:], 0.0, atol=1e-8)
+        if kind == "arc":
+            assert sizes[1] > 1e-5
+            # circle through the start: |x|² = 2 c·x
+            centre, *_ = np.linalg.lstsq(2.0 * moved, (moved**2).sum(1), rcond=1e-6)
+            radius = np.linalg.norm(moved - centre, axis=1)
+            np.testing.assert_allclose(radius, radius[0], rtol=1e-5)
+
+
+def test_the_tool_keeps_its_orientation_on_tool_paths():
+    """An arm with six joints only shifts its tool."""
+    task, arm = drawn(reference="spline").task, RigidArm("ur5e")
+    body = arm.model.site_bodyid[arm.tool]
+    _, turns = arm.body_poses(task.position[::100, 0])
+    np.testing.assert_allclose(np.abs(turns[:, body] @ turns[0, body]), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("reference", [JOINT, TOOL])
+def test_torques_and_errors_are_those_of_the_path(reference):
+    """Inverse dynamics of the rigid arm; the tool errs as its links do."""
+    env = drawn(reference=reference)
+    task, arm = env.task, RigidArm("ur5e")
+    motion = (task.position[:, 2], task.velocity[:, 2], task.acceleration[:, 2])
+    np.testing.assert_array_equal(task.link_torque[:, 2], arm.torques(*motion))
+    for _ in range(600):
+        *_, info = env.step(np.zeros((6, 6)))
+    q, at = task.position[600], info["link_angle_rad"]
+    offset = arm.tool_positions(at) - arm.tool_positions(q)
+    want = np.linalg.norm(offset, axis=1) / mm
+    np.testing.assert_allclose(info["tool_error_mm"], want, rtol=0.02, atol=1e-3)
+    assert want.max() < 3.0  # the loop follows the path
+
+
+def test_paths_differ_between_seeds_and_repeat_with_them():
+    """Every episode of a generator has a new path; the same seed gives the same."""
+    env = ArmTrackingEnv(reference=("multisine", "arc"), episode_s=0.5)
+    paths = []
+    for seed in (5, None, 5, None, 6):
+        env.reset(seed=seed)
+        paths.append(env.task.position)
+    np.testing.assert_array_equal(paths[0], paths[2])
+    np.testing.assert_array_equal(paths[1], paths[3])
+    for a, b in ((0, 1), (0, 4), (1, 4)):
+        assert np.abs(paths[a] - paths[b]).max() > 1e-3
+
+
+def test_all_kinds_are_drawn():
+    """Of the six kinds, whose draws are equally likely, each within 60 episodes."""
+    env = ArmTrackingEnv(reference=JOINT + TOOL, episode_s=0.5)
+    rng, kinds = np.random.default_rng(0), set()
+    for _ in range(60):
+        path, _ = env.core.draw(rng)
+        kinds.add(path.kind)
+    assert kinds == set(JOINT + TOOL)
+
+
+def test_an_episode_is_not_limited_by_the_motion_of_the_scene():
+    """The path of the scene takes 10.5 s, that of an arm 2.25 s."""
+    env = ArmTrackingEnv(scene="two-link", reference="sinusoid", episode_s=4.0)
+    assert env.core.steps == 4000
+
+
+def test_the_scene_is_one_path():
+    """Which cannot be one of several kinds, because its limits are not the stated."""
+    found = naming("reference", "('scene', 'line')", "scene", "line, arc, spline")
+    with pytest.raises(InputError, match=found):
+        ArmTrackingEnv(reference=("scene", "line"))
+
+
+TOUCHING = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <geom name="wall" type="box" pos="0 0 {wall}" size="1 1 0.01"/>
+    <body name="link" pos="0 0 0.5">
+      <joint name="joint" axis="0 1 0" range="-1.5 0.2"/>
+      <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="2"/>
+      <site name="tool" pos="0.4 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("reference", ["sinusoid", "line"])
+def test_paths_avoid_contacts_and_ends_of_joints(reference, tmp_path):
+    """A wall 0.05 m below the link, and a joint that ends 0.2 rad below."""
+    path, paths = tmp_path / "arm.xml", []
+    for wall in (0.42, -5.0):
+        path.write_text(TOUCHING.format(wall=wall), encoding="utf-8")
+        keys = {"scene": str(path), "reference": reference, "episode_s": 1.0}
+        keys |= {"max_speed_rad_s": 5.0, "max_angle_rad": 0.5, "max_distance_mm": 300.0}
+        if reference == "line":  # one joint cannot follow a line
+            with pytest.raises(InputError, match=naming("arm", "line", "reference")):
+                ArmTrackingVectorEnv(1, threads=1, **keys)
+            return
+        env = ArmTrackingVectorEnv(8, threads=1, **keys)
+        env.reset(seed=0)
+        paths.append(env.task.position)
+    near, far = paths
+    # the end of the link is 0.05 m above the wall and has a radius of 0.02 m
+    assert 0.4 * np.sin(near.max()) < 0.05
+    assert 0.13 < far.max() <= 0.2 * ROUND_OFF
+    # a path that meets no wall is the same without one
+    assert any((near[:, k] == far[:, k]).all() for k in range(8))
+
+
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"reference": "circle"}, ("reference", "'circle'", "scene", "arc")),
+        ({"reference": ()}, ("reference", "()", "scene", "arc")),
+        ({"reference": 3}, ("reference", "3", "scene", "arc")),
+        ({"max_speed_rad_s": 0.0}, ("max_speed_rad_s", "0.0 rad/s", "> 0")),
+        ({"max_angle_rad": -1.0}, ("max_angle_rad", "-1.0 rad", "> 0")),
+        ({"max_distance_mm": np.nan}, ("max_distance_mm", "nan mm", "> 0")),
+    ],
+)
+def test_what_is_no_path_gives_one_line(keys, match):
+    """What, where, and what is accepted."""
+    with pytest.raises(InputError, match=naming(*match)):
+        ArmTrackingEnv(**keys)
+
+
+def test_windows_change_nothing(monkeypatch):
+    """Little memory gives the same observations and tasks, bit by bit."""
+    keys = {"reference": JOINT + TOOL, "episode_s": 0.5, "payload_kg": (0.0, 2.0)}
+    runs = []
+    for memory in (plans.MEMORY, 1):
+        monkeypatch.setattr(plans, "MEMORY", memory)
+        env = ArmTrackingVectorEnv(4, threads=1, **keys)
+        run = [env.reset(seed=4)[0]]
+        run += [env.step(np.full((4, 6), 0.1))[0] for _ in range(60)]
+        runs.append([*run, env.task.position, env.task.link_torque])
+    for a, b in zip(*runs, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_batch_equals_single_environments():
+    """A batch with drawn paths and payloads, with restarts, bit by bit."""
+    keys = {
+        "scene": "two-link",
+        "reference": ("multisine", "point_to_point"),
+        "payload_kg": (0.0, 2.0),
+        "randomise": True,
+        "episode_s": 0.5,
+    }
+    runs = []
+    for mode in ("sync", "vector_entry_point"):
+        env = gymnasium.make_vec(
+            "swgjoint.envs:swgjoint/ArmTracking-v0", 3, vectorization_mode=mode, **keys
+        )
+        run, rng = [env.reset(seed=2)[0]], np.random.default_rng(0)
+        for _ in range(550):  # with restarts
+            *got, info = env.step(rng.uniform(-0.2, 0.2, (3, 2)))
+            run += [*got, info["payload_kg"], info["tool_error_mm"]]
+        runs.append(run)
+    for a, b in zip(*runs, strict=True):
+        np.testing.assert_array_equal(a, b)
