@@ -160,29 +160,33 @@ def friction_loops(
     series = series_compliance(design, cup=True)
     loops: list[FrictionLoop] = []  # along the whole path
     stage = f"{drive.name}: friction loops"
-    # zero torque begins both sides of the elastic path
-    each = outward.size + 1 + torque.size
+    each = outward.size + torque.size
     done, total = 0, each * len(parts)
 
-    def tick() -> None:
+    def tick(count: int = 1) -> None:
         nonlocal done
-        done += 1
+        done += count
         progress(stage, done, total)
 
     progress(stage, 0, total)
-    for k, part in enumerate(parts):
-        theta = period * float(part)
-        there = _kept(keep, k, theta, torque)
+    angles = [period * float(part) for part in parts]
+    kept = [_kept(keep, k, theta, torque) for k, theta in enumerate(angles)]
+    # an output that is free at one position makes the loops at all others useless
+    unloaded = {
+        k: _unloaded(smooth, angles[k], tick)
+        for k, there in enumerate(kept)
+        if there is None
+    }
+    for k, (theta, there) in enumerate(zip(angles, kept, strict=True)):
         if there is not None:
             loops.append(there)
-            done += each
-            progress(stage, done, total)
+            tick(each)
             continue
         elastic: dict[float, State] = {}
         for side in (outward[outward >= 0.0], outward[outward <= 0.0][::-1]):
-            states = _along(smooth, theta, side, tick)
+            states = _along(smooth, unloaded[k], side, tick)
             elastic |= dict(zip(side.tolist(), states, strict=True))
-        rubbed = _along(rubbing, theta, torque, tick)
+        rubbed = _along(rubbing, _unloaded(rubbing, theta, tick), torque, tick)
         still = [elastic[t] for t in torque.tolist()]
         ideal = theta / design.ratio
         loops.append(
@@ -224,38 +228,46 @@ def _kept(
     return None if keep is None else keep.read(_LOOP.format(number), taken)
 
 
+def _unloaded(follow: Continuation, theta: float, tick: Callable[[], None]) -> State:
+    """Equilibrium without load at a locked input angle [rad].
+
+    Raises:
+        ComputationError: If the output moves freely in a clearance.
+    """
+    state = follow.engage(follow.deflect(theta))
+    if state.outcome.ok:
+        state = follow.to_torque(state, 0.0)
+    if not state.outcome.ok:
+        raise ComputationError(
+            f"no equilibrium at zero torque and input angle {theta:.4g} rad: friction"
+            " loops need an output that cannot move freely in a clearance"
+        )
+    tick()
+    return state
+
+
 def _along(
-    follow: Continuation,
-    theta: float,
-    torques: Array,
-    tick: Callable[[], None] = lambda: None,
+    follow: Continuation, start: State, torques: Array, tick: Callable[[], None]
 ) -> list[State]:
-    """Equilibria along a torque path that starts at zero, with the input locked.
+    """Equilibria along a torque path, with the input locked.
 
     Args:
         follow: Continuation of the equilibria.
-        theta: Locked input angle [rad].
+        start: Equilibrium at the first torque.
         torques: Output torques (n,) [N·m].
-        tick: Called after every equilibrium.
+        tick: Called after every equilibrium except the first.
 
     Raises:
         ComputationError: If an equilibrium cannot be found.
     """
-    state = follow.engage(follow.deflect(theta))
-    states: list[State] = []
-    for torque in torques.tolist():
-        if state.outcome.ok:
-            state = follow.to_torque(state, torque)
-        if not state.outcome.ok and not states:
-            raise ComputationError(
-                f"no equilibrium at zero torque and input angle {theta:.4g} rad:"
-                " friction loops need an output that cannot move freely in a clearance"
-            )
+    states = [start]
+    for torque in torques[1:].tolist():
+        state = follow.to_torque(states[-1], torque)
         if not state.outcome.ok:
             raise ComputationError(
-                f"no equilibrium at {torque:.4g} N·m and input angle {theta:.4g} rad"
-                f" with a friction coefficient of {_coefficient(follow):g}:"
-                f" {state.outcome.value}"
+                f"no equilibrium at {torque:.4g} N·m and input angle"
+                f" {follow.input_angle(start):.4g} rad with a friction coefficient of"
+                f" {_coefficient(follow):g}: {state.outcome.value}"
             )
         states.append(state)
         tick()
