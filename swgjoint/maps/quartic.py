@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import comb
 
 import numpy as np
@@ -23,10 +24,34 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
         Breakpoints (2 n - 1,), and for each piece the coefficients in ascending powers
         of the distance from its first breakpoint (2 n - 2, 5).
     """
-    # The interval is scaled to [0, 2] and cut at 1. The left quartic has the
-    # coefficients a0..a4. Continuity of order three gives the right one, in powers of
-    # (x - 1), except for its b4. Value and derivatives at x = 2 are ``known`` times
-    # a0..a2 plus ``condition`` times a3, a4, b4.
+    known, condition = _at_end()
+    half = 0.5 * np.diff(knots)
+    scale = half ** np.arange(3)[:, None]
+    start, end = values[:, :-1] * scale, values[:, 1:] * scale
+    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
+    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
+    left = np.stack([*low, a3, a4])
+    right = np.stack(
+        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
+    )
+    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
+    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
+    breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
+    return breaks, pieces.reshape(5, -1).T
+
+
+@cache
+def _at_end() -> tuple[Array, Array]:
+    """Value and two derivatives at the end of an interval, by the coefficients.
+
+    The interval is scaled to [0, 2] and cut at 1. The left quartic has the coefficients
+    a0..a4. Continuity of order three gives the right one, in powers of (x - 1), except
+    for its b4. Value and derivatives at x = 2 are ``known`` times a0..a2 plus
+    ``condition`` times a3, a4, b4.
+
+    Returns:
+        ``known`` and ``condition`` (3, 3).
+    """
     condition = np.zeros((3, 3))
     known = np.zeros((3, 3))
     for row in range(3):  # derivative at x = 2
@@ -42,19 +67,7 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
                 if j >= row
             )
         condition[row, 2] = fall[4]
-    half = 0.5 * np.diff(knots)
-    scale = half ** np.arange(3)[:, None]
-    start, end = values[:, :-1] * scale, values[:, 1:] * scale
-    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
-    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
-    left = np.stack([*low, a3, a4])
-    right = np.stack(
-        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
-    )
-    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
-    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
-    breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
-    return breaks, pieces.reshape(5, -1).T
+    return known, condition
 
 
 def evaluate(breaks: Array, pieces: Array, at: Array) -> Array:

@@ -111,9 +111,15 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     steps = ceil(PER_CYCLE * fastest / slowest)
     most = min(MOST_ANGLES, MOST_PHASES // len(drive.orders))
     theta = np.linspace(0.0, 2.0 * np.pi / slowest, min(steps, most) + 1)
-    # one matrix product: maps with tooth errors have thousands of harmonics
-    phases, bend = drive.phases(theta, theta / drive.ratio), drive.coefficients(x, 2)
-    stiffness = bend[..., 0] @ np.cos(phases).T + bend[..., 1] @ np.sin(phases).T
+    phases = drive.phases(theta, theta / drive.ratio)
+    waves = np.stack([np.cos(phases), np.sin(phases)])
+    # the stiffness is quadratic between breakpoints: its coefficients are summed, not
+    # its values, because maps with tooth errors have thousands of harmonics
+    second = np.array([2.0, 6.0, 12.0]) * drive.potential[..., 2:]
+    c = np.tensordot(second, waves, axes=([1, 0], [0, 2]))  # (n_pieces, 3, n_angles)
+    j = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, knots.size - 2)
+    d = (x - knots[j])[:, None]
+    stiffness = c[j, 0] + d * (c[j, 1] + d * c[j, 2])
     return [float(stiffness.min()), float(stiffness.max())]
 
 
