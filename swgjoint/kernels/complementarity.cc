@@ -32,14 +32,17 @@ double StripLaw::excess(std::size_t strip, double force, double* derivative) con
 
 StripSolver::StripSolver(const Problem& problem, const StripLaw& law)
     : p_(problem), law_(law), members_(law.strips), force_row_(problem.size, -1),
-      row_(problem.size, -1), extra_of_(problem.size, -1), place_(law.strips, -1),
-      work_(problem.size), force_(law.strips) {
+      seat_(problem.size, -1), seen_(new double[problem.size * problem.size]),
+      seen_strips_(new double[problem.size * law.strips]), row_(problem.size, -1),
+      extra_of_(problem.size, -1), place_(law.strips, -1), work_(problem.size),
+      rows_(problem.size), force_(law.strips) {
   for (std::size_t k = 0; k < p_.size; ++k) {
     if (p_.strip[k] < 0) continue;
     members_[p_.strip[k]].push_back(k);
     if (!p_.closed[k]) continue;
     force_row_[k] = static_cast<std::int64_t>(forces_.size());
     forces_.push_back(k);
+    watch(k);
   }
 }
 
@@ -51,6 +54,9 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
   // first guess of the forces: the closed contacts alone
   std::fill(force_.begin(), force_.end(), 0.0);
   for (const std::size_t k : forces_) force_[p_.strip[k]] += p_.force_unit[k] * offset[k];
+  for (std::size_t k = 0; k < n; ++k) {
+    if (active[k]) watch(k);
+  }
   bool fresh = false;  // whether the reference is the active set itself
   if (referred_) start(offset);
   while (true) {
@@ -63,7 +69,7 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
       if (fresh) return false;
       continue;
     }
-    const double residual = spread(offset, active, result);
+    double residual = spread(offset, active, false, result);
     for (std::size_t j = 0; j < law_.strips; ++j) {
       approach[j] = place_[j] < 0 ? -law_.offset[j] : x_[place_[j]];
     }
@@ -81,12 +87,23 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
 
     std::size_t wrong = 0, last = 0;
     double lowest = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
+    const auto judge = [&](std::size_t k) {
       lowest = std::min(lowest, result[k]);
       if (!(result[k] >= -tolerance)) {
         ++wrong;
-        last = k;
+        last = std::max(last, k);
       }
+    };
+    for (const std::size_t k : watched_) judge(k);
+    if (wrong == 0 && error <= p_.tolerance_m) {
+      // solved as far as it is watched: check all other contacts
+      residual = spread(offset, active, true, result);
+      for (std::size_t k = 0; k < n; ++k) {
+        if (result[k] >= -tolerance) continue;
+        watch(k);
+        judge(k);
+      }
+      if (wrong > 0) fewest = n + 1;
     }
     if (wrong == 0 && !fresh && !(residual <= kResidual * tolerance)) {
       referred_ = false;
@@ -106,7 +123,7 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
     } else {
       const double part = tries < p_.tries ? kMostViolated : kViolated;
       const double limit = std::max(tolerance, -part * lowest);
-      for (std::size_t k = 0; k < n; ++k) {
+      for (const std::size_t k : watched_) {
         if (!(result[k] >= -limit)) active[k] = !active[k];
       }
     }
@@ -129,7 +146,7 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
 bool StripSolver::refer(const double* offset, const bool* active) {
   const std::size_t n = p_.size;
   inside_.clear();
-  for (std::size_t k = 0; k < n; ++k) {
+  for (const std::size_t k : watched_) {
     row_[k] = active[k] ? static_cast<std::int64_t>(inside_.size()) : -1;
     if (active[k]) inside_.push_back(k);
     extra_of_[k] = -1;
@@ -202,9 +219,9 @@ void StripSolver::start(const double* offset) {
 
 bool StripSolver::follow(const bool* active) {
   std::size_t changes = 0;
-  for (std::size_t k = 0; k < p_.size; ++k) changes += active[k] != (row_[k] >= 0);
+  for (const std::size_t k : watched_) changes += active[k] != (row_[k] >= 0);
   if (changes > kFewest + inside_.size() / kShare) return false;
-  for (std::size_t k = 0; k < p_.size; ++k) {
+  for (const std::size_t k : watched_) {
     const bool changed = active[k] != (row_[k] >= 0);
     if (changed == (extra_of_[k] >= 0)) continue;
     if (changed) {
@@ -340,35 +357,6 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
   }
   add_columns(work_.data(), columns_.data(), parts_.data(), count, a);
   return true;
-}
-
-double StripSolver::spread(const double* offset, const bool* active,
-                           double* result) {
-  const std::size_t n = p_.size;
-  columns_.clear();
-  parts_.clear();
-  for (std::size_t i = 0; i < inside_.size(); ++i) {
-    if (!active[inside_[i]]) continue;
-    columns_.push_back(p_.columns + n * inside_[i]);
-    parts_.push_back(work_[i]);
-  }
-  for (std::size_t t = 0; t < extra_.size(); ++t) {
-    const std::size_t k = extra_[t].index;
-    if (extra_[t].kind == Kind::kInactive) continue;
-    const double* columns =
-        extra_[t].kind == Kind::kStrip ? p_.strip_columns : p_.columns;
-    columns_.push_back(columns + n * k);
-    parts_.push_back(x_[t]);
-  }
-  std::copy(offset, offset + n, result);
-  add_columns(result, columns_.data(), parts_.data(), parts_.size(), n);
-  double residual = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (!active[k]) continue;
-    residual = std::max(residual, std::abs(result[k]));
-    result[k] = row_[k] >= 0 ? work_[row_[k]] : x_[extra_of_[k]];
-  }
-  return residual;
 }
 
 }  // namespace swgjoint

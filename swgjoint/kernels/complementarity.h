@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace swgjoint {
@@ -62,7 +63,12 @@ class StripSolver {
   // sets differ from it by few contacts, whose unknowns are extra, like those of the
   // strips: the reference gives the effect of each extra unknown on all others, and a
   // small system gives the extra unknowns.
+  //
+  // Most contacts are active in none of the problems. The search therefore watches those
+  // only that have been active or infeasible before; a solution is checked at all others.
 
+  // Watch one more contact.
+  void watch(std::size_t k);
   // Factorise the matrix of the active contacts, which become the reference.
   bool refer(const double* offset, const bool* active);
   // Solutions for one offset with the reference alone.
@@ -79,14 +85,20 @@ class StripSolver {
   double coupling(std::size_t k, const Extra& extra) const;
   // Values of the extra unknowns; by_load solves for the derivatives by the load.
   bool solve_extra(const bool* active, bool by_load);
-  // Unknowns and slacks; returns the largest error of an active equation.
-  double spread(const double* offset, const bool* active, double* result);
+  // Unknowns and slacks of the watched contacts or, with all, of all contacts; returns
+  // the largest error of an active equation.
+  double spread(const double* offset, const bool* active, bool all, double* result);
 
   const Problem& p_;
   const StripLaw& law_;
   std::vector<std::vector<std::size_t>> members_;  // contacts of each strip
   std::vector<std::size_t> forces_;                // strip contacts that are closed
   std::vector<std::int64_t> force_row_;            // number of a contact in forces_
+  std::vector<std::size_t> watched_;
+  std::vector<std::int64_t> seat_;                 // number of a contact in watched_, or -1
+  // columns of the watched contacts and of the strips in the rows of the watched ones;
+  // a column begins every size numbers
+  std::unique_ptr<double[]> seen_, seen_strips_;
   // the reference
   bool referred_ = false;
   const double* offset_ = nullptr;        // of the problem that is being solved
@@ -102,7 +114,7 @@ class StripSolver {
   std::vector<std::int64_t> place_;       // that of a strip
   std::vector<std::vector<double>> moved_, forced_;  // their effect on values and slacks
   std::vector<std::vector<double>> across_;  // row of the matrix of an active contact
-  std::vector<double> system_, x_, work_;
+  std::vector<double> system_, x_, work_, rows_;
   std::vector<std::size_t> order_;
   std::vector<const double*> columns_;
   std::vector<double> parts_;

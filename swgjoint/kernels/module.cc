@@ -13,6 +13,7 @@
 #include "contact_step.h"
 #include "flank_arrays.h"
 #include "motions.h"
+#include "nearest_tree.h"
 #include "outline.h"
 #include "ring_factor.h"
 #include "tangents.h"
@@ -25,6 +26,14 @@ void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
           "points: (n, 2), result: (n, 4)");
   const nb::gil_scoped_release release;
   swgjoint::outline_distance(points.data(), n, {true, major, minor}, result.data());
+}
+
+void nearest_tree(In<2> distance, IndexOut order, IndexOut before) {
+  const std::size_t n = distance.shape(0);
+  require(n > 0 && distance.shape(1) == n, "distance: (n, n)");
+  require(order.shape(0) == n && before.shape(0) == n, "order, before: (n,)");
+  const nb::gil_scoped_release release;
+  swgjoint::nearest_tree(distance.data(), n, order.data(), before.data());
 }
 
 void grow_oscillation(In<2> sin, In<2> cos, In<1> weight, In<1> omega, double offset,
@@ -333,6 +342,8 @@ NB_MODULE(compiled, m) {
   m.def("follow_path", &follow_path, nb::arg("matrix").noconvert(),
         nb::arg("slack").noconvert(), nb::arg("by_torque").noconvert(),
         nb::arg("by_value").noconvert(), nb::arg("reach"), nb::arg("most"));
+  m.def("nearest_tree", &nearest_tree, nb::arg("distance").noconvert(),
+        nb::arg("order").noconvert(), nb::arg("before").noconvert());
   m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
         nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
   m.def("grow_oscillation", &grow_oscillation, nb::arg("sin").noconvert(),

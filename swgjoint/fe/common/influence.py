@@ -158,7 +158,9 @@ class Influence:
             start: Active sets of a nearby solution (n_sets, m); None for empty sets.
         """
         load = torque - self.torque
-        offset = self.slack + gap_change @ self.by_gap.T + load * self.by_torque
+        # in place: arrays of many problems are large
+        offset = gap_change @ self.by_gap.T
+        offset += self.slack + load * self.by_torque
         solution = self._problems.solve(offset, start)
         # the approach of the strips beyond their linear law acts like a gap change
         dg, v = gap_change, solution.value
@@ -177,7 +179,8 @@ class Influence:
             self.angle + dg @ self.angle_by_gap + 0.5 * load * self.angle_by_torque
         )
         sign = np.where(self.closed, 0.5, -0.5)
-        potential = unchanged + (v * offset) @ sign
+        offset *= v
+        potential = unchanged + offset @ sign
         if self.strips is not None:
             potential += self.strips.excess_energy(solution.force)
         slope = self.angle_by_torque + solution.slope

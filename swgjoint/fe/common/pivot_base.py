@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 DIRECTIONS = 16
@@ -134,6 +135,9 @@ def next_to(offset: Array) -> tuple[Index, Index]:
     distance = size[:, None] + size - 2.0 * from_mean @ from_mean.T
     order = np.zeros(len(offset), dtype=np.int64)
     before = np.full(len(offset), -1)
+    if (native := kernels()) is not None:
+        native.nearest_tree(distance, order, before)
+        return order, before
     nearest, place = distance[0].copy(), np.zeros(len(offset), dtype=np.int64)
     nearest[0] = np.inf
     for k in range(1, len(offset)):

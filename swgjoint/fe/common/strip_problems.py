@@ -348,11 +348,15 @@ class StripProblems:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
                 list(pool.map(solve_parts, groups))
         solved &= np.isfinite(result).all(axis=1) & np.isfinite(slope)
-        value = np.where(active, result, 0.0) / scale
-        slack = np.where(active, 0.0, result) * scale
-        forces = np.where(self.closed, slack, value)[:, : self._sums.shape[0]]
+        # forces of the strips: unknowns of open contacts, slacks of closed ones
+        n = self._sums.shape[0]
+        unit = np.where(self.closed, scale, 1.0 / scale)[:n]
+        carries = active[:, :n] != self.closed[:n]
+        forces = np.where(carries, result[:, :n] * unit, 0.0)
+        result[~active] = 0.0
+        result /= scale
         return StripSolution(
-            value=value,
+            value=result,
             active=active,
             approach=approach,
             force=forces @ self._sums,
