@@ -261,11 +261,10 @@ def fatigue(rows: list[Row]) -> list[list[str]]:
         "S, four forces, mid-face": "finite elements, four forces, mid-face",
         "S, meshing, ellipse, mid-face": "meshing on a straight ellipse, mid-face",
         "S, meshing, ellipse, worst section": "the same, worst section",
-        "S, meshing, ellipse, without factors": "the same, mid-face, peak stress in the"
-        " fillet without concentration factor",
-        "S, meshing, crowned, mid-face": "meshing on a crowned and sloped ellipse,"
-        " mid-face",
-        "S, meshing, crowned, worst section": "the same, worst section",
+        "S, meshing, crowned, worst section": "meshing on a crowned and sloped ellipse,"
+        " worst section (at mid-face)",
+        "S, meshing, ellipse, without factors": "straight ellipse, mid-face, peak"
+        " stress in the fillet without concentration factor",
     }
     torques = (20.0, 60.0, 100.0, 140.0)
     head = "safety factor at a torque of [N·m]"

@@ -54,6 +54,12 @@ TABLES: dict[str, Table] = {
         cells=guide_cells.of_rows(guide_cells.tooth_profiles),
         frozen=("study-thesis-profiles",),
     ),
+    "study-articles-fatigue": Table(
+        page="articles",
+        title="Fatigue safety factor",
+        cells=guide_cells.of_rows(guide_cells.fatigue),
+        frozen=("study-articles-fatigue",),
+    ),
     "study-experiments": Table(
         page="catalogue",
         title="One change at a time",
