@@ -16,8 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import guide_cells
+import map_accuracy
 from golden import load
 
+COMPARED = tuple(
+    name
+    for name in (*map_accuracy.DESIGNS, *map_accuracy.OTHERS)
+    if name not in ("dca-80-to-1", "reference-2d-asymmetric", "own-140")
+)
 PAGES = Path(__file__).parents[2] / "notebooks" / "guide" / "validation"
 
 
@@ -77,6 +83,12 @@ TABLES: dict[str, Table] = {
         title="Radial motion of the bore at the major axis",
         cells=guide_cells.coning,
         frozen=("meshing-straight", "meshing-crowned"),
+    ),
+    "map-accuracy": Table(
+        page="gear",
+        title="Differences of 2D maps from unseen solves in % of the peak to peak",
+        cells=guide_cells.map_accuracy,
+        frozen=tuple(f"map-accuracy-{name}" for name in COMPARED),
     ),
     "study-response": Table(
         page="joint",
