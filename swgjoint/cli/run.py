@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Collection
 from typing import Any
 
 from swgjoint.cli.shared.arm_arguments import (
@@ -13,10 +12,18 @@ from swgjoint.cli.shared.arm_arguments import (
     scene_of,
 )
 from swgjoint.cli.shared.life_text import bearing_lines, gauge_lines, life_lines
+from swgjoint.cli.shared.model_text import (
+    assumed_lines,
+    left_out_lines,
+    rotor_lines,
+    sub_step_line,
+    tool_line,
+)
 from swgjoint.cli.shared.ripple_text import ripple_line
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
+from swgjoint.view.words import NOISE_NOTE, above_noise
 
 JOINT_HEADER = (
     "joint",
@@ -204,67 +211,6 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     ]
 
 
-def rotor_lines(contains: dict[str, Any], assumed: Collection[str]) -> list[str]:
-    """Format the assumed rotor inertias, grouped by joints that share them."""
-    names_by_inertia: dict[float, list[str]] = {}
-    for name, joint in contains["joints"].items():
-        if name not in assumed:
-            continue
-        names_by_inertia.setdefault(joint["rotor_inertia_kgm2"], []).append(name)
-    if not names_by_inertia:
-        return []
-    every = len(names_by_inertia) == 1 and len(assumed) == len(contains["joints"])
-    values = "; ".join(
-        f"{inertia:g} kg·m²" + ("" if every else f" ({', '.join(names)})")
-        for inertia, names in names_by_inertia.items()
-    )
-    return [
-        f"rotor inertia: {values}; assumed for the drive of the joint; another:"
-        " --set joints.JOINT.rotor_inertia_kgm2=VALUE"
-    ]
-
-
-def assumed_lines(contains: dict[str, Any]) -> list[str]:
-    """Format kinematic errors with assumed parts, grouped by joints that share them."""
-    names_by_error: dict[str, list[str]] = {}
-    for name, joint in contains["joints"].items():
-        error, _, _ = str(joint["kinematic_error"]).partition(", joint ")
-        if "assumed:" in error:
-            names_by_error.setdefault(error, []).append(name)
-    return [
-        f"kinematic error {error}"
-        + ("" if len(names) == len(contains["joints"]) else f" ({', '.join(names)})")
-        for error, names in names_by_error.items()
-    ]
-
-
-def left_out_lines(contains: dict[str, Any]) -> list[str]:
-    """Format what the model omits and why, grouped by joints with the same omission."""
-    joints_by_part: dict[tuple[str, str], list[str]] = {}
-    for item in contains["left_out"]:
-        key = (item["part"], item["reason"])
-        joints_by_part.setdefault(key, []).append(item["joint"])
-    count = len(contains["joints"])
-    return [
-        f"not simulated: {part}: {reason}"
-        + ("" if len(joints) == count else f" ({', '.join(joints)})")
-        for (part, reason), joints in joints_by_part.items()
-    ]
-
-
-def sub_step_line(contains: dict[str, Any]) -> str:
-    """State the number of sub-steps per step and its reason; empty if it is 1."""
-    if contains["sub_steps"] == 1:
-        return ""
-    why = ", ".join(
-        f"{name}: {reason}" for name, reason in contains["sub_stepped_for"].items()
-    )
-    return (
-        f"every step is divided into {contains['sub_steps']} sub-steps, because the"
-        f" full step is outside the stability region of the integrator ({why})"
-    )
-
-
 def joint_table(joints: dict[str, Any]) -> str:
     """Format one line per joint: torsion, transmission error, ripple, orders."""
     return table([JOINT_UNITS, *map(joint_row, joints.items())], header=JOINT_HEADER)
@@ -279,10 +225,10 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     return (
         name,
         joint["level"],
-        format_fixed(torsion["mean"]),
-        format_fixed(torsion["pp"]),
-        format_fixed(error["mean"]),
-        _signed(error_mark(joint, error["pp"]), format_fixed(error["pp"])),
+        _fixed(torsion["mean"]),
+        _fixed(torsion["pp"]),
+        _fixed(error["mean"]),
+        _signed(error_mark(joint, error["pp"]), _fixed(error["pp"])),
         ripple_cell(joint, "ripple_pp_percent"),
         ripple_cell(joint, "ripple_rms_percent"),
         _signed(
@@ -316,6 +262,12 @@ def ripple_cell(joint: dict[str, Any], key: str) -> str:
     return _signed(joint_mark(joint), f"{bound}{format_fixed(joint[key])}")
 
 
+def _fixed(value: float) -> str:
+    """Text of a torsion or an error [arcmin]; a dash below the noise."""
+    shown = above_noise(value)
+    return "-" if shown is None else format_fixed(shown)
+
+
 def _signed(sign: str, text: str) -> str:
     """Text with a mark in front, unless there is no mark or no figure."""
     return text if not sign or text == "-" else f"{sign} {text}"
@@ -347,6 +299,8 @@ def notes(joints: dict[str, Any]) -> list[str]:
     if marks - {""}:
         lines.insert(0, mark_legend(marks))
     lines += [f"-: no value for the torque ripple: {why}" for why in sorted(whys)]
+    if any("-" in joint_row(item)[2:6] for item in joints.items()):
+        lines.append(NOISE_NOTE)
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.insert(
             0,
@@ -354,35 +308,6 @@ def notes(joints: dict[str, Any]) -> list[str]:
             " joint",
         )
     return lines
-
-
-def tool_line(tool: dict[str, Any], *, random: bool) -> str:
-    """Format the tool errors that are defined for the motion in one line.
-
-    Args:
-        tool: Figures of the tool [mm].
-        random: Whether the scene contains random effects that differ from cycle to
-            cycle; without them the repeatability is meaningless and is not shown.
-    """
-    parts = []
-    if tool["path_rms_mm"] is not None:
-        parts.append(
-            f"deviation from the commanded path {tool['path_rms_mm']:.4f} mm rms,"
-            f" {tool['path_max_mm']:.4f} mm maximum"
-        )
-    if tool["rp_mm"] is not None:
-        repeats = (
-            f"{tool['rp_mm']:.4f} mm"
-            if random
-            else "- (the scene has no random effects)"
-        )
-        parts.append(f"AP {tool['ap_mm']:.4f} mm, RP {repeats}")
-    elif tool["ap_mm"] is not None:
-        parts.append(f"error at the end {tool['ap_mm']:.4f} mm")
-    for key, name in (("at_mm", "AT"), ("rt_mm", "RT")):
-        if tool.get(key) is not None:
-            parts.append(f"{name} {tool[key]:.4f} mm")
-    return f"tool: {', '.join(parts)}" if parts else ""
 
 
 def _orders(unresolved: list[dict[str, Any]]) -> str:

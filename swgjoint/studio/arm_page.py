@@ -14,7 +14,7 @@ from swgjoint.models_path import bundled_names
 from swgjoint.studio.parts import Downloads, progress_bar, show_frame, show_progress
 from swgjoint.studio.session import THIS_DESIGN, Session
 from swgjoint.view.report.tables import ripple_cell
-from swgjoint.view.words import format_figure
+from swgjoint.view.words import above_noise, format_figure
 
 _COLUMNS = {
     "joint": "joint",
@@ -176,11 +176,16 @@ class ArmPage:
                     key: ripple_cell([one], key).text
                     for key in ("ripple_rms_percent", "ripple_pp_percent")
                 },
-                "transmission": format_figure(one["transmission_error_arcmin"]["pp"]),
-                "torsion": format_figure(one["torsion_arcmin"]["mean"]),
+                "transmission": _shown(one["transmission_error_arcmin"]["pp"]),
+                "torsion": _shown(one["torsion_arcmin"]["mean"]),
                 "peak": format_figure(one["ratings"]["peak_Nm"]),
                 "limit": format_figure(one["ratings"]["repeated_peak_Nm"]),
                 "within": "yes" if one["ratings"]["within"] else "no",
             }
             for name, one in metrics["joints"].items()
         ]
+
+
+def _shown(value: float) -> str:
+    """Text of a torsion or an error [arcmin]; a dash below the noise."""
+    return format_figure(above_noise(value))

@@ -66,8 +66,31 @@ def format_hours(value: float | None) -> str:
     return f"{float(f'{value:.3g}'):,.12g}" if value <= LASTING else "> 1e6"
 
 
+NOISE = 1e-6
+"""Smallest displayed torsion or error of a run [arcmin] or [mm]. An exact controller
+with rigid drives leaves rounding errors of 1e-11 mm and 1e-10 arcmin."""
+NOISE_NOTE = "-: below 1e-6 arcmin or mm, where rounding errors decide"
+"""Explanation of a dash in place of a torsion or an error."""
+
+
+def above_noise(value: float | None) -> float | None:
+    """A torsion or an error of a run; None if it is below :data:`NOISE`.
+
+    Args:
+        value: Value [arcmin] or [mm]; None if it is not known.
+
+    >>> above_noise(0.07244), above_noise(1.27e-11)
+    (0.07244, None)
+    """
+    return None if value is None or abs(value) < NOISE else value
+
+
+def _has_noise(key: str) -> bool:
+    return key.endswith(("_arcmin", "_mm")) and not key.endswith("_N_mm")
+
+
 def format_named(key: str, value: object) -> str:
-    """Format the value of a figure for display; keys of lives end in ``_h``.
+    """Format the value of a figure of a run for display; keys of lives end in ``_h``.
 
     Args:
         key: Key of the figure.
@@ -75,9 +98,13 @@ def format_named(key: str, value: object) -> str:
 
     >>> format_named("L10_h", 2e6), format_named("torsion_arcmin", 2e6)
     ('> 1e6', '2,000,000')
+    >>> format_named("tool_path_rms_mm", 1.27e-11)
+    '-'
     """
     if key.endswith("_h") and isinstance(value, float):
         return format_hours(value)
+    if _has_noise(key) and isinstance(value, float):
+        value = above_noise(value)
     return format_figure(value)
 
 

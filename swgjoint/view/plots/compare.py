@@ -11,7 +11,7 @@ from swgjoint.pictures import png
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.tables import Cell, Table
-from swgjoint.view.words import format_named
+from swgjoint.view.words import NOISE_NOTE, format_named
 
 if TYPE_CHECKING:
     from swgjoint.explore.compare.compare import Compared
@@ -143,7 +143,12 @@ def left_out_notes(rows: Sequence[Compared]) -> list[str]:
         figures = row.to_json()
         error = row.transmission_error_arcmin
         marks |= {joint_mark(figures), error_mark(figures, error)}
-    return [*notes, mark_legend(marks)] if marks - {""} else notes
+    if marks - {""}:
+        notes.append(mark_legend(marks))
+    figures_of_run = (_ERROR, "torsion_arcmin", "tool_path_rms_mm")
+    if any(_is_noise(row, key) for row in rows for key in figures_of_run):
+        notes.append(NOISE_NOTE)
+    return notes
 
 
 def comparison_picture(
@@ -158,9 +163,7 @@ def comparison_picture(
     """
     from matplotlib.figure import Figure
 
-    panels = [
-        key for key in PANELS if any((row.figure(key) or 0.0) > 0.0 for row in rows)
-    ]
+    panels = [key for key in PANELS if any(_height(row, key) > 0.0 for row in rows)]
     across = min(4, len(panels))
     down = -(-len(panels) // across)
     figure = Figure(figsize=(12.5, 0.7 + down * (1.0 + 0.34 * len(rows))))
@@ -179,6 +182,17 @@ def comparison_picture(
     return png(figure, dpi=110)
 
 
+def _is_noise(row: Compared, key: str) -> bool:
+    value = row.figure(key)
+    return value is not None and format_named(key, value) == "-"
+
+
+def _height(row: Compared, key: str) -> float:
+    """Value of a bar; zero for a figure that is shown as a dash."""
+    value = row.figure(key)
+    return 0.0 if value is None or _is_noise(row, key) else float(value)
+
+
 def _bars(
     ax: Any,
     rows: Sequence[Compared],
@@ -187,8 +201,7 @@ def _bars(
     limit: float | None,
 ) -> None:
     """Draw one figure of all rows as bars, with its value next to each bar."""
-    values = [row.figure(key) for row in rows]
-    heights = [value or 0.0 for value in values]
+    heights = [_height(row, key) for row in rows]
     seen = [value for value in heights if value > 0.0]
     wide = max(seen) > _WIDE * min(seen)
     ax.barh(range(len(rows)), heights, color=colors, height=0.7)

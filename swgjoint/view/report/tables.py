@@ -28,7 +28,7 @@ from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.view.plots.spec import spec_picture
 from swgjoint.view.ratings_text import sheet_words
 from swgjoint.view.validity import left_out_share, map_error, omissions_of, warnings_of
-from swgjoint.view.words import format_figure, short
+from swgjoint.view.words import above_noise, format_figure, short
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -95,9 +95,9 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
                 Cell(metrics["verdict"], "good" if valid else "bad"),
                 ripple_cell(joints, "ripple_rms_percent"),
                 ripple_cell(joints, "ripple_pp_percent"),
-                *_cells(max(torsion)),
+                *_cells(above_noise(max(torsion))),
                 error_cell(joints, max(error)),
-                *_cells(metrics["tool"]["path_rms_mm"], max(peaks)),
+                *_cells(above_noise(metrics["tool"]["path_rms_mm"]), max(peaks)),
                 Cell(format_figure(within), "good" if within else "bad"),
                 *_cells(run.time[-1] / run.wall),
             ]
@@ -157,7 +157,8 @@ def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
         value: Peak-to-peak transmission error [arcmin].
     """
     sign = worst([error_mark(joint, value) for joint in joints])
-    return Cell(f"{sign} {format_figure(value)}".strip(), "bad" if sign else "")
+    shown = format_figure(above_noise(value))
+    return Cell(f"{sign} {shown}".strip(), "bad" if sign else "")
 
 
 def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -242,12 +243,12 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
 
 def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
     """Figures of one joint in every run."""
-    rows = []
+    rows, loads = [], ("peak_Nm", "cubed_mean_Nm", "input_speed_rpm")
     for label, run in runs.items():
         figures = run.metrics()["joints"][joint]
         ratings = figures["ratings"]
-        torsion = figures["torsion_arcmin"]
-        error = figures["transmission_error_arcmin"]
+        torsion, error = figures["torsion_arcmin"], figures["transmission_error_arcmin"]
+        shown = map(above_noise, (torsion["mean"], torsion["pp"], error["mean"]))
         orders = ", ".join(
             f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
             f" ({line['amplitude_percent']:.3f} %)"
@@ -256,16 +257,12 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
         rows.append(
             [
                 Cell(label, "text"),
-                *_cells(torsion["mean"], torsion["pp"], error["mean"]),
+                *_cells(*shown),
                 error_cell([figures], error["pp"]),
                 ripple_cell([figures], "ripple_rms_percent"),
                 ripple_cell([figures], "ripple_pp_percent"),
                 Cell(f"{joint_mark(figures)} {orders}".strip() if orders else "-"),
-                *_cells(
-                    ratings["peak_Nm"],
-                    ratings["cubed_mean_Nm"],
-                    ratings["input_speed_rpm"],
-                ),
+                *_cells(*map(ratings.get, loads)),
                 Cell(
                     format_figure(ratings["within"]),
                     "good" if ratings["within"] else "bad",
