@@ -19,8 +19,11 @@ from swgjoint.errors import InputError
 CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters that can disturb a terminal, which tab and newline do not."""
 
-# units by the last part of a key, as written in messages
+# units by the last part of a key, as written in messages; a unit precedes its own end
 _UNITS = {
+    "rad_s_Nm": "rad/(s·N·m)",
+    "rad_Nm": "rad/(N·m)",
+    "uV_V_Nm": "µV/(V·N·m)",
     "per_mm": "1/mm",
     "kg_m3": "kg/m³",
     "kgm2": "kg·m²",
@@ -108,8 +111,8 @@ class Fault(ValueError):
 def split_unit(key: str) -> tuple[str, str]:
     """Split a key into its name and the unit that its last part states.
 
-    >>> split_unit("face_width_mm")
-    ('face_width', 'mm')
+    >>> split_unit("face_width_mm"), split_unit("compliance_rad_Nm")
+    (('face_width', 'mm'), ('compliance', 'rad/(N·m)'))
     """
     for suffix, unit in _UNITS.items():
         if key == suffix or key.endswith("_" + suffix):

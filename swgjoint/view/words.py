@@ -7,11 +7,16 @@ _UNITS = {
     "Nm_rad": "N·m/rad",
     "arcmin": "arcmin",
     "percent": "%",
-    "mm": "N/mm",
+    "N_mm": "N/mm",
+    "mm": "mm",
+    "rad_Nm": "rad/(N·m)",
+    "rad_s_Nm": "rad/(s·N·m)",
+    "uV_V_Nm": "µV/(V·N·m)",
+    "per_mm": "1/mm",
     "factor": "",
     "Hz": "Hz",
 }
-"""Units by the last part of a key; ``mm`` is the end of ``N_mm``."""
+"""Units by the last part of a key."""
 
 
 _NAMES = {
@@ -34,12 +39,14 @@ def words(key: str) -> tuple[str, str]:
     ('lost motion', 'arcmin')
     >>> words("ripple_pp_percent")
     ('output torque ripple, pp', '% of rated torque')
+    >>> words("radial_stiffness_N_mm"), words("compliance_rad_Nm")
+    (('radial stiffness', 'N/mm'), ('compliance', 'rad/(N·m)'))
     """
     if key in _NAMES:
         return _NAMES[key]
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if key.endswith(f"_{suffix}"):
-            text = key.removesuffix(f"_{suffix}").removesuffix("_N")
+            text = key.removesuffix(f"_{suffix}")
             text = key if suffix == "factor" else text
             return text.replace("_", " "), _UNITS[suffix]
     return key.replace("_", " "), ""
