@@ -42,7 +42,7 @@ COMMANDS = {
     "export": "write a drive or an arm with drives for other simulators",
     "accept": "test a drive on a bench, simulated or measured, against limits",
     "lot": "estimate accuracy, ripple and yield of a production lot",
-    "tune": "tune controller gains and compare them with a textbook rule",
+    "tune": "tune a controller in an environment, and compare the result",
     "sweep": "evaluate many designs, locally or on a cluster; resumable",
     "optimise": "search for Pareto-optimal designs",
     "study": "compare swgjoint with published values",

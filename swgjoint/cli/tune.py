@@ -1,4 +1,4 @@
-"""``swgjoint tune``: tune controller gains and compare them with a textbook rule."""
+"""``swgjoint tune``: tune a controller in an environment, and compare the result."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from swgjoint.files import output_folder
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: environment, controller, optimiser, budget, output folder."""
     parser.add_argument(
-        "environment", metavar="ENV", help="environment, such as JointTracking-v0"
+        "environment",
+        metavar="ENV",
+        help="environment: JointTracking-v0, RippleSuppression-v0 or ArmTracking-v0",
     )
     parser.add_argument(
         "--controller",
         metavar="NAME",
         default="pd-flexible",
-        help="controller to tune: pd, pd-feedforward or pd-flexible (default)",
+        help="controller to tune: pd, pd-feedforward, pd-flexible (default), or a class"
+        " or function of your own as FILE.py:NAME",
     )
     parser.add_argument(
         "--optimiser",
@@ -61,12 +64,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Tune the gains.
+    """Tune a controller.
 
     Returns:
-        ``best`` and ``baseline`` (``parameters``, ``gains``, ``held_out_cost_arcmin``
-        and more), ``evaluations``, ``improvement_percent``, ``candidates`` (including
-        PD with only its gains tuned, and the untuned controller), ``summary``,
+        ``best`` and ``baseline`` (``parameters``, ``gains``, ``held_out_cost_arcmin``,
+        of an arm ``held_out_cost_mm``, and more), ``evaluations``,
+        ``improvement_percent``, ``candidates`` (including the untuned controller and,
+        where there is no motor loop, PD with only its gains tuned), ``summary``,
         ``seeds``, ``bounds``, ``files``, ``wall_s`` and the settings.
     """
     folder = output_folder(args.out) if args.out else None
@@ -91,21 +95,21 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def report(result: dict[str, Any]) -> str:
     """Format the candidates, the best gains and the summary."""
+    unit = "mm" if "error_scale_mm" in result else "arcmin"
+    costs = (
+        f"held_out_cost_{unit}",
+        f"held_out_spread_{unit}",
+        f"training_cost_{unit}",
+    )
     rows = [
-        (
-            one["name"],
-            one["held_out_cost_arcmin"],
-            one["held_out_spread_arcmin"],
-            one["training_cost_arcmin"],
-            one["improvement_percent"],
-        )
+        (one["name"], *(one[key] for key in costs), one["improvement_percent"])
         for one in result["candidates"]
     ]
     header = (
         "",
-        "held-out cost [arcmin]",
-        "spread [arcmin]",
-        "training cost [arcmin]",
+        f"held-out cost [{unit}]",
+        f"spread [{unit}]",
+        f"training cost [{unit}]",
         "improvement [%]",
     )
     best = result["best"]

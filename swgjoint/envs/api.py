@@ -160,16 +160,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
     @property
     def task(self) -> Task:
         """Commanded motion of the episode, known after its reset."""
-        task = self.core.task
-        return Task(
-            period=task.period,
-            position=task.position[:, 0],
-            velocity=task.velocity[:, 0],
-            acceleration=task.acceleration[:, 0],
-            link_torque=task.link_torque[:, 0],
-            joints=task.joints,
-            reading_age=task.reading_age,
-        )
+        return self.core.task.select(0)
 
     def read_measurements(self, observation: Array) -> Measured:
         """Sensor readings in an observation, for controllers. Shapes (n_joints,)."""

@@ -11,8 +11,9 @@ import numpy as np
 
 from swgjoint.drives.sections import GaugesSection
 from swgjoint.envs.arguments import check_flag, check_number, format_value
-from swgjoint.envs.core import Core, EpisodeLimits
+from swgjoint.envs.core import Core
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
+from swgjoint.envs.limits import EpisodeLimits
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
@@ -239,6 +240,15 @@ class BenchCore(Core):
             normalise=bool(s.normalise),
             gauges=_gauges(s, drive),
         )
+
+    @property
+    def worst_error(self) -> float:
+        """Link error that stands for an exceeded limit [rad]."""
+        return float(self.limits.angle[0])
+
+    def shown_error(self) -> Array:
+        """Link angle minus reference [rad]. Shape (n,)."""
+        return self.link_error[:, 0]
 
     def vary_load(self, index: int, shares: Array) -> None:
         """Change the load inertia of one simulation.

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.entries import Entry, bounds
+from swgjoint.envs.limits import EpisodeLimits
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plans import Plans, PlanSize
 from swgjoint.envs.plant import Plant
@@ -22,37 +23,25 @@ from swgjoint.envs.sensors import Readout, Sensors
 from swgjoint.envs.specimen import SpecimenTolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import SIZE, Variation
-from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
+from swgjoint.sim.controller import (
+    KnownJoints,
+    KnownLoop,
+    Measured,
+    ReadingAge,
+    Task,
+)
 from swgjoint.sim.gauges import JointGauges
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 Rows = NDArray[np.intp]
 
-LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
-"""Names of the limits by their number in ``info["broken_limit"]``."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EpisodeLimits:
-    """Limits of the joints. Arrays have shape (n_joints,)."""
-
-    angle: Array
-    """Largest deviation of the link angle from ``centre`` [rad]."""
-    centre: Array
-    """Centre of the range of the link angle [rad]."""
-    motor_speed: Array
-    """Largest motor speed [rad/s]."""
-    momentary_peak: Array
-    """Momentary peak torque of the drives [N·m]."""
-    ratcheting: Array
-    """Ratcheting torque of the drives [N·m], inf if unknown."""
-    motor_torque: Array
-    """Largest motor torque [N·m]; motors saturate there, and the episode continues."""
-
 
 class Core(ABC):
     """Episodes on a :class:`~swgjoint.envs.plant.Plant`."""
+
+    first_step = 0
+    """Last instant without a reward."""
 
     def __init__(
         self,
@@ -168,6 +157,13 @@ class Core(ABC):
         """Reward of the last step [-]. Shape (n,)."""
 
     @abstractmethod
+    def deviation(self) -> tuple[Array, Array]:
+        """Squares of the error over its scale and of the effort [-]. Shapes (n,).
+
+        The reward is 1/(1 + error) - effort_weight effort.
+        """
+
+    @abstractmethod
     def vary_load(self, index: int, shares: Array) -> None:
         """Change the load inertia of one simulation.
 
@@ -247,6 +243,13 @@ class Core(ABC):
         self.judge()
         self.remember()
 
+    def feedforward(self, plan: Array) -> Array | None:
+        """Feed-forward of the motor loops along plans [N·m]; None without such loops.
+
+        Shape (...), for plans of shape (n_rows, ...).
+        """
+        return None
+
     def next_plan(self) -> Array:
         """Plan at the end of the next step. Shape (n, n_rows, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
@@ -308,7 +311,10 @@ class Core(ABC):
         return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
 
     def broken(self) -> NDArray[np.int64]:
-        """Number of the exceeded limit in :data:`LIMITS`, or 0. Shape (n,)."""
+        """Number of the exceeded limit, or 0. Shape (n,).
+
+        See :data:`~swgjoint.envs.limits.LIMITS`.
+        """
         limits, torque = self.limits, np.abs(self.output_torque)
         numbers = np.zeros(len(torque), dtype=np.int64)
         # NaN exceeds every limit; the last exceeded limit is reported
@@ -349,7 +355,8 @@ class Core(ABC):
         if self._task is None:
             # (n_rows, steps + 1, n, n_joints); copied, as further episodes overwrite it
             plan = self.plans.whole_plans().transpose(2, 1, 0, 3).copy()
-            age = self.sensors.delay_periods * self.period
+            age, loop = self.sensors.delay_periods * self.period, self.loop
+            ahead = self.feedforward(plan)
             self._task = Task(
                 period=self.period,
                 position=plan[0],
@@ -358,6 +365,11 @@ class Core(ABC):
                 link_torque=plan[4],
                 joints=self.joints,
                 reading_age=ReadingAge(motor=age, link=age, torque=age),
+                loop=None
+                if ahead is None
+                else KnownLoop(
+                    stiffness=loop.stiffness, damping=loop.damping, feedforward=ahead
+                ),
             )
         return self._task
 

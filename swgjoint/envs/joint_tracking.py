@@ -185,16 +185,28 @@ class TrackingCore(BenchCore):
             *self.readings(),
         ]
 
+    @property
+    def authority(self) -> Array:
+        """Motor torques at an action of 1 [N·m]. Shape (1,)."""
+        return self.limits.motor_torque
+
+    def deviation(self) -> tuple[Array, Array]:
+        """Squares of link error over its scale and of motor torque over its limit."""
+        effort = self.motor_torque[:, 0] / self.limits.motor_torque[0]
+        return _deviation(self.settings, self.link_error[:, 0], effort)
+
     def reward(self) -> Array:
         """Reward as :class:`JointTrackingEnv` defines it."""
-        effort = self.motor_torque[:, 0] / self.limits.motor_torque[0]
-        return np.asarray(_reward(self.settings, self.link_error[:, 0], effort))
+        error, effort = self.deviation()
+        return np.asarray(1.0 / (1.0 + error) - self.settings.effort_weight * effort)
 
 
-def _reward(s: TrackingSettings, link_error: Values, effort: Values) -> Values:
-    """Reward for link errors [rad] and motor torques relative to their limit [-]."""
+def _deviation(
+    s: TrackingSettings, link_error: Values, effort: Values
+) -> tuple[Values, Values]:
+    """Squares of link errors [rad] over their scale and of efforts [-]."""
     error = link_error / (s.error_scale_arcmin * arcmin)
-    return 1.0 / (1.0 + error * error) - s.effort_weight * (effort * effort)
+    return error * error, effort * effort
 
 
 class TrackingEpisode(JointEpisode):
@@ -216,8 +228,9 @@ class TrackingEpisode(JointEpisode):
 
     def reward(self) -> float:
         """Reward as :class:`JointTrackingEnv` defines it."""
-        effort = self.motor_torque / self.limit
-        return _reward(self.core.settings, self.link_error, effort)
+        s, effort = self.core.settings, self.motor_torque / self.limit
+        error, effort = _deviation(s, self.link_error, effort)
+        return 1.0 / (1.0 + error) - s.effort_weight * effort
 
 
 class JointTrackingEnv(SingleEnv):
@@ -273,7 +286,7 @@ class JointTrackingEnv(SingleEnv):
     during the first 0.3 s, and the motion begins at 0.1 s. The episode is ``truncated``
     after ``episode_s`` and ``terminated`` when a limit is exceeded.
     ``info["broken_limit"]`` is then the number of the limit in
-    :data:`swgjoint.envs.core.LIMITS`: link angle (1 rad + 2 ``max_angle_rad``), motor
+    :data:`swgjoint.envs.limits.LIMITS`: link angle (1 rad + 2 ``max_angle_rad``), motor
     speed (twice that of the fastest reference), or drive torque (momentary peak torque
     or ratcheting torque).
 

@@ -217,11 +217,15 @@ class RippleCore(BenchCore):
 
     def command(self, action: Array) -> Array:
         """Input of the motor loop [N·m]: reference, feed-forward and added torque."""
-        plan, ratio = self.next_plan(), self.joint.ratio
-        rotor = self.settings.rotor_inertia_kgm2
-        known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
+        plan = self.next_plan()
+        known = self.feedforward(plan.transpose(1, 0, 2))
         loop = self.loop.command(plan[:, 0], plan[:, 1])
         return np.asarray(loop + known + action * self.authority)
+
+    def feedforward(self, plan: Array) -> Array:
+        """Torques of load and inertia, reduced to the motor [N·m]."""
+        ratio, rotor = self.joint.ratio, self.settings.rotor_inertia_kgm2
+        return np.asarray(plan[4] / ratio + ratio * rotor * plan[2])
 
     def columns(self) -> list[Array]:
         """Parts of the observation in the order of its table."""
@@ -279,14 +283,23 @@ class RippleCore(BenchCore):
         """Running means of the link and transmission errors of the first episode."""
         return [float(one) for one in self._mean[:, 0]]
 
+    def deviation(self) -> tuple[Array, Array]:
+        """Sum of the squares of both ripples over their scales, and squared action."""
+        a, b = self._ripples()
+        effort = self.action[:, 0]
+        return a * a + b * b, effort * effort
+
     def reward(self) -> Array:
         """Reward as :class:`RippleSuppressionEnv` defines it."""
-        s = self.settings
-        a = self.ripple / self.ripple_scale
-        b = self.link_ripple / (s.error_scale_arcmin * arcmin)
-        effort = self.action[:, 0]
-        value = 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
+        (a, b), effort = self._ripples(), self.action[:, 0]
+        effort_weight = self.settings.effort_weight
+        value = 1.0 / (1.0 + a * a + b * b) - effort_weight * (effort * effort)
         return np.where(self.instant > self.first_step, value, 0.0)
+
+    def _ripples(self) -> tuple[Array, Array]:
+        """Ripples of torque and link angle over their scales [-]. Shapes (n,)."""
+        scale = self.settings.error_scale_arcmin * arcmin
+        return self.ripple / self.ripple_scale, self.link_ripple / scale
 
     def info(self) -> dict[str, NDArray[Any]]:
         """True values, including the ripples and whether the reward counts."""

@@ -6,7 +6,7 @@ so that one controller drives a single joint, an arm, or a batch of either.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
@@ -91,6 +91,21 @@ class ReadingAge:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class KnownLoop:
+    r"""Motor loop within the engine's step, to which a controller adds its torque.
+
+    .. math:: u = k_p (i q - \theta) + k_d (i \dot q - \dot\theta) + u_\mathrm{ff}
+    """
+
+    stiffness: Array
+    """Position gain k_p [N·m/rad]. Shape (n_joints,)."""
+    damping: Array
+    """Speed gain k_d [N·m·s/rad]. Shape (n_joints,)."""
+    feedforward: Array
+    """Feed-forward torque of the motors [N·m]. Shape (n, ..., n_joints)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
     """A commanded motion of the links at the n control instants."""
 
@@ -109,6 +124,22 @@ class Task:
     """Nominal data of the driven joints."""
     reading_age: ReadingAge = ReadingAge()
     """Age of the sensor readings."""
+    loop: KnownLoop | None = None
+    """Motor loop to which torques are added; None if they are the whole torques."""
+
+    def select(self, episodes: int | slice) -> Task:
+        """Motion of one or some of several episodes, the second axis of all arrays."""
+        loop = self.loop
+        if loop is not None:
+            loop = replace(loop, feedforward=loop.feedforward[:, episodes])
+        return replace(
+            self,
+            position=self.position[:, episodes],
+            velocity=self.velocity[:, episodes],
+            acceleration=self.acceleration[:, episodes],
+            link_torque=self.link_torque[:, episodes],
+            loop=loop,
+        )
 
     def as_read(
         self, values: NDArray[Number], sensor: Literal["motor", "link", "torque"]
@@ -167,6 +198,8 @@ class Controller(Protocol):
 
     def torque(self, k: int, measured: Measured) -> Array:
         """Torque of every motor until the next instant [N·m]. Shape (..., n_joints).
+
+        With a :attr:`Task.loop` it is added to the torque of the loop.
 
         Args:
             k: Index of the control instant.

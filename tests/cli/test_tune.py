@@ -45,7 +45,14 @@ def test_json_of_the_contract(tmp_path, capsys):
             ["JointTracking-v1"],
             ("environment", "'JointTracking-v1'", "JointTracking-v0"),
         ),
-        (["ArmTracking-v0"], ("environment", "'ArmTracking-v0'", "JointTracking-v0")),
+        (
+            ["ArmTracking-v0", "--set", "action=setpoint"],
+            ("action", "'setpoint'", "torque"),
+        ),
+        (
+            ["JointTracking-v0", "--controller", "none.py:Mine"],
+            ("none.py", "FILE.py:NAME"),
+        ),
         (
             ["JointTracking-v0", "--controller", "pid"],
             ("controller", "'pid'", "pd", "pd-feedforward", "pd-flexible"),

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from messages import names, naming
 
-from swgjoint.envs.core import LIMITS
 from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
+from swgjoint.envs.limits import LIMITS
 from swgjoint.envs.references import KINDS
 from swgjoint.envs.sensors import Sensors
 from swgjoint.envs.specimen import SpecimenTolerances, load_drive_once

@@ -12,15 +12,11 @@ from messages import naming
 import swgjoint.envs  # noqa: F401
 from swgjoint.control.motor_side import MotorPID, ideal_plan
 from swgjoint.errors import InputError
-from swgjoint.explore.tune import cost as tune_cost
 from swgjoint.explore.tune.cost import Trials, environment_named
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
     anti_resonance,
-    gains_of,
-    parameters_of,
     parts_of,
-    textbook,
     weight_plan,
 )
 from swgjoint.explore.tune.result import TuneSettings
@@ -65,7 +61,8 @@ def test_textbook_gains_by_hand(trials):
     omega = np.sqrt(stiffness / link) / 3.0
     inertia = rotor + link / 100.0**2
     assert anti_resonance(joints) == pytest.approx(3.0 * omega / (2.0 * np.pi))
-    gains = gains_of(textbook(joints), joints)
+    rule = {p.key: np.array([p.neutral]) for p in PD.parameters(joints, None)}
+    gains = PD.gains(rule, joints)
     assert gains["stiffness_Nm_rad"] == pytest.approx(inertia * omega**2)
     assert gains["damping_Nms_rad"] == pytest.approx(1.4 * omega * inertia)
     # poles of the rigid joint under these gains
@@ -113,14 +110,10 @@ def test_broken_limits_cost_a_finite_worst(trials):
 
 def test_what_is_not_a_number_costs_the_worst(trials, monkeypatch):
     """Readings that are lost do not spread to the cost."""
-    step = trials.env.step
-
-    def lost(action):
-        *got, info = step(action)
-        info["link_error_arcmin"] = np.full_like(info["link_error_arcmin"], np.nan)
-        return *got, info
-
-    monkeypatch.setattr(trials.env, "step", lost)
+    core = trials.env.core
+    error, effort = core.deviation()
+    lost = np.full_like(error, np.nan), effort
+    monkeypatch.setattr(core, "deviation", lambda: lost)
     values = {"frequency_Hz": np.full(3, 14.0), "damping_ratio": np.full(3, 0.7)}
     costs = trials.costs(PD, values)
     np.testing.assert_allclose(costs, trials.worst)
@@ -129,11 +122,12 @@ def test_what_is_not_a_number_costs_the_worst(trials, monkeypatch):
 def test_shares_of_one_are_the_plan_itself(trials):
     """Without tuning, the weighted plan is that of the control package."""
     neutral = {
-        p.key: np.full(3, p.neutral) for p in parameters_of(FLEXIBLE, trials.joints)
+        p.key: np.full((1, 1), p.neutral)
+        for p in FLEXIBLE.parameters(trials.joints, None)
     }
     trials.env.reset(seed=[4, 9] * 3)
     task = trials.env.task
-    plan = trials._plan(FLEXIBLE, task, {k: v[:1, None] for k, v in neutral.items()})
+    plan = weight_plan(parts_of(FLEXIBLE, task), task, neutral)
     wanted = FLEXIBLE.plan(task)
     for name in ("angle", "speed", "torque"):
         # last digits of angles of tens of rad, through sums in another order
@@ -254,7 +248,7 @@ def test_report_states_what_feed_forward_alone_brings(tmp_path):
     training, held_out = found.settings.seeds
     assert not set(training) & set(held_out)
     lines = claims(found)
-    assert "feed-forward alone" in lines[2] and "two gains of PD alone" in lines[1]
+    assert "pd-feedforward by rule" in lines[2] and "gains of PD alone" in lines[1]
     files = write_files(found, tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert "Cost by held-out seed" in page and "data:image/png" in page
@@ -271,12 +265,12 @@ def test_names_that_are_not_there():
             ("environment", "'JointTraking-v0'", "JointTracking-v0"),
         ),
         (
-            {"environment": "RippleSuppression-v0"},
-            ("environment", "'RippleSuppression-v0'", "JointTracking-v0"),
+            {"environment": "Ripple"},
+            ("environment", "'Ripple'", "RippleSuppression-v0", "ArmTracking-v0"),
         ),
         (
             {"controller": "lqr"},
-            ("controller", "'lqr'", "pd", "pd-feedforward", "pd-flexible"),
+            ("controller", "'lqr'", "pd", "pd-feedforward", "pd-flexible", "FILE.py"),
         ),
         ({"arguments": {"gear": 3}}, ("'gear'", "drive", "effort_weight")),
     ):
@@ -294,7 +288,6 @@ def test_names_that_are_not_there():
     ):
         with pytest.raises(InputError, match=naming(*text)):
             settings(**changes)
-    assert set(tune_cost.TUNABLE) <= {"JointTracking-v0"}
 
 
 @pytest.mark.slow

@@ -13,8 +13,9 @@ from swgjoint.envs.arm.paths import ArmPaths, JointPath, ToolPath, tool_slopes
 from swgjoint.envs.arm.payload import DrawnPayloads, start_of
 from swgjoint.envs.arm.scene import check_assembly, drives_of, scene_of
 from swgjoint.envs.arm.settings import ArmSettings
-from swgjoint.envs.core import Core, EpisodeLimits, Rows
+from swgjoint.envs.core import Core, Rows
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
+from swgjoint.envs.limits import EpisodeLimits
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.references import Instants, Motion
@@ -92,7 +93,8 @@ class ArmCore(Core):
         ).T
         ratio, start = np.abs(task.joints.ratio), task.position[0]
         one = np.ones(len(drives))
-        self._authority = s.authority_of_rated * rated / ratio
+        self.authority = s.authority_of_rated * rated / ratio
+        """Largest added motor torques [N·m]. Shape (n_joints,)."""
         self._paths: ArmPaths | None = None
         if s.kinds:
             self._instants = Instants(task.period * np.arange(steps + 1.0))
@@ -279,7 +281,7 @@ class ArmCore(Core):
         s, plan = self.settings, self.next_plan()
         if s.action == "torque":
             own = self.loop.command(plan[:, 0], plan[:, 1])
-            own = own + action * self._authority
+            own = own + action * self.authority
         else:
             shift = s.shift_arcmin * arcmin * action
             own = self.loop.command(plan[:, 0] + shift, plan[:, 1])
@@ -312,14 +314,32 @@ class ArmCore(Core):
         x, y, z = offset
         self.tool_error = np.sqrt(x * x + y * y + z * z)
 
-    def reward(self) -> Array:
-        """Reward as :class:`~swgjoint.envs.arm_tracking.ArmTrackingEnv` defines it."""
-        s, effort = self.settings, np.zeros(len(self.action))
+    def deviation(self) -> tuple[Array, Array]:
+        """Square of the tool error over its scale, and mean square of the actions."""
+        effort = np.zeros(len(self.action))
         for share in self.action.T:
             effort = effort + share * share
-        error = self.tool_error / (1e-3 * s.error_scale_mm)
-        mean = effort / self.action.shape[1]
-        return np.asarray(1.0 / (1.0 + error * error) - s.effort_weight * mean)
+        error = self.tool_error / (1e-3 * self.settings.error_scale_mm)
+        return error * error, effort / self.action.shape[1]
+
+    @property
+    def worst_error(self) -> float:
+        """Tool error that stands for an exceeded limit: all links at theirs [m]."""
+        slopes = tool_slopes(self._assembly.arm, self._assembly.trajectory.position[:1])
+        return float(np.linalg.norm(np.abs(slopes[0]) @ self.limits.angle))
+
+    def shown_error(self) -> Array:
+        """Distance of the tool from its reference [m]. Shape (n,)."""
+        return self.tool_error
+
+    def feedforward(self, plan: Array) -> Array:
+        """Feed-forward of the scene's controller [N·m]."""
+        return np.asarray(plan[FEEDFORWARD])
+
+    def reward(self) -> Array:
+        """Reward as :class:`~swgjoint.envs.arm_tracking.ArmTrackingEnv` defines it."""
+        error, effort = self.deviation()
+        return np.asarray(1.0 / (1.0 + error) - self.settings.effort_weight * effort)
 
     def info(self) -> dict[str, NDArray[Any]]:
         """True values, with the error of the tool [mm] and a drawn payload [kg]."""

@@ -10,29 +10,33 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.control.motor_side import MotorPID, MotorPlan
+from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
-    Tunable,
+    LOOP,
+    AddedPID,
+    PlannedControl,
     build,
     parts_of,
     weight_plan,
 )
+from swgjoint.explore.tune.own import OwnController
 from swgjoint.files import read_regular
-from swgjoint.sim.controller import Measured, ReadingAge, Task
+from swgjoint.sim.controller import Controller, Measured, ReadingAge, Task
 from swgjoint.typing import Array
 
 
 class TunedController:
     """A controller of :data:`~swgjoint.explore.tune.gains.CONTROLLERS` with its values.
 
-    It drives a scene, a single environment or a batch. Its natural frequency and
+    It drives a scene, a single environment or a batch. In environments with motor
+    loops, its torques are those to be added to the loops. Its natural frequency and
     damping ratio are those of the tuning run, so the gains follow the inertias of each
     joint.
     """
 
-    def __init__(self, tunable: Tunable, values: Mapping[str, float]) -> None:
+    def __init__(self, tunable: PlannedControl, values: Mapping[str, float]) -> None:
         """Set the values.
 
         Args:
@@ -40,7 +44,7 @@ class TunedController:
             values: Value of every parameter by key, in the unit of the key.
         """
         self.tunable, self.values = tunable, dict(values)
-        self._loop: MotorPID | None = None
+        self._loop: AddedPID | None = None
 
     def start(self, task: Task) -> None:
         """Plan the motion with the tuned shares."""
@@ -77,19 +81,24 @@ class TunedController:
         return self._loop.torque(k, measured)
 
 
-def load_controller(path: str | Path, candidate: str = "best") -> TunedController:
+def load_controller(
+    path: str | Path, candidate: str = "best", *, own: Any = None
+) -> Controller:
     """Controller with the gains that ``swgjoint tune`` has written.
 
     Args:
         path: ``tune.json`` of a tuning run, or the output of its option ``--json``.
         candidate: ``best``, ``baseline``, or the name of a candidate in the file.
+        own: Class or function with ``parameters`` that was tuned, if it was your own.
+            A file does not tell which code to run.
 
     Returns:
-        The controller, for ``swgjoint.run_scene`` or a loop over an environment.
+        The controller, for ``swgjoint.run_scene`` or a loop over an environment. In
+        environments with motor loops, its torques are added to those of the loops.
 
     Raises:
-        InputError: If the file is not the result of a tuning run, or if it has no such
-            candidate.
+        InputError: If the file is not the result of a tuning run, if it has no such
+            candidate, or if the values do not belong to ``own``.
     """
     try:
         content = json.loads(read_regular(Path(path)))
@@ -104,20 +113,39 @@ def load_controller(path: str | Path, candidate: str = "best") -> TunedControlle
         raise InputError(
             f"{path}: candidate {candidate!r}; accepted: {', '.join(map(str, named))}"
         )
-    if (kind := row.get("controller")) not in CONTROLLERS:
+    kind = row.get("controller")
+    if kind == LOOP.name:
+        others = (str(key) for key, one in named.items() if one != row)
         raise InputError(
-            f"{path}: controller {kind!r}; accepted: {', '.join(CONTROLLERS)}"
+            f"{path}: {candidate!r} is the {LOOP.name} alone, which adds no torque;"
+            f" accepted: {', '.join(others)}"
         )
-    tunable = CONTROLLERS[kind]
+    if kind in CONTROLLERS:
+        tunable = CONTROLLERS[kind]
+        values = _values_of(row, tunable.keys, f"{path}: ", candidate, least=0.0)
+        return TunedController(tunable, values)
+    if own is None:
+        raise InputError(
+            f"{path}: controller {kind!r}; accepted: {', '.join(CONTROLLERS)}, or one"
+            " of your own with load_controller(path, own=ITS_CLASS)"
+        )
+    mine = OwnController.from_object(own, str(kind))
+    keys = tuple(one.key for one in mine.bounds)
+    return mine.controller(_values_of(row, keys, f"{path}: ", candidate, least=-np.inf))
+
+
+def _values_of(
+    row: dict[str, Any], keys: tuple[str, ...], where: str, name: str, *, least: float
+) -> dict[str, float]:
+    """Checked parameter values of a candidate."""
     values = row.get("parameters")
-    if not isinstance(values, dict) or set(values) != set(tunable.keys):
-        raise InputError(
-            f"{path}: parameters of {candidate!r}; accepted: {', '.join(tunable.keys)}"
-        )
+    if not isinstance(values, dict) or set(values) != set(keys):
+        raise InputError(f"{where}parameters of {name!r}; accepted: {', '.join(keys)}")
     if values.get("integral_time_s", 0.0) is None:  # JSON has no infinity
         values["integral_time_s"] = np.inf
     for key, value in values.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not value >= 0.0:
-            raise InputError(f"{path}: {key} {value!r}; accepted: a number >= 0")
-    return TunedController(tunable, values)
+        if not number or not value >= least:
+            what = f"a number >= {least:g}" if np.isfinite(least) else "a number"
+            raise InputError(f"{where}{key} {value!r}; accepted: {what}")
+    return {key: values[key] for key in keys}

@@ -1,39 +1,37 @@
-r"""Cost of gains: parallel episodes of an environment, one per candidate and seed.
+r"""Cost of controllers: parallel episodes of an environment, per candidate and seed.
 
-With the symbols of the environment's reward :math:`1/(1 + (e/s)^2) - w u^2`, the cost
-of an episode is
+The reward of an environment is :math:`1/(1 + q) - w u`, with the squared error q
+relative to its scale s, the squared effort u and the effort weight w. The cost of an
+episode is
 
-.. math:: J = s \sqrt{\langle (e/s)^2 + w u^2 \rangle}
-    = \sqrt{\langle e^2 \rangle + s^2 w \langle u^2 \rangle},
+.. math:: J = s \sqrt{\langle q + w u \rangle},
 
-where e is the error of the true link angle, u the motor torque divided by its limit,
-and the brackets denote the mean over the episode. J combines the rms error with a
-torque term, which is :math:`s\sqrt{w}` for permanent full torque. For small errors the
-mean reward is :math:`1 - (J/s)^2`. For large errors the reward levels off, but J does
-not. After a limit has been exceeded, and wherever a signal is not finite, e is set to
-the limit of the link angle and u to 1. No cost is therefore larger than
-:attr:`Trials.worst`.
+where the brackets denote the mean over the instants that have a reward. For an error e
+of the link angle, this is :math:`\sqrt{\langle e^2 \rangle + s^2 w \langle u \rangle}`:
+the rms error and a term of the effort. For small errors the mean reward is :math:`1 -
+(J/s)^2`. For large errors the reward levels off, but J does not. After a limit has been
+exceeded, and wherever a signal is not finite, the error is that of all links at their
+limits and u is 1. No cost is therefore larger than :attr:`Trials.worst`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, cast
 
 import numpy as np
 
-from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
-from swgjoint.explore.tune.gains import Tunable, build, parts_of, weight_plan
-from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
+from swgjoint.explore.tune.tunable import Tunable
+from swgjoint.sim.controller import KnownJoints, KnownLoop, Task
 from swgjoint.typing import Array
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, mm
 
 PREFIX = "swgjoint/"
-TUNABLE = ("JointTracking-v0",)
-"""Environments whose action is the motor torque alone."""
+UNITS = {"error_scale_arcmin": ("arcmin", arcmin), "error_scale_mm": ("mm", mm)}
+"""Units of costs by the setting of the environment that has the error scale."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,34 +41,30 @@ class Trace:
     time: Array
     """Ends of the control periods [s], shape (n,)."""
     reference: Array
-    """Reference of the link angle [rad]."""
+    """Reference of the first link angle [rad]."""
     error: Array
-    """Link angle minus reference [rad]; NaN after a limit has been exceeded."""
+    """Link angle minus reference [rad], of an arm the error of its tool [m]; NaN after
+    a limit has been exceeded."""
     torque: Array
-    """Motor torque [N·m]."""
+    """Torque of the first motor [N·m]."""
 
 
 def environment_named(name: str) -> str:
-    """Find the id of an environment whose controllers can be tuned.
+    """Find the id of an environment.
 
     Raises:
-        InputError: If the environment is unknown, or if its action is added to an
-            internal control loop.
+        InputError: If the environment is unknown.
         MissingExtraError: If gymnasium is not installed.
     """
     from swgjoint.envs import ENVIRONMENTS
 
+    known = [one.removeprefix(PREFIX) for one in ENVIRONMENTS]
     short = name.removeprefix(PREFIX)
-    if short in TUNABLE:
+    if short in known:
         return PREFIX + short
-    if PREFIX + short in ENVIRONMENTS:
-        raise InputError(
-            f"environment {name!r}: its action is added to an internal control loop;"
-            f" accepted: {', '.join(TUNABLE)}"
-        )
-    near = get_close_matches(short, TUNABLE, n=1)
+    near = get_close_matches(short, known, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
-    raise InputError(f"environment {name!r}; {hint}accepted: {', '.join(TUNABLE)}")
+    raise InputError(f"environment {name!r}; {hint}accepted: {', '.join(known)}")
 
 
 class Trials:
@@ -96,12 +90,15 @@ class Trials:
             InputError: If an argument is not a setting of the environment.
         """
         import gymnasium
+        from gymnasium.envs.registration import load_env_creator
 
         from swgjoint.envs.bench import settings_of
-        from swgjoint.envs.joint_tracking import TrackingSettings
 
         # reject arguments of gymnasium itself, such as the restart mode
-        settings_of(TrackingSettings, dict(arguments))
+        single: Any = load_env_creator(str(gymnasium.spec(environment).entry_point))
+        settings = settings_of(single.settings_type, dict(arguments))
+        if (kind := getattr(settings, "action", "torque")) != "torque":
+            raise InputError(f"action {kind!r} of a tuning run; accepted: torque")
         self.seeds, self.candidates = tuple(seeds), candidates
         env = gymnasium.make_vec(
             f"swgjoint.envs:{environment}",
@@ -109,24 +106,29 @@ class Trials:
             **arguments,
         )
         self.env = cast(Any, env.unwrapped)
-        settings, limits = self.env.core.settings, self.env.core.limits
-        self.joints: KnownJoints = self.env.core.joints
-        self.error_scale = float(settings.error_scale_arcmin * arcmin)
-        """Error scale s of the cost [rad]."""
+        core = self.env.core
+        self.joints: KnownJoints = core.joints
+        (scale,) = (key for key in UNITS if hasattr(settings, key))
+        self.unit, self.unit_size = UNITS[scale]
+        """Name and size of the unit of costs in results."""
+        self.error_scale = float(getattr(settings, scale) * self.unit_size)
+        """Error scale s of the cost [rad or m]."""
         self.effort_weight = float(settings.effort_weight)
         """Effort weight w of the cost [-]."""
-        self._limit = float(limits.angle[0])
-        self.worst = float(np.hypot(self._limit, self._full_torque))
+        self._limit = (core.worst_error / self.error_scale) ** 2
+        self.worst = self.error_scale * float(np.sqrt(self._limit + self.effort_weight))
         """Largest possible cost: that of an episode that exceeds a limit at once
-        [rad]."""
-        self._plans: dict[str, tuple[MotorPlan, MotorPlan]] = {}
+        [rad or m]."""
+        self._kept: dict[str, Any] = {}
+        self._task = self._begin()
 
     @property
-    def _full_torque(self) -> float:
-        return self.error_scale * float(np.sqrt(self.effort_weight))
+    def loop(self) -> KnownLoop | None:
+        """Motor loop to which torques are added, along the motions of the seeds."""
+        return self._task.loop
 
     def costs(self, tunable: Tunable, values: Mapping[str, Array]) -> Array:
-        """Costs of candidates on all seeds [rad], shape (candidates, seeds).
+        """Costs of candidates on all seeds, shape (candidates, seeds) [rad or m].
 
         Args:
             tunable: Controller.
@@ -137,7 +139,7 @@ class Trials:
     def cost_and_traces(
         self, tunable: Tunable, values: Mapping[str, Array]
     ) -> tuple[Array, Trace]:
-        """Costs [rad], shape (candidates, seeds), and signals of the episodes.
+        """Costs [rad or m], shape (candidates, seeds), and signals of the episodes.
 
         Args:
             tunable: Controller.
@@ -148,7 +150,7 @@ class Trials:
         error, torque = (np.array(x) for x in zip(*rows, strict=True))
         task = self._task
         return costs, Trace(
-            time=task.period * np.arange(1, len(error) + 1),
+            time=task.period * np.arange(1.0, len(error) + 1.0),
             reference=np.asarray(task.position[1:, :, 0]),
             error=error,
             torque=torque,
@@ -158,55 +160,38 @@ class Trials:
         """Close the environments."""
         self.env.close()
 
+    def _begin(self) -> Task:
+        """Begin the episodes of all candidates."""
+        seeds = list(self.seeds) * self.candidates
+        self._observation, _ = self.env.reset(seed=seeds)
+        task: Task = self.env.task
+        return task
+
     def _run(
         self,
         tunable: Tunable,
         values: Mapping[str, Array],
         rows: list[tuple[Array, Array]] | None,
     ) -> Array:
-        env, count = self.env, len(self.seeds)
-        observation, _ = env.reset(seed=list(self.seeds) * self.candidates)
-        self._task = task = env.task
-        each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
-        limit = self.joints.torque_limit
-        controller = build(self._plan(tunable, task, each), each, limit)
-        # the age of the readings is a tuned parameter, so hide the true one
-        controller.start(replace(task, reading_age=ReadingAge()))
-        squares = np.zeros((2, env.num_envs))
+        env, core = self.env, self.env.core
+        self._task = task = self._begin()
+        act, observation = tunable.begin(values, task, self._kept), self._observation
+        total = np.zeros(env.num_envs)
         alive = np.ones(env.num_envs, dtype=bool)
         steps = len(task.position) - 1
         for k in range(steps):
-            torque = controller.torque(k, env.read_measurements(observation))
-            action = np.nan_to_num(torque / limit, posinf=1.0, neginf=-1.0)
-            observation, _, terminated, _, info = env.step(np.clip(action, -1.0, 1.0))
-            error = arcmin * info["link_error_arcmin"]
-            effort = info["motor_torque_Nm"] / limit[0]
+            torque = act(k, env.read_measurements(observation), alive)
+            action = np.nan_to_num(torque / core.authority, posinf=1.0, neginf=-1.0)
+            observation, _, terminated, _, _ = env.step(np.clip(action, -1.0, 1.0))
+            error, effort = core.deviation()
             valid = alive & np.isfinite(error) & np.isfinite(effort)
-            size = np.where(valid, np.minimum(np.abs(error), self._limit), self._limit)
-            squares += np.square([size, np.where(valid, effort, 1.0)])
+            if k + 1 > core.first_step:
+                error = np.where(valid, np.minimum(error, self._limit), self._limit)
+                total += error + self.effort_weight * np.where(valid, effort, 1.0)
             if rows is not None:
-                rows.append(
-                    (np.where(valid, error, np.nan), info["motor_torque_Nm"].copy())
-                )
-            alive &= ~terminated
-        mean = squares / steps
-        cost = np.sqrt(mean[0] + self._full_torque**2 * mean[1])
-        return np.asarray(cost.reshape(self.candidates, count))
-
-    def _plan(
-        self, tunable: Tunable, task: Task, each: Mapping[str, Array]
-    ) -> MotorPlan:
-        """Plan of all motions; parts that candidates share are computed only once."""
-        count = len(self.seeds)
-        few = replace(
-            task,
-            position=task.position[:, :count],
-            velocity=task.velocity[:, :count],
-            acceleration=task.acceleration[:, :count],
-            link_torque=task.link_torque[:, :count],
-        )
-        if tunable.name not in self._plans:
-            self._plans[tunable.name] = parts_of(tunable, few)
-        return weight_plan(
-            self._plans[tunable.name], few, each, repeats=self.candidates
-        )
+                shown = core.shown_error()
+                torques = core.motor_torque[:, 0].copy()
+                rows.append((np.where(valid, shown, np.nan), torques))
+            alive = alive & ~terminated
+        cost = self.error_scale * np.sqrt(total / (steps - core.first_step))
+        return np.asarray(cost.reshape(self.candidates, len(self.seeds)))

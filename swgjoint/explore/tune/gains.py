@@ -10,12 +10,17 @@ drive limits the bandwidth: with the motor locked, the link oscillates on the st
 K of the drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`. The textbook rule
 of this file is :math:`\omega = \omega_a/3` and :math:`\zeta = 0.7`, with nominal
 inertias and the mean stiffness of the map up to rated torque.
+
+Where the environment has a motor loop, the torque of the controller minus that of the
+loop is added, so that the gains of the loop are the rule, and the difference of the two
+plans remains.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +34,9 @@ from swgjoint.control.motor_side import (
     rigid_plan,
 )
 from swgjoint.errors import InputError
-from swgjoint.sim.controller import KnownJoints, Task
+from swgjoint.explore.tune.own import OwnController
+from swgjoint.explore.tune.tunable import Act, GainParameter, Tunable
+from swgjoint.sim.controller import KnownJoints, KnownLoop, Measured, ReadingAge, Task
 from swgjoint.typing import Array
 
 BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
@@ -37,33 +44,8 @@ BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class GainParameter:
-    """One tuned number, on a logarithmic scale between two bounds."""
-
-    key: str
-    """Name that ends with the unit; without a unit the parameter is dimensionless."""
-    low: float
-    """Lower bound, in the unit of the key."""
-    high: float
-    """Upper bound, in the unit of the key."""
-    neutral: float
-    """Value before tuning, in the unit of the key: gains by the rule, shares of 1, no
-    integral, no delay of the readings."""
-
-    def value(self, place: Array) -> Array:
-        """Values at relative positions between the bounds, 0 to 1."""
-        return np.asarray(self.low * (self.high / self.low) ** place)
-
-    @property
-    def start(self) -> float:
-        """Relative position of the neutral value, 0 to 1; clipped to the bounds."""
-        inside = min(max(self.neutral, self.low), self.high)
-        return float(np.log(inside / self.low) / np.log(self.high / self.low))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tunable:
-    """A named controller and the keys of its tuned parameters."""
+class PlannedControl:
+    """A controller along a plan, and the keys of its tuned parameters."""
 
     name: str
     text: str
@@ -72,18 +54,180 @@ class Tunable:
     """Function that plans the motor motion and torque of a task."""
     keys: tuple[str, ...]
     """Keys of the tuned parameters."""
+    untuned = "by rule"
+    content = ""
+
+    def parameters(
+        self, joints: KnownJoints, loop: KnownLoop | None
+    ) -> tuple[GainParameter, ...]:
+        """Tuned parameters, with bounds for the first joint.
+
+        Before tuning they are gains by the rule or those of the loop, shares of 1, no
+        integral, and no delay of the readings.
+
+        Args:
+            joints: Joints with their drives and inertias.
+            loop: Motor loop to which torques are added, if there is one.
+        """
+        high = anti_resonance(joints)
+        frequency, damping = BANDWIDTH * high, DAMPING
+        if loop is not None:
+            inertia = motor_inertia(joints)
+            omega = float(np.sqrt(loop.stiffness[0] / inertia))
+            frequency = omega / (2.0 * np.pi)
+            damping = float(loop.damping[0] / (2.0 * omega * inertia))
+        known = (
+            # 0.1 to 2 times the anti-resonance: softer control follows poorly, stiffer
+            # control oscillates
+            GainParameter(
+                key="frequency_Hz", low=0.1 * high, high=2.0 * high, neutral=frequency
+            ),
+            GainParameter(key="damping_ratio", low=0.2, high=3.0, neutral=damping),
+            GainParameter(key="integral_time_s", low=0.01, high=10.0, neutral=np.inf),
+            GainParameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
+            GainParameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
+            GainParameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
+            # share of the nominal kinematic error, whose phase differs between
+            # specimens
+            GainParameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
+            # a reading taken at t - age is compared with the plan at that time
+            GainParameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
+        )
+        return tuple(p for key in self.keys for p in known if p.key == key)
+
+    def gains(
+        self, values: Mapping[str, Array], joints: KnownJoints
+    ) -> dict[str, Array]:
+        """Gains at the motor of the first joint, in SI units.
+
+        Args:
+            values: Values of the tuned parameters by key.
+            joints: Joints with their inertias and ratios.
+
+        Returns:
+            Gains by key with unit, of the same shape as the values.
+        """
+        inertia = motor_inertia(joints)
+        omega = 2.0 * np.pi * values["frequency_Hz"]
+        stiffness = inertia * omega**2
+        gains = {
+            "stiffness_Nm_rad": stiffness,
+            "damping_Nms_rad": 2.0 * values["damping_ratio"] * omega * inertia,
+        }
+        if "integral_time_s" in values:
+            gains["integral_Nm_rads"] = stiffness / values["integral_time_s"]
+        return gains
+
+    def begin(
+        self, values: Mapping[str, Array], task: Task, kept: dict[str, Any]
+    ) -> Act:
+        """Begin the episodes of all candidates; their plans have common parts.
+
+        Args:
+            values: Values of the candidates by key. Shape (n_candidates,) each.
+            task: Motions of all episodes.
+            kept: Parts of the plans, by name of the controller.
+        """
+        repeats = len(values["frequency_Hz"])
+        count = task.position.shape[1] // repeats
+        few = task.select(slice(0, count))
+        if self.name not in kept:
+            kept[self.name] = parts_of(self, few)
+        each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
+        plan = weight_plan(kept[self.name], few, each, repeats=repeats)
+        loop = build(plan, each, task.joints.torque_limit)
+        # the age of the readings is a tuned parameter, so hide the true one
+        loop.start(replace(task, reading_age=ReadingAge()))
+        return lambda k, measured, alive: loop.torque(k, measured)
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoopAlone:
+    """No torque in addition to that of the motor loops."""
+
+    name: str = "motor loop"
+    untuned = ""
+    content = ""
+
+    def parameters(
+        self, joints: KnownJoints, loop: KnownLoop | None
+    ) -> tuple[GainParameter, ...]:
+        """None.
+
+        Args:
+            joints: Unused.
+            loop: Unused.
+        """
+        return ()
+
+    def gains(
+        self, values: Mapping[str, Array], joints: KnownJoints
+    ) -> dict[str, Array]:
+        """None.
+
+        Args:
+            values: Unused.
+            joints: Unused.
+        """
+        return {}
+
+    def begin(
+        self, values: Mapping[str, Array], task: Task, kept: dict[str, Any]
+    ) -> Act:
+        """Torques of zero.
+
+        Args:
+            values: Empty.
+            task: Motions of all episodes.
+            kept: Unused.
+        """
+        zero = np.zeros(task.position.shape[1:])
+        return lambda k, measured, alive: zero
+
+
+class AddedPID(MotorPID):
+    """PID control whose torque replaces that of a motor loop, if the task has one."""
+
+    def start(self, task: Task) -> None:
+        """Prepare the motion and the torque of the loop along it."""
+        super().start(task)
+        self._loop, i = task.loop, task.joints.ratio
+        if (loop := task.loop) is not None:
+            self._command = (
+                loop.stiffness * (i * task.position)
+                + loop.damping * (i * task.velocity)
+                + loop.feedforward
+            )
+
+    def torque(self, k: int, measured: Measured) -> Array:
+        """Motor torques in addition to those of the loop [N·m]. Shape (..., n_joints).
+
+        Args:
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
+        """
+        whole, loop = super().torque(k, measured), self._loop
+        if loop is None:
+            return whole
+        by_loop = (
+            self._command[k]
+            - loop.stiffness * measured.motor_angle
+            - loop.damping * measured.motor_speed
+        )
+        return np.asarray(whole - by_loop)
+
+
+LOOP = LoopAlone()
 CONTROLLERS = {
     one.name: one
     for one in (
-        Tunable(
+        PlannedControl(
             name="pd",
             text="PD on the motor angle",
             plan=ideal_plan,
             keys=("frequency_Hz", "damping_ratio"),
         ),
-        Tunable(
+        PlannedControl(
             name="pd-feedforward",
             text="PID with feed-forward of torque and friction of a rigid drive",
             plan=rigid_plan,
@@ -96,7 +240,7 @@ CONTROLLERS = {
                 "reading_age_s",
             ),
         ),
-        Tunable(
+        PlannedControl(
             name="pd-flexible",
             text="PID with feed-forward of torque, friction and torsion of the map",
             plan=flexible_plan,
@@ -115,18 +259,27 @@ CONTROLLERS = {
 }
 
 
-def controller_named(name: str) -> Tunable:
-    """Look up one of :data:`CONTROLLERS`.
+def controller_named(name: Any) -> Tunable:
+    """Controller of a tuning run.
+
+    Args:
+        name: Name in :data:`CONTROLLERS`, ``FILE.py:NAME``, or a class or function of
+            the user, see :class:`~swgjoint.explore.tune.own.OwnController`.
 
     Raises:
-        InputError: If the name is unknown.
+        InputError: If there is no such controller.
     """
-    if name not in CONTROLLERS:
-        raise InputError(
-            f"controller {name!r}; accepted: "
-            + "; ".join(f"{one.name} ({one.text})" for one in CONTROLLERS.values())
-        )
-    return CONTROLLERS[name]
+    if not isinstance(name, str):
+        return OwnController.from_object(name)
+    if name in CONTROLLERS:
+        return CONTROLLERS[name]
+    if ".py:" in name:
+        return OwnController.from_file(name)
+    raise InputError(
+        f"controller {name!r}; accepted: "
+        + "; ".join(f"{one.name} ({one.text})" for one in CONTROLLERS.values())
+        + "; FILE.py:NAME (a class of your own)"
+    )
 
 
 def anti_resonance(joints: KnownJoints) -> float:
@@ -135,66 +288,14 @@ def anti_resonance(joints: KnownJoints) -> float:
     return float(np.sqrt(stiffness / joints.link_inertia[0]) / (2.0 * np.pi))
 
 
-def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter, ...]:
-    """Tuned parameters of a controller, with bounds for the first joint.
-
-    Args:
-        tunable: Controller.
-        joints: Joints with their drives and inertias.
-    """
-    high = anti_resonance(joints)
-    known = (
-        # 0.1 to 2 times the anti-resonance: softer control follows poorly, stiffer
-        # control oscillates
-        GainParameter(
-            key="frequency_Hz",
-            low=0.1 * high,
-            high=2.0 * high,
-            neutral=BANDWIDTH * high,
-        ),
-        GainParameter(key="damping_ratio", low=0.2, high=3.0, neutral=DAMPING),
-        GainParameter(key="integral_time_s", low=0.01, high=10.0, neutral=np.inf),
-        GainParameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
-        GainParameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
-        GainParameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
-        # share of the nominal kinematic error, whose phase differs between specimens
-        GainParameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
-        # a reading taken at t - age is compared with the plan at that time
-        GainParameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
+def motor_inertia(joints: KnownJoints) -> float:
+    """Inertia of motor and link of the first joint, at its motor [kg·m²]."""
+    return float(
+        joints.rotor_inertia[0] + joints.link_inertia[0] / joints.ratio[0] ** 2
     )
-    return tuple(p for key in tunable.keys for p in known if p.key == key)
 
 
-def textbook(joints: KnownJoints) -> dict[str, Array]:
-    """Parameter values of plain PD control by the rule, shape (1,) each."""
-    pd = parameters_of(CONTROLLERS["pd"], joints)
-    return {p.key: np.array([p.neutral]) for p in pd}
-
-
-def gains_of(values: Mapping[str, Array], joints: KnownJoints) -> dict[str, Array]:
-    """Gains at the motor of the first joint, in SI units.
-
-    Args:
-        values: Values of the tuned parameters by key.
-        joints: Joints with their inertias and ratios.
-
-    Returns:
-        Gains by key with unit, of the same shape as the values.
-    """
-    ratio, rotor = joints.ratio[0], joints.rotor_inertia[0]
-    inertia = rotor + joints.link_inertia[0] / ratio**2
-    omega = 2.0 * np.pi * values["frequency_Hz"]
-    stiffness = inertia * omega**2
-    gains = {
-        "stiffness_Nm_rad": stiffness,
-        "damping_Nms_rad": 2.0 * values["damping_ratio"] * omega * inertia,
-    }
-    if "integral_time_s" in values:
-        gains["integral_Nm_rads"] = stiffness / values["integral_time_s"]
-    return gains
-
-
-def parts_of(tunable: Tunable, task: Task) -> tuple[MotorPlan, MotorPlan]:
+def parts_of(tunable: PlannedControl, task: Task) -> tuple[MotorPlan, MotorPlan]:
     """Split the plan of a controller into a mean part and an angle-dependent part.
 
     The first part is the plan for the mean torsion curve of the drives, without
@@ -267,7 +368,7 @@ def weight_plan(
 
 def build(
     plan: MotorPlan, values: Mapping[str, Array], torque_limit: Array
-) -> MotorPID:
+) -> AddedPID:
     """Build the controller of parallel motions.
 
     Args:
@@ -275,7 +376,7 @@ def build(
         values: Values of the tuned parameters, shape (n_motions, 1) each.
         torque_limit: Torque limit of the motors [N·m], used as limit of the integral.
     """
-    return MotorPID(
+    return AddedPID(
         lambda task: plan,
         frequency=values["frequency_Hz"],
         damping_ratio=values["damping_ratio"],

@@ -10,10 +10,9 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace
-from swgjoint.explore.tune.gains import GainParameter
 from swgjoint.explore.tune.search import OPTIMISERS, GainSearch
+from swgjoint.explore.tune.tunable import GainParameter
 from swgjoint.typing import Array
-from swgjoint.units import arcmin
 
 MINUTES = 3.0
 """Default wall time of a tuning run [min]."""
@@ -24,7 +23,9 @@ class TuneSettings:
     """Environment, controller, optimiser and budget of a tuning run."""
 
     environment: str
-    controller: str = "pd-flexible"
+    controller: Any = "pd-flexible"
+    """Name of a controller, ``FILE.py:NAME``, or a class or function of the user, see
+    :class:`~swgjoint.explore.tune.own.OwnController`."""
     optimiser: str = "de"
     minutes: float | None = None
     """Wall time [min]; None for :data:`MINUTES`, unless ``evaluations`` is set."""
@@ -83,15 +84,22 @@ class GainCandidate:
     """Parameter values by key, in the unit of the key."""
     gains: dict[str, float]
     """Gains at the motor by key, in SI units."""
+    tuned: bool
+    """Whether a search has found the values."""
     training: Array
-    """Cost of each training seed [rad]."""
+    """Cost of each training seed [rad or m]."""
     held_out: Array
-    """Cost of each held-out seed [rad]."""
+    """Cost of each held-out seed [rad or m]."""
     trace: Trace
     """Signals of the held-out episodes."""
 
-    def to_json(self) -> dict[str, Any]:
-        """Parameters, gains and costs as JSON."""
+    def to_json(self, unit: str, size: float) -> dict[str, Any]:
+        """Parameters, gains and costs as JSON.
+
+        Args:
+            unit: Name of the unit of costs.
+            size: Size of the unit [rad or m].
+        """
         got: dict[str, Any] = {
             "name": self.name,
             "controller": self.controller,
@@ -99,13 +107,16 @@ class GainCandidate:
             "gains": self.gains,
         }
         for key, costs in (("training", self.training), ("held_out", self.held_out)):
-            got[f"{key}_cost_arcmin"] = float(costs.mean() / arcmin)
-            got[f"{key}_spread_arcmin"] = float(costs.std(ddof=1) / arcmin)
-            got[f"{key}_costs_arcmin"] = (costs / arcmin).tolist()
-        error = self.trace.error
-        broken = ~np.isfinite(error).all(axis=0)
-        got["broken_limits"] = int(broken.sum())
+            got[f"{key}_cost_{unit}"] = float(costs.mean() / size)
+            got[f"{key}_spread_{unit}"] = float(costs.std(ddof=1) / size)
+            got[f"{key}_costs_{unit}"] = (costs / size).tolist()
+        got["broken_limits"] = self.broken
         return got
+
+    @property
+    def broken(self) -> int:
+        """Number of held-out episodes that exceed a limit."""
+        return int((~np.isfinite(self.trace.error).all(axis=0)).sum())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,24 +126,28 @@ class Tuned:
     settings: TuneSettings
     environment: str
     candidates: tuple[GainCandidate, ...]
-    """Compared controllers, from PD control by the rule to the tuned controller."""
+    """Compared controllers, from the baseline to the tuned controller."""
     searches: dict[str, GainSearch]
     parameters: tuple[GainParameter, ...]
     """Parameters of the named controller."""
     anti_resonance: float
     """Anti-resonance of the nominal joint [Hz]."""
+    unit: str
+    """Name of the unit of costs."""
+    unit_size: float
+    """Size of the unit of costs [rad or m]."""
     error_scale: float
-    """Error scale s of the cost [rad]."""
+    """Error scale s of the cost [rad or m]."""
     effort_weight: float
     """Effort weight w of the cost [-]."""
     worst: float
-    """Largest possible cost [rad]."""
+    """Largest possible cost [rad or m]."""
     wall: float
     """Wall time, including the time before an interruption [s]."""
 
     @property
     def baseline(self) -> GainCandidate:
-        """PD control with gains by the textbook rule."""
+        """PD control with gains by the textbook rule, or the motor loop alone."""
         return self.candidates[0]
 
     @property
@@ -147,10 +162,12 @@ class Tuned:
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint tune``, without files."""
         rows = [
-            one.to_json() | {"improvement_percent": 100.0 * self.improvement(one)}
+            one.to_json(self.unit, self.unit_size)
+            | {"improvement_percent": 100.0 * self.improvement(one)}
             for one in self.candidates
         ]
         training, held_out = self.settings.seeds
+        unit, size = self.unit, self.unit_size
         return {
             "best": rows[-1],
             "baseline": rows[0],
@@ -159,17 +176,16 @@ class Tuned:
             "candidates": rows,
             "environment": self.environment,
             "arguments": arguments_of(self.settings),
-            "controller": self.settings.controller,
+            "controller": self.best.controller,
             "optimiser": self.settings.optimiser,
             "seed": self.settings.seed,
             "seeds": {"training": list(training), "held_out": list(held_out)},
             "bounds": {p.key: [p.low, p.high] for p in self.parameters},
             "anti_resonance_Hz": self.anti_resonance,
-            "cost": "sqrt(mean(e^2) + s^2 w mean(u^2)), e link error, u motor torque"
-            " divided by its limit",
-            "error_scale_arcmin": self.error_scale / arcmin,
+            "cost": "s sqrt(mean(q + w u)), where the reward is 1/(1 + q) - w u",
+            f"error_scale_{unit}": self.error_scale / size,
             "effort_weight": self.effort_weight,
-            "worst_cost_arcmin": self.worst / arcmin,
+            f"worst_cost_{unit}": self.worst / size,
             "wall_s": self.wall,
         }
 

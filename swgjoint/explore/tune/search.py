@@ -51,7 +51,7 @@ class GainSearch:
     places: list[Array] = field(default_factory=list)
     """Candidates of each generation in the unit cube, shape (n, d) each."""
     costs: list[Array] = field(default_factory=list)
-    """Costs on every seed [rad], shape (n, seeds) each."""
+    """Costs on every seed [rad or m], shape (n, seeds) each."""
     seconds: list[float] = field(default_factory=list)
     """Wall time of each generation [s]."""
 
@@ -66,7 +66,7 @@ class GainSearch:
         return np.asarray(np.concatenate(self.places)[int(mean.argmin())])
 
     def progress(self) -> Array:
-        """Lowest mean cost after every candidate [rad], shape (evaluations,)."""
+        """Lowest mean cost after every candidate [rad or m], shape (evaluations,)."""
         mean = np.concatenate(self.costs).mean(axis=1)
         return np.asarray(np.minimum.accumulate(mean))
 
@@ -238,7 +238,7 @@ def write_journal(
     for name, search in searches.items():
         if search.places:
             arrays[f"{name}.places"] = np.stack(search.places)
-            arrays[f"{name}.costs_rad"] = np.stack(search.costs)
+            arrays[f"{name}.costs"] = np.stack(search.costs)
             arrays[f"{name}.seconds"] = np.array(search.seconds)
     return write_whole(folder / JOURNAL, arrays_file(arrays))
 
@@ -288,7 +288,7 @@ def _search(arrays: Mapping[str, Array], name: str) -> GainSearch:
     if f"{name}.places" not in arrays:
         return GainSearch()
     places, costs, seconds = (
-        arrays[f"{name}.{key}"] for key in ("places", "costs_rad", "seconds")
+        arrays[f"{name}.{key}"] for key in ("places", "costs", "seconds")
     )
     whole = places.shape[:2] == costs.shape[:2] and seconds.shape == places.shape[:1]
     if not (whole and places.ndim == costs.ndim == 3 and np.isfinite(costs).all()):

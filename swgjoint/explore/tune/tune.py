@@ -1,9 +1,10 @@
-"""``swgjoint tune``: tunes the gains of a controller and compares with a textbook rule.
+"""``swgjoint tune``: tunes the gains of a controller and compares with a baseline.
 
-Four controllers are compared on held-out seeds: PD control with gains by the rule, PD
-control with tuned gains, the named controller with gains by the rule, and the named
-controller with tuned gains. The comparison separates the benefit of feed-forward from
-the benefit of tuning. If the named controller is PD itself, only two remain.
+Controllers are compared on held-out seeds: the baseline, and the named controller with
+its values before and after tuning. In an environment without motor loops, the baseline
+is PD control with gains by the textbook rule, and PD control with tuned gains is
+compared, too, which separates the benefit of feed-forward from the benefit of tuning.
+In others, whose actions are added to motor loops, the baseline is the loop alone.
 """
 
 from __future__ import annotations
@@ -23,12 +24,9 @@ from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace, Trials, environment_named
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
-    GainParameter,
-    Tunable,
+    LOOP,
     anti_resonance,
     controller_named,
-    gains_of,
-    parameters_of,
 )
 from swgjoint.explore.tune.result import (
     MINUTES,
@@ -44,8 +42,8 @@ from swgjoint.explore.tune.search import (
     run_search,
     write_journal,
 )
+from swgjoint.explore.tune.tunable import GainParameter, Tunable
 from swgjoint.json_text import json_text, plain
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
@@ -63,7 +61,7 @@ def tune(
     resume: bool = False,
     progress: Progress = silent,
 ) -> Tuned:
-    """Tune a controller, and a PD controller for comparison.
+    """Tune a controller, and compare it with a baseline.
 
     Args:
         settings: Controller and budget. With ``evaluations``, the same settings give
@@ -85,10 +83,6 @@ def tune(
     began = time.perf_counter()
     environment = environment_named(settings.environment)
     named, arguments = controller_named(settings.controller), arguments_of(settings)
-    tunables = {_PD: CONTROLLERS["pd"]}
-    if named.name != "pd":
-        tunables[_NAMED] = named
-    searches = {name: GainSearch() for name in tunables}
     if folder is None and resume:
         raise InputError(
             "resume without a folder; accepted: with the folder of the run (--out)"
@@ -97,10 +91,18 @@ def tune(
     trials = Trials(
         environment, arguments, seeds=training, candidates=settings.population
     )
-    header = _header(settings, environment, arguments, trials.joints.drives[0])
+    baseline = CONTROLLERS["pd"] if trials.loop is None else LOOP
+    tunables: dict[str, Tunable] = {_PD: baseline, _NAMED: named}
+    if named is baseline:
+        del tunables[_NAMED]
+    parameters = {
+        key: one.parameters(trials.joints, trials.loop) for key, one in tunables.items()
+    }
+    searches = {key: GainSearch() for key, some in parameters.items() if some}
+    header = _header(settings, environment, arguments, named, trials)
     if folder is not None:
         if resume or (folder / JOURNAL).exists():
-            searches = read_journal(folder, header, tuple(tunables))
+            searches = read_journal(folder, header, tuple(searches))
             known = sum(search.evaluations for search in searches.values())
             stage = f"resuming from {folder / JOURNAL}: known candidates"
             progress(stage, known, known)
@@ -110,10 +112,9 @@ def tune(
     def elapsed() -> float:
         return time.perf_counter() - began + before
 
-    for name, tunable in tunables.items():
-        search = searches[name]
-        parameters = parameters_of(tunable, trials.joints)
-        share = PD_SHARE if name == _PD and len(tunables) > 1 else 1.0
+    for name, search in searches.items():
+        tunable = tunables[name]
+        share = PD_SHARE if name == _PD and len(searches) > 1 else 1.0
         budget = _Budget(settings, searches, search, share, elapsed)
 
         def after(budget: _Budget = budget, tunable: Tunable = tunable) -> None:
@@ -124,9 +125,9 @@ def tune(
         run_search(
             settings.optimiser,
             search,
-            costs=partial(_costs, trials, tunable, parameters),
+            costs=partial(_costs, trials, tunable, parameters[name]),
             more=budget.more,
-            start=np.array([p.start for p in parameters]),
+            start=np.array([p.start for p in parameters[name]]),
             size=settings.population,
             seed=settings.seed,
             clock=time.perf_counter,
@@ -134,35 +135,33 @@ def tune(
         )
     trials.close()
     last = Trials(environment, arguments, seeds=training + held_out, candidates=1)
-    joints = last.joints
     candidates: list[GainCandidate] = []
+    total = len(tunables) + len(searches)
     for name, tunable in tunables.items():
-        parameters = parameters_of(tunable, joints)
-        neutral = {p.key: np.array([p.neutral]) for p in parameters}
-        best = _values(parameters, searches[name].best()[None])
-        for label, values in (("by rule", neutral), ("tuned", best)):
-            progress("held-out seeds", len(candidates), 2 * len(tunables))
-            costs, trace = last.cost_and_traces(tunable, values)
-            candidates.append(
-                _candidate(
-                    label,
-                    tunable,
-                    values,
-                    costs[0],
-                    trace,
-                    last,
-                    settings,
-                )
-            )
-    progress("held-out seeds", len(candidates), len(candidates))
+        neutral = {p.key: np.array([p.neutral]) for p in parameters[name]}
+        tried = [neutral]
+        if name in searches:
+            tried.append(_values(parameters[name], searches[name].best()[None]))
+        found: list[GainCandidate] = []
+        for tuned, values in enumerate(tried):
+            progress("held-out seeds", len(candidates) + len(found), total)
+            found.append(_candidate(tunable, values, bool(tuned), last, settings))
+        # bounds may exclude the values before tuning, such as no integral
+        first, best = found[0], found[-1]
+        if best.training.mean() > first.training.mean():
+            found[-1] = replace(first, name=best.name, tuned=True)
+        candidates += found
+    progress("held-out seeds", total, total)
     last.close()
     return Tuned(
         settings=settings,
         environment=environment,
         candidates=tuple(candidates),
         searches=searches,
-        parameters=parameters_of(named, joints),
-        anti_resonance=anti_resonance(joints),
+        parameters=list(parameters.values())[-1],
+        anti_resonance=anti_resonance(last.joints),
+        unit=last.unit,
+        unit_size=last.unit_size,
         error_scale=last.error_scale,
         effort_weight=last.effort_weight,
         worst=last.worst,
@@ -222,18 +221,21 @@ def _header(
     settings: TuneSettings,
     environment: str,
     arguments: Mapping[str, Any],
-    drive: DriveMap,
+    named: Tunable,
+    trials: Trials,
 ) -> dict[str, Any]:
     """Settings that a journal must share with the run that resumes it."""
     # a file of the same path may have changed; provenance does not affect the joint
-    moved = json_text(replace(drive, info={}, fields=None), indent=None)
+    drives = [replace(one, info={}, fields=None) for one in trials.joints.drives]
+    moved = "".join(json_text(one, indent=None) for one in drives)
     text: dict[str, Any] = json.loads(
         json.dumps(
             {
                 "environment": environment,
                 "arguments": plain(arguments),
-                "drive_content": hashlib.sha256(moved.encode()).hexdigest()[:16],
-                "controller": settings.controller,
+                "drive_content": _digest(moved),
+                "controller": named.name,
+                "controller_content": _digest(named.content),
                 "optimiser": settings.optimiser,
                 "seed": settings.seed,
                 "population": settings.population,
@@ -242,6 +244,10 @@ def _header(
         )
     )
     return text
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _values(parameters: tuple[GainParameter, ...], places: Array) -> dict[str, Array]:
@@ -258,22 +264,24 @@ def _costs(
 
 
 def _candidate(
-    label: str,
     tunable: Tunable,
     values: Mapping[str, Array],
-    costs: Array,
-    trace: Trace,
+    tuned: bool,
     trials: Trials,
     settings: TuneSettings,
 ) -> GainCandidate:
-    first = settings.training
+    """A controller with its costs on all seeds."""
+    first, (costs, trace) = settings.training, trials.cost_and_traces(tunable, values)
+    label = "tuned" if tuned else tunable.untuned
+    gains = tunable.gains(values, trials.joints)
     return GainCandidate(
-        name=f"{tunable.name} {label}",
+        name=f"{tunable.name} {label}".strip(),
         controller=tunable.name,
         values={key: float(x[0]) for key, x in values.items()},
-        gains={key: float(x[0]) for key, x in gains_of(values, trials.joints).items()},
-        training=costs[:first],
-        held_out=costs[first:],
+        gains={key: float(x[0]) for key, x in gains.items()},
+        tuned=tuned,
+        training=costs[0, :first],
+        held_out=costs[0, first:],
         trace=Trace(
             time=trace.time,
             reference=trace.reference[:, first:],

@@ -10,7 +10,6 @@ import numpy as np
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.pictures import png
-from swgjoint.units import arcmin
 from swgjoint.view.report.report import write_tables
 from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.words import format_figure
@@ -19,37 +18,40 @@ if TYPE_CHECKING:
     from swgjoint.explore.tune.result import GainCandidate, Tuned
 
 COLORS = ("0.45", "C1", "C2", "C0")
-"""Colours of the candidates; the tuned controller has the last one."""
+"""Colours of the candidates; the baseline has the first one, the tuned controller the
+last one."""
 
 
 def claims(tuned: Tuned) -> list[str]:
     """Findings of a tuning run, one line each; costs are mean ± standard deviation."""
-    baseline, best = tuned.baseline, tuned.best
+    baseline, best, unit = tuned.baseline, tuned.best, tuned.unit
     better = int((best.held_out < baseline.held_out).sum())
     count = best.held_out.size
     lines = [
-        f"{best.name}: cost {_cost(best)} on {count} held-out seeds,"
-        f" {_less(tuned, best)} than PD by the textbook rule ({_cost(baseline)}),"
+        f"{best.name}: cost {_cost(tuned, best)} on {count} held-out seeds,"
+        f" {_less(tuned, best)} than {baseline.name} ({_cost(tuned, baseline)}),"
         f" lower on {better} of them"
     ]
-    if len(tuned.candidates) > 2:
-        _, pd, ruled, _ = tuned.candidates
-        lines += [
-            f"tuning the two gains of PD alone: {_cost(pd)}, {_less(tuned, pd)}",
-            f"feed-forward alone, with gains by the rule: {_cost(ruled)},"
-            f" {_less(tuned, ruled)}; tuning changes this cost by"
-            f" {100.0 * (best.held_out.mean() / ruled.held_out.mean() - 1.0):+.0f} %",
-        ]
+    for one in tuned.candidates[1:-1]:
+        if one.tuned:
+            lines.append(
+                f"tuning the two gains of PD alone: {_cost(tuned, one)},"
+                f" {_less(tuned, one)}"
+            )
+            continue
+        change = best.held_out.mean() / one.held_out.mean() - 1.0
+        lines.append(
+            f"{one.name}: {_cost(tuned, one)}, {_less(tuned, one)}; tuning changes this"
+            f" cost by {100.0 * change:+.0f} %"
+        )
     wide = best.held_out.mean() / best.training.mean() - 1.0
     lines.append(
-        f"{best.name}: cost {best.training.mean() / arcmin:.3g} arcmin on the training"
-        f" seeds, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'} on the"
-        " held-out seeds"
+        f"{best.name}: cost {best.training.mean() / tuned.unit_size:.3g} {unit} on the"
+        f" training seeds, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'}"
+        " on the held-out seeds"
     )
     at_bound = [
-        p.key
-        for p, place in zip(tuned.parameters, _best_place(tuned), strict=True)
-        if not 0.01 < place < 0.99
+        p.key for p in tuned.parameters if not 0.01 < p.place(best.values[p.key]) < 0.99
     ]
     if at_bound:
         lines.append(f"parameters at a bound of the search: {', '.join(at_bound)}")
@@ -79,7 +81,7 @@ def write_files(tuned: Tuned, folder: Path) -> list[str]:
         "report.html",
         lambda path: write_tables(
             path,
-            title=f"Tuning of {tuned.settings.controller} in {tuned.environment}",
+            title=f"Tuning of {tuned.best.controller} in {tuned.environment}",
             description="; ".join(claims(tuned)) + ".",
             tables=[_summary(tuned), _gains(tuned), _by_seed(tuned)],
             pictures=pictures,
@@ -106,19 +108,20 @@ def picture(tuned: Tuned) -> bytes:
 
 
 def _draw_search(ax: Any, tuned: Tuned) -> None:
-    names = [one.controller for one in tuned.candidates[1::2]]
-    colors = (COLORS[1], COLORS[3]) if len(names) > 1 else (COLORS[3],)
-    for name, color, search in zip(names, colors, tuned.searches.values(), strict=True):
-        best = search.progress() / arcmin
+    colored = _colored(tuned)
+    searched = [pair for pair in colored if pair[0].tuned]
+    for (one, color), search in zip(searched, tuned.searches.values(), strict=True):
+        best = search.progress() / tuned.unit_size
         ax.step(np.arange(1, best.size + 1), best, where="post", color=color)
-        ax.plot([], [], color=color, label=f"{name}, best so far")
-    for one, color in zip(tuned.candidates[::2], (COLORS[0], COLORS[2]), strict=False):
-        level = one.training.mean() / arcmin
-        ax.axhline(level, color=color, ls="--", lw=1.0, label=one.name)
+        ax.plot([], [], color=color, label=f"{one.controller}, best so far")
+    for one, color in colored:
+        if not one.tuned:
+            level = one.training.mean() / tuned.unit_size
+            ax.axhline(level, color=color, ls="--", lw=1.0, label=one.name)
     ax.set(
         yscale="log",
         xlabel="number of evaluated candidates",
-        ylabel="mean cost [arcmin]",
+        ylabel=f"mean cost [{tuned.unit}]",
         title=f"search on {tuned.settings.training} training seeds",
     )
     _plain_ticks(ax)
@@ -128,17 +131,17 @@ def _draw_search(ax: Any, tuned: Tuned) -> None:
 def _draw_seeds(ax: Any, tuned: Tuned) -> None:
     seeds = tuned.settings.seeds[1]
     for one, color in _colored(tuned):
-        cost = one.held_out / arcmin
+        cost = one.held_out / tuned.unit_size
         ax.plot(seeds, cost, "o", ms=5, color=color, label=one.name)
         ax.axhline(cost.mean(), color=color, lw=1.0)
     ax.set(
         yscale="log",
         xlabel="seed",
-        ylabel="cost [arcmin]",
+        ylabel=f"cost [{tuned.unit}]",
         title="cost on held-out seeds (lines: means)",
     )
     # leave room for the legend above the points
-    ax.set_ylim(top=4.0 * tuned.baseline.held_out.max() / arcmin)
+    ax.set_ylim(top=4.0 * tuned.baseline.held_out.max() / tuned.unit_size)
     ax.ticklabel_format(axis="x", useOffset=False)
     _plain_ticks(ax)
     ax.legend(loc="upper center", ncols=2)
@@ -152,13 +155,14 @@ def _draw_episode(axes: Any, tuned: Tuned) -> None:
     for one, color in ((tuned.baseline, COLORS[0]), (tuned.best, COLORS[3])):
         trace = one.trace
         style = {"color": color, "lw": 1.0, "label": one.name}
-        axes[0].plot(trace.time, trace.error[:, k] / arcmin, **style)
+        axes[0].plot(trace.time, trace.error[:, k] / tuned.unit_size, **style)
         axes[1].plot(trace.time, trace.torque[:, k], **style)
-    axes[0].set(
-        ylabel="link angle minus reference [arcmin]", title=f"seed {seed}: error"
-    )
+    what = "tool error" if tuned.unit == "mm" else "link angle minus reference"
+    axes[0].set(ylabel=f"{what} [{tuned.unit}]", title=f"seed {seed}: error")
+    first = " of the first joint" if tuned.unit == "mm" else ""
     axes[1].set(
-        ylabel="motor torque [N·m]", title=f"seed {seed}: motor torque and reference"
+        ylabel="motor torque [N·m]",
+        title=f"seed {seed}: motor torque and reference{first}",
     )
     other = axes[1].twinx()
     trace = tuned.best.trace
@@ -181,7 +185,9 @@ def _plain_ticks(ax: Any) -> None:
 
 
 def _colored(tuned: Tuned) -> list[tuple[GainCandidate, str]]:
-    colors = COLORS if len(tuned.candidates) > 2 else (COLORS[0], COLORS[3])
+    colors = (COLORS[0], *COLORS[1:-1][-(len(tuned.candidates) - 2) :], COLORS[-1])
+    if len(tuned.candidates) == 2:
+        colors = (COLORS[0], COLORS[-1])
     return list(zip(tuned.candidates, colors, strict=True))
 
 
@@ -193,9 +199,9 @@ def _summary(tuned: Tuned) -> Table:
         rows.append(
             [
                 Cell(one.name, "text"),
-                *[Cell(format_figure(float(x / arcmin))) for x in costs],
+                *[Cell(format_figure(float(x / tuned.unit_size))) for x in costs],
                 Cell("-" if one is tuned.baseline else f"{saved:.1f}"),
-                Cell(str(one.to_json()["broken_limits"])),
+                Cell(str(one.broken)),
             ]
         )
     s = tuned.settings
@@ -203,27 +209,39 @@ def _summary(tuned: Tuned) -> Table:
     return Table(
         header=[
             ("controller", ""),
-            ("cost, held-out seeds", "arcmin"),
-            ("standard deviation", "arcmin"),
-            ("cost, training seeds", "arcmin"),
-            ("reduction relative to the textbook rule", "%"),
+            ("cost, held-out seeds", tuned.unit),
+            ("standard deviation", tuned.unit),
+            ("cost, training seeds", tuned.unit),
+            (f"reduction relative to {tuned.baseline.name}", "%"),
             ("held-out episodes that exceed a limit", f"of {s.held_out}"),
         ],
         rows=rows,
         notes=[
-            "The cost of an episode is the square root of the mean of e² + s² w u²,"
-            " with the error e of the link angle, the ratio u of the motor torque to"
-            f" its limit, s = {tuned.error_scale / arcmin:g} arcmin and"
+            "The cost of an episode is s times the square root of the mean of q + w u,"
+            " where 1/(1 + q) - w u is the reward, with"
+            f" s = {tuned.error_scale / tuned.unit_size:g} {tuned.unit} and"
             f" w = {tuned.effort_weight:g}. It is at most"
-            f" {tuned.worst / arcmin:.0f} arcmin.",
-            "The textbook rule sets the natural frequency to one third of the"
-            " anti-resonance of the nominal link on its drive"
-            f" ({tuned.anti_resonance:.3g} Hz) and the damping ratio to 0.7.",
+            f" {tuned.worst / tuned.unit_size:.0f} {tuned.unit}.",
+            _on_baseline(tuned),
             f"Settings of the environment: {plant}."
             f" Optimiser {s.optimiser}, seed {s.seed},"
             f" {sum(x.evaluations for x in tuned.searches.values())} candidates,"
             f" {tuned.wall:.0f} s.",
         ],
+    )
+
+
+def _on_baseline(tuned: Tuned) -> str:
+    """What the baseline is, as text."""
+    if not tuned.baseline.values:
+        return (
+            "The baseline is the motor loop of the environment alone. The torques of"
+            " the controllers are added to it."
+        )
+    return (
+        "The textbook rule sets the natural frequency to one third of the"
+        " anti-resonance of the nominal link on its drive"
+        f" ({tuned.anti_resonance:.3g} Hz) and the damping ratio to 0.7."
     )
 
 
@@ -257,7 +275,7 @@ def _gains(tuned: Tuned) -> Table:
 def _by_seed(tuned: Tuned) -> Table:
     rows = []
     for k, seed in enumerate(tuned.settings.seeds[1]):
-        costs = [float(one.held_out[k] / arcmin) for one in tuned.candidates]
+        costs = [float(x.held_out[k] / tuned.unit_size) for x in tuned.candidates]
         better = costs[-1] < costs[0]
         rows.append(
             [
@@ -269,27 +287,23 @@ def _by_seed(tuned: Tuned) -> Table:
                 ),
             ]
         )
-    names = [(one.name, "arcmin") for one in tuned.candidates]
+    names = [(one.name, tuned.unit) for one in tuned.candidates]
     return Table(
         title="Cost by held-out seed",
-        header=[("seed", ""), *names, ("reduction relative to the textbook rule", "%")],
+        header=[
+            ("seed", ""),
+            *names,
+            (f"reduction relative to {tuned.baseline.name}", "%"),
+        ],
         rows=rows,
     )
 
 
-def _best_place(tuned: Tuned) -> list[float]:
-    """Positions of the tuned parameters between their bounds, logarithmic, 0 to 1."""
-    values = tuned.best.values
-    return [
-        float(np.log(values[p.key] / p.low) / np.log(p.high / p.low))
-        for p in tuned.parameters
-    ]
-
-
-def _cost(one: GainCandidate) -> str:
+def _cost(tuned: Tuned, one: GainCandidate) -> str:
     """Mean and standard deviation of the held-out costs as text."""
-    mean, spread = one.held_out.mean() / arcmin, one.held_out.std(ddof=1) / arcmin
-    return f"{mean:.3g} ± {spread:.2g} arcmin"
+    mean, spread = one.held_out.mean(), one.held_out.std(ddof=1)
+    size = tuned.unit_size
+    return f"{mean / size:.3g} ± {spread / size:.2g} {tuned.unit}"
 
 
 def _less(tuned: Tuned, one: GainCandidate) -> str:
