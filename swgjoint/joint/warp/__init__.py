@@ -21,9 +21,16 @@ so that every world may have its own specimens::
 
 The law is evaluated in double precision, but the engine's state has single precision:
 the relative rounding error of a position is 6e-8, which causes torque noise of about
-K times 1e-7 rad at an output angle of 1 rad and stiffness K. The time of a world must
-increase in every step, because it distinguishes a step from a repeated ``forward`` and
-from a reset; in single precision it does so for about 1e7 steps.
+K times 1e-7 rad at an output angle of 1 rad and stiffness K. A joint that follows a
+reference of ``JointTracking`` stays within 2e-7 rad (torsion) and 1e-6 rad (output) of
+MuJoCo with the plugin for one second, with hysteresis and friction. Free motion adds up
+the rounding of the rotor's angle: after one second and up to 15 rad of the output, the
+torsion differs by 4e-6 to 2.5e-5 rad; the plugin in double precision whose state is
+rounded to single precision after every step differs by 4e-6 to 8e-6 rad.
+
+The time of a world must increase in every step, because it distinguishes a step from a
+repeated ``forward`` and from a reset; in single precision it does so for about 1e7
+steps.
 """
 
 from __future__ import annotations
