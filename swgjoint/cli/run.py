@@ -11,7 +11,12 @@ from swgjoint.cli.shared.arm_arguments import (
     choice_lines,
     scene_of,
 )
-from swgjoint.cli.shared.life_text import bearing_lines, gauge_lines, life_lines
+from swgjoint.cli.shared.life_text import (
+    bearing_lines,
+    gauge_lines,
+    life_lines,
+    thermal_lines,
+)
 from swgjoint.cli.shared.model_text import (
     assumed_lines,
     left_out_lines,
@@ -185,6 +190,7 @@ def report(result: dict[str, Any]) -> str:
         *life_lines(result),
         *bearing_lines(result),
         *gauge_lines(result),
+        *thermal_lines(result),
         *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
         f"model: degrees of freedom: {contains['degrees_of_freedom']}, tendons:"
         f" {contains['tendons']}, plugin instances: {contains['plugin_instances']};"

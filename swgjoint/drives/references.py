@@ -64,12 +64,15 @@ def drive_of(
     if section.hysteresis is False and drive.hysteresis:
         info = {**drive.info, "hysteresis_left_out": len(drive.hysteresis)}
         drive = replace(drive, hysteresis=(), info=info)
-    if section.temperature_C is not None:
+    key, celsius = "temperature_C", section.temperature_C
+    if celsius is None and section.thermal is not None:
+        key, celsius = "thermal.ambient_C", section.thermal.ambient_C
+    if celsius is not None:
         where = f"joints.{joint}." if joint else ""
         drive = at_temperature(
             drive,
-            section.temperature_C + ZERO_CELSIUS,
-            where=f"{where}temperature_C = {section.temperature_C:g} °C",
+            celsius + ZERO_CELSIUS,
+            where=f"{where}{key} = {celsius:g} °C",
         )
     tolerance = section.harmonics_tolerance_arcmin
     if tolerance is None or section.level in WITHOUT_HARMONICS:

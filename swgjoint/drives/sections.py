@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from swgjoint.drives.thermal_section import ThermalSection
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, shorten
 from swgjoint.gear.bearing.output_bearing import OutputBearing, catalogue_bearing
@@ -331,6 +332,10 @@ class JointSection(Section):
     native and full. The drive must state its friction over temperature: a design with
     ``[losses]``, a map built from one, or a catalogue drive with stated losses. By
     default, the friction is that of the drive, at +20 °C in catalogues."""
+    thermal: ThermalSection | None = None
+    """Warming of the drive by its own losses at level full, from ``temperature_C`` on;
+    by default the temperature is constant. The drive must state its friction over
+    temperature."""
     harmonics_tolerance_arcmin: Positive | None = None
     """Tolerance for omitting harmonics [arcmin]: at constant torque, the omitted
     harmonics together turn the output by less than this, see

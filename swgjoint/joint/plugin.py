@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -19,6 +20,9 @@ from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import vary_with_load, yield_table
+
+if TYPE_CHECKING:
+    from swgjoint.joint.drive import JointDrive
 
 NUMERICAL_DAMPING = 0.1
 """Coefficient nu1 of the numerical damping of unresolved torsion modes [-].
@@ -258,3 +262,46 @@ def require_metric() -> None:
             "integrator RK4 and a step below 0.3 divided by the fastest torsion "
             "frequency [rad/s]"
         )
+
+
+_WIDTH = 24
+"""Characters of a number in reserved text: the most that its shortest text has."""
+
+
+def _wide(drive: DriveMap) -> str:
+    """Numbers of the attribute ``friction`` as text whose length is always the same."""
+    return " ".join(f"{x!r:>{_WIDTH}}" for x in friction_numbers(drive).tolist())
+
+
+def reserve_friction(spec: mujoco.MjSpec, drive: JointDrive) -> None:
+    """Write the friction of an attached drive as text that any other friction fits.
+
+    Args:
+        spec: Model before compilation.
+        drive: A drive of level ``full`` with friction.
+    """
+    [instance] = [one for one in spec.plugins if one.name == drive.plugin]
+    instance.config = {**instance.config, "friction": _wide(drive.drive)}
+
+
+def replace_friction(
+    model: mujoco.MjModel, name: str, old: DriveMap, new: DriveMap
+) -> None:
+    """Replace the friction of a drive in a compiled model.
+
+    Data made from the model afterwards use the new friction; existing data do not.
+
+    Args:
+        model: Model whose friction :func:`reserve_friction` prepared.
+        name: Name of the plugin instance.
+        old: Map with the present friction.
+        new: Map with the new friction.
+    """
+    instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, name)
+    first = int(model.plugin_attradr[instance])
+    texts = model.plugin_attr[first:].tobytes()
+    sought = b"\0" + _wide(old).encode() + b"\0"
+    at = texts.find(sought)
+    assert at >= 0, "the friction of the instance is not the old one"
+    text = np.frombuffer(_wide(new).encode(), np.int8)
+    model.plugin_attr[first + at + 1 : first + at + 1 + text.size] = text

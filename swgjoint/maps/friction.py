@@ -36,6 +36,7 @@ Source:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -139,6 +140,39 @@ class Friction:
         return float(np.copysign(slip, speed)) + self.viscous * speed
 
 
+class FrictionCourse:
+    """Friction whose parameters change along a history, as the temperature does."""
+
+    def __init__(self, laws: Sequence[Friction], index: NDArray[np.intp]) -> None:
+        """Take the parameters of every sample from one of the laws.
+
+        Args:
+            laws: Friction laws.
+            index: Law of each sample. Shape (n,).
+        """
+
+        def course(key: str) -> Array:
+            return np.array([float(getattr(law, key)) for law in laws])[index]
+
+        self.stiffness, self.damping = course("stiffness"), course("damping")
+        self.viscous, self._load = course("viscous"), course("load")
+        self._coulomb, self._static = course("coulomb"), course("static")
+        self._bending, self._stribeck = course("bending"), course("stribeck_speed")
+
+    def yield_torque(self, speed: ArrayLike, input_torque: ArrayLike) -> Array:
+        """Torque at which the bristle slips, see :meth:`Friction.yield_torque` [N·m].
+
+        Args:
+            speed: Relative speed nu [rad/s]. Shape (n,).
+            input_torque: Elastic torque on the input, T/i [N·m]. Shape (n,).
+        """
+        x = np.asarray(speed, float) / self._stribeck
+        more = (self._static - self._coulomb) * np.exp(-(x**2))
+        return np.asarray(
+            self._bending + self._coulomb + more + self._load * np.abs(input_torque)
+        )
+
+
 def play_friction(
     friction: Friction, rotation: Array, speed: Array, input_torque: Array
 ) -> Array:
@@ -152,22 +186,51 @@ def play_friction(
         speed: Relative speed nu [rad/s]. Shape (n,).
         input_torque: Elastic torque on the input, T/i [N·m]. Shape (n,).
     """
+    return continue_friction(friction, rotation, speed, input_torque)[0]
+
+
+def continue_friction(
+    friction: Friction | FrictionCourse,
+    rotation: Array,
+    speed: Array,
+    input_torque: Array,
+    rest: float | None = None,
+) -> tuple[Array, float]:
+    """Friction torque F along a history, and where its bristle was relaxed.
+
+    Args:
+        friction: Friction parameters.
+        rotation: Relative rotation beta [rad]. Shape (n,).
+        speed: Relative speed nu [rad/s]. Shape (n,).
+        input_torque: Elastic torque on the input, T/i [N·m]. Shape (n,).
+        rest: Rotation at which the bristle is relaxed at the start [rad]; None if that
+            is the first one.
+
+    Returns:
+        Friction torques [N·m], shape (n,), and the rotation at which the bristle was
+        relaxed before the last sample [rad], with which a history may continue there.
+    """
     reach = friction.yield_torque(speed, input_torque) / friction.stiffness
-    stretch, slips = play_bristle(rotation, reach)
+    stretch, slips = play_bristle(rotation, reach, rest)
     creep = np.where(slips, 0.0, friction.damping * np.asarray(speed))
-    return np.asarray(friction.stiffness * stretch + creep + friction.viscous * speed)
+    torque = friction.stiffness * stretch + creep + friction.viscous * speed
+    return np.asarray(torque), float((rotation - stretch)[-2:][0])
 
 
-def play_bristle(rotation: Array, reach: Array) -> tuple[Array, NDArray[np.bool_]]:
+def play_bristle(
+    rotation: Array, reach: Array, rest: float | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
     """Bristle stretch z along a history [rad] and whether it slips. Shapes (n,).
 
     Args:
-        rotation: Relative rotation beta; the bristle is relaxed at the first sample
-            [rad]. Shape (n,).
+        rotation: Relative rotation beta [rad]. Shape (n,).
         reach: Largest stretch at each sample [rad]. Shape (n,).
+        rest: Rotation at which the bristle is relaxed at the start [rad]; None if that
+            is the first one.
     """
     stretch, slips = np.empty(len(rotation)), np.zeros(len(rotation), dtype=bool)
-    rest = float(rotation[0]) if len(rotation) else 0.0
+    if rest is None:
+        rest = float(rotation[0]) if len(rotation) else 0.0
     for k, (x, r) in enumerate(zip(rotation.tolist(), reach.tolist(), strict=True)):
         slips[k] = abs(x - rest) > r
         rest = min(max(rest, x - r), x + r)

@@ -46,6 +46,7 @@ from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.run_memory import require_run_memory
 from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.thermal import reserve_friction
 from swgjoint.typing import Array
 
 
@@ -204,6 +205,7 @@ def assemble(
         transmission_of(attached[name], fittings[name].drive) for name in arm.joints
     )
 
+    reserve_friction(spec, sections, attached)
     bearings = output_bearings(scene, dict(zip(arm.joints, sections, strict=True)))
     add_tilt_hinges(spec, bearings)
 

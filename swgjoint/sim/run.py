@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.figures.metrics import run_metrics
 from swgjoint.sim.life.loads import TaskLoads
 from swgjoint.sim.life.motion_loads import motion_loads
+from swgjoint.sim.thermal import HeatCourse
 from swgjoint.typing import Array
 
 
@@ -76,6 +77,8 @@ class Run:
     """Tilt speeds [rad/s]. Shape of ``tilt``."""
     recording: Path | None = None
     """File of the recording for the viewer; None if none was written."""
+    heat: dict[str, HeatCourse] = field(default_factory=dict)
+    """Temperature and losses of the drives that warm, by joint."""
     cycle: tuple[TaskLoads, ...] = ()
     """Loads by task of the duty cycle; empty if the scene has none."""
 

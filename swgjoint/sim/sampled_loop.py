@@ -21,6 +21,7 @@ from swgjoint.units import arcsec
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
+    from swgjoint.sim.thermal import Warming
 
 
 _CHUNK = 1000  # recorded states between two progress reports
@@ -280,7 +281,8 @@ def run_sampled(
     data: mujoco.MjData,
     inputs: Array,
     *,
-    check: Callable[[Array], None],
+    warming: Warming,
+    check: Callable[[mujoco.MjData, Array], None],
     progress: Callable[[int], None],
 ) -> tuple[Array, Array, Array]:
     """Step the engine and evaluate the loop once per control period.
@@ -288,10 +290,12 @@ def run_sampled(
     Args:
         assembly: The compiled scene.
         loop: The control law.
-        data: Engine data in the initial state; left in the final state.
+        data: Engine data in the initial state.
         inputs: Actuator inputs without the torques of the loop. Shape (n_steps,
             n_inputs).
-        check: Called with the states recorded since its last call.
+        warming: Temperatures of the drives, updated at its intervals.
+        check: Called with the engine's data and the states recorded since its last
+            call.
         progress: Called with the number of completed engine steps.
 
     Returns:
@@ -307,7 +311,7 @@ def run_sampled(
     flexible = np.flatnonzero(assembly.motor_position >= 0)
     motor_q = assembly.motor_position[flexible]
     motor_v = assembly.motor_velocity[flexible]
-    ratio, checked = assembly.ratio, 0
+    ratio, checked, warmed = assembly.ratio, 0, 0
     mujoco.mj_getState(model, data, states[0], _STATE)
     rates[0] = data.qvel[assembly.link_velocity]
     for k in range(n):
@@ -317,8 +321,8 @@ def run_sampled(
         theta[k, flexible] = data.qpos[motor_q]
         theta_rate[k, flexible] = data.qvel[motor_v]
         if loop.senses_torque:
-            for j, transmission in enumerate(assembly.transmissions):
-                torque[k, j] = transmission.attached.observe(model, data).torque
+            for j, attached in enumerate(warming.attached):
+                torque[k, j] = attached.observe(model, data).torque
         wanted[k + 1] = (
             loop.torque(k, theta, psi, theta_rate, torque)
             if k % loop.every == 0
@@ -331,9 +335,14 @@ def run_sampled(
         done = (k + 1) // parts
         if (k + 1) % parts == 0:
             mujoco.mj_getState(model, data, states[done], _STATE)
-            if done % _CHUNK == 0 or k + 1 == n:
-                check(states[checked + 1 : done + 1])
+            due = warming.every and (done % warming.every == 0 or k + 1 == n)
+            if done % _CHUNK == 0 or k + 1 == n or due:
+                check(data, states[checked + 1 : done + 1])
                 checked = done
                 progress(k + 1)
+            if due:
+                interval = states[warmed : done + 1]
+                model, data = warming.advance(model, data, interval)
+                warmed = done
     wanted[0] = wanted[min(1, n)]
     return states, rates, wanted

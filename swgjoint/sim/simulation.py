@@ -23,6 +23,7 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
+from swgjoint.sim.thermal import Warming
 from swgjoint.typing import Array
 
 _CHUNK = 1000  # approximate number of engine steps between two progress reports
@@ -130,6 +131,7 @@ def simulate(
     set_start(assembly, data)
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
+    warming = Warming(assembly)
 
     if assembly.loops.sampled:
         begin = time.perf_counter()
@@ -138,11 +140,12 @@ def simulate(
             loop or SampledLoop(assembly),
             data,
             inputs,
-            check=lambda new: _check_finite(assembly, data, new),
+            warming=warming,
+            check=lambda data, new: _check_finite(assembly, data, new),
             progress=lambda done: progress(f"run {name}", done, len(inputs)),
         )
         wall = time.perf_counter() - begin
-        return _recorded(assembly, name, states, rates, wall, wanted=wanted)
+        return _recorded(assembly, name, states, rates, wall, warming, wanted=wanted)
 
     # the engine's rollout runs without Python between steps and records every state
     steps, parts = len(inputs), assembly.sub_steps
@@ -151,7 +154,7 @@ def simulate(
     speeds = 1 + model.nq + assembly.link_velocity
     rates = np.empty((path.time.size, speeds.size))
     rates[0] = state[speeds]
-    chunk = parts * max(1, _CHUNK // parts)
+    chunk = parts * (warming.every or max(1, _CHUNK // parts))
     begin = time.perf_counter()
     with Rollout(nthread=0) as rollout:
         for first in range(0, steps, chunk):
@@ -167,8 +170,12 @@ def simulate(
             states[kept] = rolled[0, parts - 1 :: parts]
             rates[first + 1 : last + 1] = rolled[0][:, speeds]
             _check_finite(assembly, data, rolled[0])
+            if warming.every:
+                interval = states[first // parts : last // parts + 1]
+                model, data = warming.advance(model, data, interval)
             progress(f"run {name}", last, steps)
-    return _recorded(assembly, name, states, rates, time.perf_counter() - begin)
+    wall = time.perf_counter() - begin
+    return _recorded(assembly, name, states, rates, wall, warming)
 
 
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
@@ -213,6 +220,7 @@ def _recorded(
     states: Array,
     rates: Array,
     wall: float,
+    warming: Warming,
     *,
     wanted: Array | None = None,
 ) -> Run:
@@ -224,6 +232,7 @@ def _recorded(
         states: Full engine states, one per step of the scene. Shape (n, n_state).
         rates: Link speeds at every engine step [rad/s]. Shape (n_steps + 1, n_joints).
         wall: Wall time of all steps [s].
+        warming: Temperatures of the drives during the run.
         wanted: Motor torque that a sampled loop requested at every engine step [N·m],
             shape (n_steps + 1, n_joints); None for the engine's own loops.
     """
@@ -273,6 +282,7 @@ def _recorded(
             position[:, j] - ahead * velocity[:, j],
             theta_rate[:, j],
             velocity[:, j],
+            course=warming.course(int(j)),
         )
         torsion[:, j], error[:, j] = signals.torsion, signals.transmission_error
         output[:, j] = signals.torque
@@ -299,6 +309,7 @@ def _recorded(
         wall=wall,
         tilt=q[:, assembly.tilt_position],
         tilt_velocity=v[:, assembly.tilt_velocity],
+        heat=warming.heat(),
     )
 
 

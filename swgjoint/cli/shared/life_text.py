@@ -1,4 +1,4 @@
-"""Life over the duty cycle, output bearings and strain gauges in terminal output."""
+"""Life, output bearings, strain gauges and temperatures in terminal output."""
 
 from __future__ import annotations
 
@@ -34,6 +34,20 @@ def gauge_lines(result: dict[str, Any]) -> list[str]:
     from swgjoint.view.gauges import GAUGE_COLUMNS, gauge_grid, gauge_notes
 
     return [_grid(GAUGE_COLUMNS, gauge_grid(joints)), *gauge_notes(joints)]
+
+
+def thermal_lines(result: dict[str, Any]) -> list[str]:
+    """Format the temperatures of drives that warm; empty without any.
+
+    Args:
+        result: Figures of a run.
+    """
+    joints = result["joints"]
+    if not any("thermal" in joint for joint in joints.values()):
+        return []
+    from swgjoint.view.thermal import THERMAL_COLUMNS, thermal_grid
+
+    return [_grid(THERMAL_COLUMNS, thermal_grid(joints))]
 
 
 def life_lines(result: dict[str, Any]) -> list[str]:

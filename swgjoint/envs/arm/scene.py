@@ -30,6 +30,10 @@ def scene_of(settings: ArmSettings) -> Scene:
     for section in (scene.defaults, *scene.joints.values()):
         if section.output_bearing is not None:
             raise InputError(f"scene {scene.name!r} has output_bearing; accepted: none")
+        if section.thermal is not None:
+            raise InputError(
+                f"scene {scene.name!r} has thermal; accepted: a constant temperature_C"
+            )
     scene = scene.with_level(settings.level)  # type: ignore[arg-type]
     scene = scene.with_friction(bool(settings.friction))
     scene = scene.with_kinematic_error(settings.kinematic_error_arcmin)

@@ -56,6 +56,7 @@ def contents(assembly: Assembly) -> dict[str, Any]:
                 *_left_out(t),
                 *_off_damping(assembly, t),
                 *_tilt_damping(assembly, t.joint),
+                *_not_warming(assembly, t),
             )
         ],
         "absent": _absent(assembly),
@@ -102,6 +103,13 @@ def _features(assembly: Assembly) -> dict[str, Any]:
             }
             for name, one in assembly.gauges.items()
         }
+    thermal = {
+        t.joint: _set_keys(section.thermal)
+        for t in assembly.transmissions
+        if (section := scene.joint_settings(t.joint)).thermal and t.attached.friction
+    }
+    if thermal:
+        features["thermal"] = thermal
     if scene.payload is not None:
         features["payload"] = scene.payload.model_dump()
     if scene.sensors is not None:
@@ -156,6 +164,24 @@ def _tilt_damping(assembly: Assembly, joint: str) -> list[dict[str, str]]:
             " correct; use a shorter simulation.step_s",
         }
     ]
+
+
+def _not_warming(
+    assembly: Assembly, transmission: Transmission
+) -> list[dict[str, str]]:
+    """What the model omits of the warming that the scene describes."""
+    scene, attached = assembly.scene, transmission.attached
+    if scene.joint_settings(transmission.joint).thermal is None:
+        return []
+    if attached.friction is not None:
+        if not scene.cycle:
+            return []
+        part = "temperature at the end of one task at the start of the next"
+        return [{"part": part, "reason": "every task of the cycle starts anew"}]
+    reason = f"not at level {attached.level}; use joints.*.level = 'full'"
+    if attached.level == "full":
+        reason = "joints.*.friction = false"
+    return [{"part": "warming of the drive by its losses", "reason": reason}]
 
 
 def _set_keys(section: Section) -> dict[str, Any]:

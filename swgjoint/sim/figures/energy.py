@@ -26,6 +26,7 @@ from swgjoint.sim.scene.feature_sections import ToolForce
 from swgjoint.typing import Array
 
 if TYPE_CHECKING:
+    from swgjoint.sim.figures.transmission import Transmission
     from swgjoint.sim.run import Run
 
 
@@ -124,24 +125,55 @@ def dissipation(run: Run, j: int) -> float:
         run: The run.
         j: Index of the joint.
     """
-    transmission = run.assembly.transmissions[j]
+    return drive_loss(
+        run.assembly.transmissions[j],
+        torsion=run.torsion[:, j],
+        slipping=run.slipping_torque[:, j],
+        friction=run.friction_torque[:, j],
+        stored=run.hysteresis_energy[j],
+        theta=run.motor_position[:, j],
+        psi=run.position[:, j],
+        step=run.assembly.scene.simulation.step_s,
+    )
+
+
+def drive_loss(
+    transmission: Transmission,
+    *,
+    torsion: Array,
+    slipping: Array,
+    friction: Array,
+    stored: float,
+    theta: Array,
+    psi: Array,
+    step: float,
+) -> float:
+    """Energy that one drive dissipates during a record [J], as :func:`dissipation`.
+
+    Args:
+        transmission: The drive.
+        torsion: Torsion [rad]. Shape (n,).
+        slipping: Hysteresis torque along the torsion [N·m]. Shape (n,).
+        friction: Friction torque of the wave generator [N·m]. Shape (n,).
+        stored: Change of the energy stored in the hysteresis springs [J].
+        theta: Motor angles [rad]. Shape (n,).
+        psi: Link angles [rad]. Shape (n,).
+        step: Time between two samples [s].
+    """
     attached = transmission.attached
     if transmission.law is None:
         return 0.0
-    step = run.assembly.scene.simulation.step_s
-    twist = np.diff(run.torsion[:, j])
+    twist = np.diff(torsion)
     total = attached.damping / step * float(twist @ twist)
-    slipping = run.slipping_torque[:, j]
-    total += _work(slipping, run.torsion[:, j])
-    total -= run.hysteresis_energy[j]
-    turn = np.diff(run.motor_position[:, j])
+    total += _work(slipping, torsion)
+    total -= stored
+    turn = np.diff(theta)
     if attached.native is not None:
         total += attached.native.friction * float(np.abs(turn).sum())
         total += attached.native.viscous / step * float(turn @ turn)
     elif attached.friction is not None:
         by_theta, by_psi = transmission.drive.friction_direction
-        rotation = by_theta * run.motor_position[:, j] + by_psi * run.position[:, j]
-        total += _work(run.friction_torque[:, j], rotation)
+        total += _work(friction, by_theta * theta + by_psi * psi)
     return total
 
 

@@ -133,6 +133,11 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
             else {}
         ),
         **_gauges(run, j, rated),
+        **(
+            {"thermal": run.heat[run.joints[j]].figures()}
+            if run.joints[j] in run.heat
+            else {}
+        ),
         **({} if untold is None else {"missing": {"orders": untold}}),
     }
 

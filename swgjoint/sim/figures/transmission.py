@@ -10,8 +10,8 @@ from swgjoint.joint.drive import JointDrive, JointSignals
 from swgjoint.joint.native import native_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_error
-from swgjoint.maps.friction import play_friction
-from swgjoint.maps.hysteresis import play_hysteresis, stretches, vary_with_load
+from swgjoint.maps.friction import FrictionCourse, continue_friction
+from swgjoint.maps.hysteresis import stretches, vary_with_load
 from swgjoint.typing import Array
 
 _CHUNK = 1024  # samples per call: the coefficient table of a chunk fits in the cache
@@ -19,6 +19,16 @@ STIFF = 1e3
 """Stiffness of the map that represents a drive without torsion, relative to the
 stiffness of the drive itself. The torsion of this map is about 0.01 arcmin at rated
 torque, which is negligible but well above round-off."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rests:
+    """Where hysteresis elements and the friction bristle of a drive are relaxed."""
+
+    elements: tuple[float, ...] = ()
+    """Torsion at which each element is relaxed [rad]."""
+    bristle: float | None = None
+    """Rotation beta at which the bristle is relaxed [rad]; None without friction."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,6 +39,11 @@ class PlayedSignals(JointSignals):
     """Hysteresis torque along the torsion [N·m]."""
     friction: Array
     """Friction torque of the wave generator on the flexspline [N·m]."""
+    stored: float
+    """Change of the energy stored in the hysteresis springs over the record [J]."""
+    rests: Rests
+    """Where elements and bristle were relaxed before the last sample, with which a
+    record may continue there."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +98,14 @@ class Transmission:
         return replace(spring, level="rigid")
 
     def signals(
-        self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
+        self,
+        theta: Array,
+        psi: Array,
+        theta_rate: Array,
+        psi_rate: Array,
+        *,
+        course: FrictionCourse | None = None,
+        rests: Rests | None = None,
     ) -> PlayedSignals:
         """Torsion, transmission error and torques of recorded states.
 
@@ -96,6 +118,9 @@ class Transmission:
             psi: Link angles [rad]. Shape (n,).
             theta_rate: Motor speeds [rad/s]. Shape (n,).
             psi_rate: Link speeds [rad/s]. Shape (n,).
+            course: Friction that changes along the record; None for that of the drive.
+            rests: Where elements and bristle are relaxed before the record; None at
+                the start of a run.
         """
         evaluated = [
             self.attached.signals_and_law(
@@ -111,23 +136,30 @@ class Transmission:
         torsion = np.concatenate([p.torsion for p in pieces])
         torque = np.concatenate([p.torque for p in pieces])
         played, rubs = np.zeros((2, theta.size))
+        stored, ends, bristle = 0.0, [], None
         elements = self.attached.elements
         if elements:
             elastic = np.concatenate([law.torque for law in laws]) if laws else 0.0
-            played = play_hysteresis(
-                elements, torsion - self._relaxed(torsion), elastic
-            )
+            relaxed = self._relaxed(torsion)
+            begins = rests.elements if rests else len(elements) * (relaxed,)
+            for element, rest in zip(elements, begins, strict=True):
+                stretch = stretches(torsion - rest, element.reach(elastic))
+                played += element.stiffness * stretch
+                change = stretch[-1] ** 2 - stretch[0] ** 2
+                stored += 0.5 * element.stiffness * float(change)
+                ends.append(float((torsion - stretch)[-2:][0]))
             # torque on the link per torque along the torsion
             slope = -np.concatenate([law.by_psi for law in laws]) if laws else 1.0
             torque = torque + played * slope
         friction = self.attached.friction
         if friction is not None:
             by_theta, by_psi = self.drive.friction_direction
-            rubs = play_friction(
-                friction,
+            rubs, bristle = continue_friction(
+                course or friction,
                 by_theta * theta + by_psi * psi,
                 by_theta * theta_rate + by_psi * psi_rate,
                 torque / self.ratio,
+                rests.bristle if rests else None,
             )
             torque = torque - by_psi * rubs
         return PlayedSignals(
@@ -136,6 +168,8 @@ class Transmission:
             torque=torque,
             slipping=played,
             friction=rubs,
+            stored=stored,
+            rests=Rests(elements=tuple(ends), bristle=bristle),
         )
 
     def hysteresis_energy_change(

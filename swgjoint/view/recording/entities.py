@@ -16,6 +16,7 @@ If a recording contains several runs, ``<run>/`` precedes these entity paths:
   ``position_deg``                     link angle
   ``reference_deg``                    commanded link angle
   ``gauge_torque_Nm``                  torque that strain gauges read, if there are any
+  ``temperature_C``                    temperature of the drive, if it warms
 ``joint/<joint>/ripple_orders``        ripple amplitude over order per input turn,
                                        static
 ``tool/error_mm``                      distance from the commanded path, or from the
@@ -86,7 +87,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
     Returns:
         Arrays of shape (n_samples,).
     """
-    reading = run.gauge_torque(j)
+    reading, heat = run.gauge_torque(j), run.heat.get(run.joints[j])
     return {
         "output_torque_Nm": run.output_torque[part, j],
         "torque_deviation_Nm": torque_deviation(run, j, part),
@@ -96,6 +97,7 @@ def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
         "position_deg": run.position[part, j] / deg,
         "reference_deg": run.reference[part, j] / deg,
         **({} if reading is None else {"gauge_torque_Nm": reading[part]}),
+        **({} if heat is None else {"temperature_C": heat.celsius_at(run.time[part])}),
     }
 
 

@@ -28,6 +28,7 @@ from swgjoint.view.report.tables import (
     summary_table,
     versions_table,
 )
+from swgjoint.view.thermal import thermal_picture, thermal_tables
 from swgjoint.view.validity import step_error
 from swgjoint.view.words import short
 
@@ -103,7 +104,12 @@ def write_report(
         description=scene.description,
         alerts=alerts(runs),
         summary=summary or summary_table(runs),
-        tables=[*life_tables(runs), *bearing_tables(runs), *gauge_tables(runs)],
+        tables=[
+            *life_tables(runs),
+            *bearing_tables(runs),
+            *gauge_tables(runs),
+            *thermal_tables(runs),
+        ],
         pictures={
             **(pictures or {}),
             **{
@@ -115,6 +121,11 @@ def write_report(
                 f"Strain gauges of {label}": gauge_picture(run)
                 for label, run in runs.items()
                 if run.assembly.gauges
+            },
+            **{
+                f"Temperatures of {label}": thermal_picture(run)
+                for label, run in runs.items()
+                if run.heat
             },
         },
         labels=labels,
