@@ -303,8 +303,13 @@ std::vector<double> ToothSearch::elastic_gaps(const std::vector<Vec>& points,
       gaps.push_back(kInfinity);
       continue;
     }
+    // a foot near a close point has almost its radius; far from ends there is one
+    const double start = interpolate(radii_, stations_, samples_, size(there));
+    const bool close = !beside && !rigid() && known > -limit;
     const Vec outward = samples.at[i].normal;
-    gaps.push_back(see(points[i], outward, pose, rigid(), nullptr, 2).foot.gap);
+    gaps.push_back(see(points[i], outward, pose, rigid(), close ? &start : nullptr,
+                       close ? 3 : 2)
+                       .foot.gap);
   }
   return gaps;
 }
