@@ -148,12 +148,12 @@ def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
     # S and H map a rotation to motions and to changes of force
     s = -spin(frames.position).reshape(n, 3 * m, 3)
     h = -spin(force.reshape(n, m, 3)).reshape(n, 3 * m, 3)
-    ks = np.einsum("ij,sjw->siw", segment.stiffness, s)
-    middle = np.einsum("siw,siv->swv", s, ks)
-    geometric = np.einsum("siw,siv->swv", h, s)
+    ks = segment.stiffness @ s
+    middle = s.transpose(0, 2, 1) @ ks
+    geometric = h.transpose(0, 2, 1) @ s
     middle -= 0.5 * (geometric + geometric.transpose(0, 2, 1))
     # everything but K has G on one side: T = K + U G + (U G)^T
-    u = h - ks + 0.5 * np.einsum("swi,swv->siv", g, middle)
+    u = h - ks + 0.5 * (g.transpose(0, 2, 1) @ middle)
     outer = u @ g
     return np.asarray(segment.stiffness + outer + outer.transpose(0, 2, 1))
 

@@ -148,11 +148,11 @@ def linearise(
         gradient[:, dofs] += rotate_to_global(frame, project_to_frames(frame, elastic))
         if hessian is not None:
             local = matrices_in_global(frame, stiffness(segment, frame, total))
-            hessian[:, dofs[:, None], dofs] += local
+            _add(hessian, dofs, local)
     into, held = model.contact_dofs, bore.inverse @ bore.rows
     pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
     if hessian is not None:
-        hessian[:, into[:, None], into] += bore.rows.transpose(0, 2, 1) @ held
+        _add(hessian, into, bore.rows.transpose(0, 2, 1) @ held)
     race = None
     if model.race is not None and state.race is not None:
         race, dofs = (
@@ -161,7 +161,7 @@ def linearise(
         )
         gradient[:, dofs] += race.gradient
         if hessian is not None:
-            hessian[:, dofs[:, None], dofs] += race.hessian
+            _add(hessian, dofs, race.hessian)
     return SolidLinearised(
         frames=frames,
         gradient=gradient,
@@ -170,6 +170,22 @@ def linearise(
         bore=bore,
         race=race,
     )
+
+
+def _add(matrix: Array, dofs: Index, blocks: Array) -> None:
+    """Add blocks (N, k, k) to the rows and columns of degrees of freedom (k,).
+
+    The degrees of freedom form a few runs: slices are faster than indices.
+    """
+    breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
+    begin, end = np.concatenate([[0], breaks]), np.append(breaks, len(dofs))
+    runs = [
+        (slice(dofs[i], dofs[j - 1] + 1), slice(i, j))
+        for i, j in zip(begin, end, strict=True)
+    ]
+    for row, i in runs:
+        for column, j in runs:
+            matrix[:, row, column] += blocks[:, i, j]
 
 
 def bore_contact(
