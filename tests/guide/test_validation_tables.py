@@ -1,10 +1,13 @@
-"""Tables of the validation pages are those of the files that commands write."""
+"""Tables of the validation pages are those of commands, at known commits."""
 
 from __future__ import annotations
 
 import json
 import re
+import subprocess
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "notebooks" / "guide" / "validation" / "calculix.md"
@@ -58,3 +61,38 @@ def test_table_of_calculix():
     ]
     (stated,) = re.findall(r"differs by at most ([\d.]+) µm", flat)
     assert f"{max(finest):.2f}" == stated
+
+
+COMMIT = r" at commit ([0-9a-f]{12})\b"
+CAPTION = re.compile(r"\*(?=.*`.+`).* on \d{4}-\d\d-\d\d\b.*" + COMMIT + r".*:\*")
+"""Command, date and commit of a table."""
+PAGES = [*sorted(PAGE.parent.glob("*.md")), PAGE.parents[1] / "benchmarks.md"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_tables_have_captions(page):
+    """Every table says by which command, when and at which commit it was measured."""
+    lines = [line for line in page.read_text("utf-8").splitlines() if line]
+    heads = [k - 1 for k, line in enumerate(lines) if re.match(r"\|[ -]*---", line)]
+    above = [next(x for x in lines[k - 1 :: -1] if x[:4] != "<!--") for k in heads]
+    bare = [
+        lines[k] for k, x in zip(heads, above, strict=True) if not CAPTION.fullmatch(x)
+    ]
+    assert bare == []
+
+
+def test_commits_of_captions_exist():
+    """A reader finds the code with which a table was measured."""
+
+    def git(*arguments):
+        return subprocess.run(
+            ["git", *arguments], cwd=ROOT, capture_output=True, text=True, timeout=20
+        )
+
+    found = git("rev-parse", "--is-shallow-repository")
+    if found.stdout.strip() != "false":
+        pytest.skip("no history of commits here")
+    named = {c for page in PAGES for c in re.findall(COMMIT, page.read_text("utf-8"))}
+    within = {c: git("merge-base", "--is-ancestor", c, "HEAD") for c in sorted(named)}
+    lost = [c for c, found in within.items() if found.returncode]
+    assert lost == []
