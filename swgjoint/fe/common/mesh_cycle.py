@@ -14,7 +14,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.angle_columns import AngleColumn
 from swgjoint.fe.common.clearance import FAINT
 from swgjoint.fe.common.following import AnyState, Follower
-from swgjoint.fe.common.torque_choice import unseen_places
+from swgjoint.fe.common.torque_choice import Ripple, no_ripple, unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
 from swgjoint.maps.samples import FullSolves
@@ -115,6 +115,7 @@ def solve_mesh_cycle(
     symmetric: bool,
     tick: Callable[[], None],
     keep: Unfinished | None = None,
+    ripple: Callable[[float], Ripple] = lambda top: no_ripple,
 ) -> Pattern[AnyState]:
     """Pattern of a drive, sampled at as many angles and torques as it needs.
 
@@ -140,6 +141,9 @@ def solve_mesh_cycle(
         tick: Called after every solve.
         keep: Store of equilibria, from which an interrupted run resumes; None stores
             none.
+        ripple: Function that takes the largest torque that was solved at all initial
+            angles [N·m] and returns lower bounds of the peak-to-peak values by which
+            the errors between samples are divided.
 
     Returns:
         The sampled pattern.
@@ -162,6 +166,7 @@ def solve_mesh_cycle(
             f"no equilibrium under the smallest torque, {min(torques, key=abs):g} N·m"
             f" (largest: {max(torques, key=abs):g} N·m)"
         )
+    grid.ripple = ripple(max(abs(t) for t in grid.levels))
     info = _checks(grid, effort.angles, rated, symmetric=symmetric)
     # validation angles, which are not sampled
     places = unseen_places(effort.unseen[1], effort.most_angles)
@@ -299,7 +304,7 @@ def _can_double(
     grid: ColumnGrid[AnyState], effort: Effort, count: int, reserved: int
 ) -> bool:
     """Whether the budget allows twice the angles, the new ones with one more torque."""
-    solves = grid.solves + grid.cost(count) + count
+    solves = grid.solves + count * (2 + len(grid.levels))
     fits = solves <= _budget(grid, effort, count, reserved)
     return 2 * count <= effort.most_angles and fits
 

@@ -12,14 +12,10 @@ from typing import Any
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import FAINT, HELD
 from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
-from swgjoint.fe.common.stress_state import stress_state_label
+from swgjoint.fe.common.torque_choice import Ripple
+from swgjoint.fe.label import label_of
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import (
-    carries_bearing,
-    in_plane,
-    sector_model,
-    unmodelled_parts,
-)
+from swgjoint.fe.plane.drive2d import in_plane, sector_model
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.shape_fields import (
     SectorFields,
@@ -32,15 +28,16 @@ from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerances.rest import SMALL
-from swgjoint.fe.tolerances.sampling import STAGES, sample_tolerances
+from swgjoint.fe.tolerances.ripple import ripple_with_errors
+from swgjoint.fe.tolerances.sampling import sample_tolerances, stage_name
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.gear.kinematics import angle_coefficients
-from swgjoint.gear.mounting import series_compliance, springs_of
+from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.worst_positions import worst_positions
-from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.samples import MapSamples, ToleranceSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
@@ -61,6 +58,11 @@ changes between the samples [-]."""
 TOLERANCED_SOLVES = 1050
 """The same for a map with tooth errors, whose accuracy is limited by the harmonics that
 it leaves out."""
+TOLERANCED_ANGLES = 12
+"""Initial number of input positions over one pitch in a 2D map with tooth errors."""
+TOLERANCED_UNSEEN = (5, 3)
+"""Numbers of validation torques of one sign and of validation angles of the pattern of
+perfect teeth in a 2D map with tooth errors, whose accuracy is validated separately."""
 ANNOUNCED = 0.3
 """Fraction of the largest number of equilibria that is announced at first [-]. The
 announced number grows with the finished ones."""
@@ -150,8 +152,8 @@ def sample_map(
         model, angles, both_signs=not symmetric, errors=has_errors(design)
     )
     done, total = 0, int(ANNOUNCED * effort.solves)
-    stages = len(STAGES) if has_errors(design) else 1
-    stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
+    flawed = has_errors(design)
+    stage = stage_name(design, 0) if flawed else f"{drive.name}: equilibria"
 
     def tick() -> None:
         nonlocal done, total
@@ -159,7 +161,23 @@ def sample_map(
         total = min(effort.solves, max(total, int(1.2 * done)))
         progress(stage, min(done, total), total)
 
-    pattern, shown, surface = _solved(design, model, effort, tick, keep)
+    found: dict[float, ToleranceSamples] = {}
+
+    def with_errors(top: float) -> Ripple:
+        nonlocal stage
+        found[top] = sample_tolerances(
+            design,
+            repeated_peak=top,
+            rated_torque=ratings.rated_torque,
+            model=model,
+            progress=progress,
+            keep=keep,
+        )
+        stage = stage_name(design, -1)
+        return ripple_with_errors(found[top], design.periodicity)
+
+    options: dict[str, Any] = {"ripple": with_errors} if flawed else {}
+    pattern, shown, surface = _solved(design, model, effort, tick, keep, **options)
     _check_torques(design, pattern)
     # springs in series: the cup that the 2D model lacks, boss and housing
     series = series_compliance(design, cup=model == "2d")
@@ -188,7 +206,7 @@ def sample_map(
         info=pattern.info
         | {
             "design_hash": given.content_hash(),
-            "label": _label(given, model),
+            "label": label_of(given, model),
             "ratings_source": ratings.source,
             "truncated": pattern.truncated,
         },
@@ -199,16 +217,11 @@ def sample_map(
         samples = replace(samples, worst=worst)
     # fewer solves than announced may have been needed
     progress(stage, total, total)
-    if has_errors(design):
-        tolerances = sample_tolerances(
-            design,
-            repeated_peak=float(pattern.torque[-1]),
-            rated_torque=ratings.rated_torque,
-            model=model,
-            progress=progress,
-            keep=keep,
-        )
-        samples = replace(samples, tolerances=tolerances.in_series(series))
+    if flawed:
+        top = float(pattern.torque[-1])
+        if top not in found:  # a solve failed at the largest torque later
+            with_errors(top)
+        samples = replace(samples, tolerances=found[top].in_series(series))
     spent = {"solves": done, "sampling_wall_s": time.perf_counter() - begin}
     return replace(samples, info=samples.info | spent)
 
@@ -219,6 +232,7 @@ def _solved(
     effort: Effort,
     tick: Callable[[], None],
     keep: Unfinished | None,
+    **options: Any,
 ) -> tuple[Pattern[Any], Callable[[Any], SectorFields], ShapeSurface]:
     """Pattern of equilibria of a drive in the 2D or 3D model.
 
@@ -237,6 +251,7 @@ def _solved(
         "symmetric": design.wave_generator.kind in SYMMETRIC,
         "tick": tick,
         "keep": keep,
+        **options,
     }
     try:
         # two calls, because states of 2D and 3D models have different types
@@ -297,29 +312,6 @@ def _order(design: Design) -> tuple[int, int]:
     return (cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0])
 
 
-def _label(design: Design, model: str) -> dict[str, Any]:
-    """Validity label: what the samples of a model represent and what they neglect."""
-    plane = model == "2d"
-    return {
-        "model": model,
-        "level": "nonlinear",
-        "circular_spline": "elastic, outside " + design.circular_spline.outer_rim,
-        "cup": "closed-form torsion in series"
-        if plane and design.cup is not None
-        else None,
-        "bearing": "balls at rest on the cam, their passage left out"
-        if plane and carries_bearing(design)
-        else None,
-        "stress_state": stress_state_label(design) if plane else None,
-        "springs_Nm_rad": springs_of(design),
-        "friction": "left out of the potential; hysteresis of the 2d model"
-        if design.friction.tooth_coefficient
-        else None,
-        "tolerances": _named(design),
-        "left_out": unmodelled_parts(design, model),
-    }
-
-
 def effort_of(
     model: str, angles: int | None, *, both_signs: bool, errors: bool
 ) -> Effort:
@@ -333,7 +325,7 @@ def effort_of(
         errors: Whether manufacturing errors are superposed.
     """
     solid, chosen = model == "3d", angles is None
-    unseen = SOLID_UNSEEN if solid else UNSEEN
+    unseen = SOLID_UNSEEN if solid else TOLERANCED_UNSEEN if errors else UNSEEN
     if angles is not None:
         # a quick map is validated at the same number of torques but at fewer angles
         unseen = unseen[0], min(unseen[1], max(2, angles // 4))
@@ -341,7 +333,7 @@ def effort_of(
         most = angles
     else:
         solves = SOLID_SOLVES if solid else TOLERANCED_SOLVES if errors else SOLVES
-        angles = SOLID_ANGLES if solid else ANGLES
+        angles = SOLID_ANGLES if solid else TOLERANCED_ANGLES if errors else ANGLES
         most = angles
         while 2 * most <= (SOLID_MOST_ANGLES if solid else MOST_ANGLES):
             most *= 2
@@ -380,9 +372,3 @@ def _follower_3d(design: Design) -> SolidContinuation:
         ratio=design.ratio,
         layout=design.drive.layout,
     )
-
-
-def _named(design: Design) -> dict[str, float] | None:
-    """Nonzero tolerances of the drive, for the validity label."""
-    values = design.tolerances.model_dump()
-    return {k: v for k, v in values.items() if v} if has_errors(design) else None

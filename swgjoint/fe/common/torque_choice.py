@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.typing import Array
@@ -20,6 +23,16 @@ MISSED_JUMPS = 0.5
 """Largest number of jumps per angle at which the goal may be missed [-]."""
 MOST_MISSED = 0.04
 """Largest error at any jump, if permitted by the number of torques [-]."""
+
+
+Ripple = Callable[[ArrayLike], Array]
+"""Function that returns, at torques T [N·m] of any shape (...), peak-to-peak values of
+output error [rad] and input torque [N·m] over the angle (2, ...)."""
+
+
+def no_ripple(torque: ArrayLike) -> Array:
+    """No lower bound of the peak-to-peak values, see :data:`Ripple`."""
+    return np.zeros((2, *np.shape(torque)))
 
 
 def common_torques(

@@ -13,7 +13,13 @@ from swgjoint.fe.common.clearance import FAINT, add_clearance
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState
 from swgjoint.fe.common.load_path import LoadPath
-from swgjoint.fe.common.torque_choice import common_torques, periodic, unseen_parts
+from swgjoint.fe.common.torque_choice import (
+    Ripple,
+    common_torques,
+    no_ripple,
+    periodic,
+    unseen_parts,
+)
 from swgjoint.maps.fit.between_angles import (
     doubt_between,
     even_steps,
@@ -49,6 +55,9 @@ largest torque [-]. It exceeds the distance between neighbouring common torques.
 @dataclass(kw_only=True, eq=False)
 class ColumnGrid(SolvedColumns[AnyState]):
     """Columns of equilibria that are refined until they predict a map well enough."""
+
+    ripple: Ripple = no_ripple
+    """Lower bounds of the peak-to-peak values by which errors are divided."""
 
     def path(
         self, column: AngleColumn[AnyState], sign: float
@@ -108,13 +117,12 @@ class ColumnGrid(SolvedColumns[AnyState]):
     ) -> float:
         """Largest error at other angles, as a fraction of the peak-to-peak value [-].
 
-        It is the larger one of the errors of output error and input torque. The latter
-        is predicted as the derivative of the complementary potential with respect to
-        the angle.
+        It is the larger one of the errors of output error and input torque, which is
+        predicted as the derivative of the complementary potential by the angle.
 
         Args:
-            count: Number of equally spaced columns; they and those between them
-                predict the others.
+            count: Number of equally spaced columns, which predict the others together
+                with those between them.
             others: Columns at other angles.
             torques: Torques at which to compare [N·m].
         """
@@ -131,14 +139,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
             error = spread_evenly(own, error, even)
             there, _, _, moment = self._row(others, torque)
             predicted, _ = periodic(error, parts)
-            _, slope = periodic(potential, np.concatenate([parts, self._parts(even)]))
+            _, slope = periodic(
+                potential, np.concatenate([parts, np.arange(even) / even])
+            )
             moments = slope / self.period + torque / self.follow.ratio
             predicted_moment, own_moment = np.split(moments, [len(parts)])
-            for sampled, truth, estimate in (
-                (error, there, predicted),
-                (own_moment, moment, predicted_moment),
-            ):
-                height = np.ptp(np.concatenate([sampled, truth]))
+            triples = (error, there, predicted), (own_moment, moment, predicted_moment)
+            for triple, least in zip(triples, self.ripple(torque), strict=True):
+                sampled, truth, estimate = triple
+                height = max(least, np.ptp(np.concatenate([sampled, truth])))
                 worst = max(worst, float(np.abs(estimate - truth).max() / height))
         return worst
 
@@ -154,18 +163,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
         error, energy, _ = np.array(table)[:, :, 0].T
         return sign * error, energy
 
-    @staticmethod
-    def _parts(count: int) -> Array:
-        """Angles of the columns as fractions of the period (count,)."""
-        return np.arange(count) / count
-
     def _row(self, columns: list[AngleColumn[AnyState]], torque: float) -> Array:
         """Values of columns at a torque that all of them have (4, n)."""
+        states = [c.states[torque] if torque else c.rest.state for c in columns]
         return np.array(
-            [
-                self.figures(c.states[torque] if torque else c.rest.state, c.theta)
-                for c in columns
-            ]
+            [self.figures(s, c.theta) for s, c in zip(states, columns, strict=True)]
         ).T
 
     def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
@@ -176,8 +178,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
             sign: Sign of the torques, 1.0 or -1.0.
 
         Returns:
-            Magnitudes of the torques [N·m], and the peak-to-peak values of the output
-            error [rad] and of the input torque [N·m] at these torques, each (n,).
+            Magnitudes of the torques [N·m], and the peak-to-peak values of output error
+            [rad] and input torque [N·m] at them, each (n,).
         """
         curves = [self.path(column, sign)[0] for _, column in self.chosen(count)]
         first = max(curve.torque[0] for curve in curves)
@@ -186,19 +188,17 @@ class ColumnGrid(SolvedColumns[AnyState]):
         tables = np.array([curve.evaluate_at(torque) for curve in curves])
         errors = tables[:, 0]
         potential = tables[:, 1] + torque * errors
-        _, slope = periodic(potential, self._parts(count))
+        _, slope = periodic(potential, np.arange(count) / count)
         moments = slope / self.period
         heights = []
-        for table in (errors, moments):
+        for table, least in zip(
+            (errors, moments), self.ripple(sign * torque), strict=True
+        ):
             height = np.ptp(table, axis=0)
-            height = np.maximum(height, LEAST_PEAK * height.max())
+            height = np.maximum(np.maximum(height, least), LEAST_PEAK * height.max())
             # with two angles the derivative vanishes and gives no reference for errors
             heights.append(np.where(height > 0.0, height, np.inf))
         return torque, heights[0], heights[1]
-
-    def cost(self, count: int) -> int:
-        """Number of solves of ``count`` columns at all levels and at zero torque."""
-        return count * (1 + len(self.levels))
 
     def divide(self, count: int, most: int, goal: float) -> float:
         """Add common torques until the estimated errors between them meet a goal.

@@ -56,7 +56,13 @@ CHECKS = {"2d": 24, "3d": 3}
 """Number of positions that are also solved without linearisation to validate the map.
 In 2D they lie between the sampled positions, half of them under negative torques, see
 :mod:`swgjoint.fe.tolerances.unseen`. Each of them takes half a minute in 3D."""
-STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
+STAGES = (
+    "first equilibria",
+    "linearised positions",
+    "superposition",
+    "full solves",
+    "equilibria",
+)
 """Stages of the sampling of a drive with errors, as reported by the progress."""
 FREE = 100.0
 """Multiple of the median compliance of all positions above which the output counts as
@@ -337,12 +343,23 @@ def respond_over_torque(
     return np.stack(table, axis=1), int(free.sum())
 
 
+def stage_name(design: Design, number: int) -> str:
+    """Name of a stage of the sampling with errors, as reported by the progress.
+
+    Args:
+        design: The drive.
+        number: Index in :data:`STAGES`.
+    """
+    part = range(len(STAGES))[number] + 1
+    return f"{design.drive.name}: {STAGES[number]}, part {part} of {len(STAGES)}"
+
+
 def _stage(
     progress: Progress, design: Design, number: int, total: int
 ) -> Callable[..., None]:
     """Function that counts and reports the finished parts of one sampling stage."""
     done = 0
-    name = f"{design.drive.name}: {STAGES[number]}, part {number + 1} of {len(STAGES)}"
+    name = stage_name(design, number)
     progress(name, 0, total)
 
     def tick(parts: int = 1) -> None:
