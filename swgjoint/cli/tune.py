@@ -21,8 +21,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--controller",
         metavar="NAME",
         default="pd-flexible",
-        help="controller to tune: pd, pd-feedforward, pd-flexible (default), or a class"
-        " or function of your own as FILE.py:NAME",
+        help="controller to tune: pd, pd-feedforward, pd-flexible (default),"
+        " compensation (of RippleSuppression-v0), or a class or function of your own as"
+        " FILE.py:NAME",
     )
     parser.add_argument(
         "--optimiser",

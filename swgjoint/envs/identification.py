@@ -24,11 +24,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.control.error_compensation import ORDERS
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.typing import Array
 
-ORDERS = (2, 4)
-"""Orders of the wave-generator angle: lobes, and twice as many."""
 ADAPTATION = 0.3
 """Time constant with which amplitudes follow [s]. It is longer than the period of the
 slowest wave, so that a compensation by the estimate is stable although the inertia of

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.control.error_compensation import ORDERS
 from swgjoint.envs.arguments import check_flag
 from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Rows
 from swgjoint.envs.entries import Entry, ceiling
-from swgjoint.envs.identification import ORDERS, KinematicErrorEstimate
+from swgjoint.envs.identification import KinematicErrorEstimate
 from swgjoint.envs.one_joint import JointEpisode
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.maps.fit.error_spectrum import peak_to_peak
+from swgjoint.sim.controller import Measured
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -246,6 +248,16 @@ class RippleCore(BenchCore):
             *(self.estimate.columns() if self.estimate else ()),
             *self.readings(),
         ]
+
+    def read_measurements(self, observation: Array) -> Measured:
+        """Sensor readings in observations with any leading axes, for controllers."""
+        measured = super().read_measurements(observation)
+        if self.estimate is None:
+            return measured
+        # before the readings of further sensors, which come last
+        last = observation.shape[-1] - (self.readout.channels - 1)
+        part = slice(last - 2 * len(ORDERS), last)
+        return replace(measured, error_estimate=(observation * self.units)[..., part])
 
     def judge(self) -> None:
         """Set the torque ripple [N·m] and the errors [rad] including their means."""

@@ -188,6 +188,10 @@ class Measured:
     """Link encoder reading [rad]; None without a link encoder."""
     output_torque: Array | None = None
     """Output torque sensor reading [N·m]; None without a torque sensor."""
+    error_estimate: Array | None = None
+    """Estimated kinematic error [rad] and its rate [rad/s] for every order, see
+    :mod:`swgjoint.envs.identification`; None without an estimate. Shape (...,
+    n_values)."""
 
 
 class Controller(Protocol):

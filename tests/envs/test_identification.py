@@ -5,9 +5,13 @@ from __future__ import annotations
 import gymnasium
 import numpy as np
 import pytest
+from messages import naming
 
+from swgjoint.control.error_compensation import ErrorCompensation
 from swgjoint.envs import ripple_suppression  # noqa: F401
+from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.controller import Measured
 
 NAME = "swgjoint.envs:swgjoint/RippleSuppression-v0"
 
@@ -16,20 +20,18 @@ def make(**keys):
     return gymnasium.make_vec(NAME, num_envs=6, identify=True, threads=1, **keys)
 
 
-def compensate(core):
-    """Action that lets the motor turn against the estimated error. Shape (n, 1)."""
-    loop, ratio, s = core.loop, core.joint.ratio, core.settings
-    speed, torque = np.where(core.now[:, 1, 0] < 0.0, -1e-9, 1e-9), 0.0
-    speed = ratio * (core.now[:, 1, 0] + speed)
-    for k, order in enumerate((2, 4)):
-        error, rate = (one[:, 0] for one in core.estimate.columns()[2 * k : 2 * k + 2])
-        inertia = s.rotor_inertia_kgm2 * (order * speed) ** 2
-        torque = torque - ratio * (
-            (loop.stiffness - inertia) * error + loop.damping * rate
-        )
-        # the load drives the motor through the slope of the error
-        torque = torque + core.now[:, 4, 0] * rate / speed
-    return (torque / core.authority)[:, None]
+def compensate(env):
+    """Action that lets the motor turn against the estimated error, by the library."""
+    controller, core = ErrorCompensation(), env.unwrapped.core
+
+    def act(_, k):
+        if k == 0:
+            controller.start(env.unwrapped.task)
+        observation = core.observation()
+        torque = controller.torque(k, core.read_measurements(observation))
+        return torque / core.authority
+
+    return act
 
 
 def run(env, act, seed=4):
@@ -72,6 +74,56 @@ def nothing(core, k):
     return np.zeros((6, 1))
 
 
+@pytest.mark.parametrize("sensors", [{}, {"link_encoder": True, "torque_sensor": True}])
+def test_controllers_read_the_estimate(sensors):
+    """In SI units, whichever sensors follow it; the compensation needs it."""
+    env = make(sensors=sensors, episode_s=3.0)
+    run(env, nothing)
+    core = env.unwrapped.core
+    read = core.read_measurements(core.observation())
+    want = np.concatenate(core.estimate.columns(), axis=1)
+    np.testing.assert_allclose(read.error_estimate, want, rtol=1e-12)
+    assert np.abs(want).max() > 1e-5
+    plain = gymnasium.make_vec(NAME, 1, sensors=sensors).unwrapped
+    observation, _ = plain.reset(seed=0)
+    read = plain.core.read_measurements(observation)
+    assert read.error_estimate is None
+    controller = ErrorCompensation()
+    controller.start(plain.task)
+    with pytest.raises(InputError, match=naming("estimate", "identify=True")):
+        controller.torque(0, read)
+    other = gymnasium.make_vec("swgjoint.envs:swgjoint/JointTracking-v0", 1).unwrapped
+    other.reset(seed=0)
+    with pytest.raises(InputError, match=naming("motor loop", "RippleSuppression-v0")):
+        controller.start(other.task)
+
+
+def test_a_lead_advances_the_estimate():
+    """By the time of one period, the torque is that of the wave one period later."""
+    env = make(friction=False, sensors={"delay_periods": 0, "motor_noise_rad": 0.0})
+    env.reset(seed=1)
+    task, k = env.unwrapped.task, 3000
+    speed = task.joints.ratio * task.velocity[k]
+    wave = np.array([3e-5, 1e-5])  # rad
+
+    def torque(time, lead):
+        parts = []
+        for order, size in zip((2, 4), wave, strict=True):
+            omega = order * speed[:, 0]
+            parts += [size * np.sin(omega * time), size * omega * np.cos(omega * time)]
+        controller = ErrorCompensation(lead_s=lead)
+        controller.start(task)
+        still = np.zeros_like(speed)
+        read = Measured(
+            motor_angle=still, motor_speed=still, error_estimate=np.stack(parts, -1)
+        )
+        return controller.torque(k, read)
+
+    want = torque(task.period, 0.0)
+    np.testing.assert_allclose(torque(0.0, task.period), want, rtol=1e-9, atol=1e-12)
+    assert np.abs(want - torque(0.0, 0.0)).max() > 1e-3
+
+
 @pytest.mark.parametrize(
     ("keys", "act", "within"),
     [
@@ -103,5 +155,5 @@ def test_one_law_improves_every_specimen():
     """The same linear law of the observation, whatever the phase of the error."""
     env = make(randomise=True)
     *_, before = run(env, nothing)
-    *_, after = run(env, lambda core, k: compensate(core) * (k > 800))
+    *_, after = run(env, compensate(env))
     assert (after > 1.3 * before).all() and after.mean() > 1.8 * before.mean()

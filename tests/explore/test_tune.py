@@ -14,7 +14,7 @@ from swgjoint.control.motor_side import MotorPID, ideal_plan
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trials, environment_named
 from swgjoint.explore.tune.gains import (
-    CONTROLLERS,
+    PLANNED,
     anti_resonance,
     parts_of,
     weight_plan,
@@ -29,7 +29,7 @@ from swgjoint.view.plots.tune import claims, write_files
 
 NAME = "swgjoint/JointTracking-v0"
 SHORT = {"episode_s": 0.5, "max_speed_rad_s": 0.3}
-PD, FLEXIBLE = CONTROLLERS["pd"], CONTROLLERS["pd-flexible"]
+PD, FLEXIBLE = PLANNED["pd"], PLANNED["pd-flexible"]
 
 
 @pytest.fixture(scope="module")

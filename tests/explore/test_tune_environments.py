@@ -11,9 +11,11 @@ from messages import naming
 
 import swgjoint
 import swgjoint.envs
+from swgjoint.control.error_compensation import ErrorCompensation
 from swgjoint.errors import InputError
+from swgjoint.explore.tune.added import LOOP
 from swgjoint.explore.tune.cost import Trials
-from swgjoint.explore.tune.gains import CONTROLLERS, LOOP
+from swgjoint.explore.tune.gains import PLANNED
 from swgjoint.explore.tune.result import TuneSettings
 from swgjoint.explore.tune.tune import tune
 from swgjoint.json_text import json_text
@@ -30,7 +32,7 @@ SHORT = {
 }
 EACH = pytest.mark.parametrize("name", SHORT)
 ADDED = pytest.mark.parametrize("name", list(SHORT)[1:])
-RIGID = CONTROLLERS["pd-feedforward"]
+RIGID = PLANNED["pd-feedforward"]
 
 
 def settings(name, **changes):
@@ -90,7 +92,7 @@ def test_a_plan_with_the_gains_of_the_loop_adds_what_the_loop_lacks(name):
     still = trials.costs(LOOP, {})[0, 0]
     rigid = trials.costs(RIGID, neutral(RIGID))[0, 0]
     assert rigid == pytest.approx(still, rel=1e-6)
-    flexible = CONTROLLERS["pd-flexible"]
+    flexible = PLANNED["pd-flexible"]
     # nominal drives, whose error and torsion the plan knows
     assert trials.costs(flexible, neutral(flexible))[0, 0] < 0.5 * still
     trials.close()
@@ -157,6 +159,23 @@ def test_a_file_drives_the_environment_as_the_run_did(name, tmp_path):
         assert got / (mm if unit == "mm" else arcmin) == pytest.approx(want, rel=1e-6)
     with pytest.raises(InputError, match=naming("motor loop", "no torque", "tuned")):
         swgjoint.load_controller(path, "baseline")
+
+
+def test_the_compensation_of_an_estimate_is_tuned(tmp_path):
+    """It observes the estimate, lowers the cost of every specimen, and is read back."""
+    name = "swgjoint/RippleSuppression-v0"
+    found = tune(settings(name, controller="compensation"))
+    loop, ruled, best = found.candidates
+    assert (best.held_out < 0.8 * loop.held_out).all()
+    assert best.training.mean() <= ruled.training.mean()
+    path = tmp_path / "tune.json"
+    path.write_text(json_text(found.to_json()))
+    assert json.loads(path.read_text())["arguments"]["identify"] is True
+    assert isinstance(swgjoint.load_controller(path), ErrorCompensation)
+    found = naming("compensation", "JointTracking-v0", "RippleSuppression-v0")
+    with pytest.raises(InputError, match=found):
+        other = "swgjoint/JointTracking-v0"
+        tune(settings(other, controller="compensation", arguments={}))
 
 
 def test_set_points_are_not_tuned():

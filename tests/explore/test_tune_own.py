@@ -14,7 +14,7 @@ import swgjoint.envs
 from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trials
-from swgjoint.explore.tune.gains import CONTROLLERS
+from swgjoint.explore.tune.gains import PLANNED
 from swgjoint.explore.tune.own import OwnController
 from swgjoint.explore.tune.result import TuneSettings
 from swgjoint.explore.tune.tune import tune
@@ -108,10 +108,10 @@ def test_its_cost_is_that_of_the_same_law():
     frequency = np.array([8.0, 20.0])
     own = OwnController.from_object(make)
     got = trials.costs(own, {"frequency_Hz": frequency})
-    neutral = dict.fromkeys(CONTROLLERS["pd-feedforward"].keys[3:5], np.ones(2))
+    neutral = dict.fromkeys(PLANNED["pd-feedforward"].keys[3:5], np.ones(2))
     neutral |= {"integral_time_s": np.full(2, np.inf), "reading_age_s": np.zeros(2)}
     values = {"frequency_Hz": frequency, "damping_ratio": np.full(2, 0.7)} | neutral
-    want = trials.costs(CONTROLLERS["pd-feedforward"], values)
+    want = trials.costs(PLANNED["pd-feedforward"], values)
     np.testing.assert_allclose(got, want, rtol=1e-9)
     trials.close()
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
+from swgjoint.explore.tune.added import LOOP
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
-    LOOP,
     AddedPID,
     PlannedControl,
     build,
@@ -123,7 +123,9 @@ def load_controller(
     if kind in CONTROLLERS:
         tunable = CONTROLLERS[kind]
         values = _values_of(row, tunable.keys, f"{path}: ", candidate, least=0.0)
-        return TunedController(tunable, values)
+        if isinstance(tunable, PlannedControl):
+            return TunedController(tunable, values)
+        return tunable.controller(values)
     if own is None:
         raise InputError(
             f"{path}: controller {kind!r}; accepted: {', '.join(CONTROLLERS)}, or one"

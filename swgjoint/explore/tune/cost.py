@@ -67,6 +67,45 @@ def environment_named(name: str) -> str:
     raise InputError(f"environment {name!r}; {hint}accepted: {', '.join(known)}")
 
 
+def settings_type(environment: str) -> type[Any]:
+    """Class of the settings of an environment."""
+    import gymnasium
+    from gymnasium.envs.registration import load_env_creator
+
+    single: Any = load_env_creator(str(gymnasium.spec(environment).entry_point))
+    kind: type[Any] = single.settings_type
+    return kind
+
+
+def arguments_for(
+    tunable: Tunable, environment: str, arguments: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Arguments of an environment with those that a controller needs.
+
+    Args:
+        tunable: Controller.
+        environment: Id of the environment.
+        arguments: Other arguments.
+
+    Raises:
+        InputError: If the environment has no such arguments.
+    """
+    from swgjoint.envs import ENVIRONMENTS
+
+    def fits(name: str) -> bool:
+        return all(hasattr(settings_type(name), key) for key in tunable.needs)
+
+    if not fits(environment):
+        others = ", ".join(
+            one.removeprefix(PREFIX) for one in ENVIRONMENTS if fits(one)
+        )
+        raise InputError(
+            f"controller {tunable.name!r} in {environment.removeprefix(PREFIX)};"
+            f" accepted: in {others}"
+        )
+    return {**tunable.needs, **arguments}
+
+
 class Trials:
     """The same seeded episodes for every candidate."""
 
@@ -90,13 +129,11 @@ class Trials:
             InputError: If an argument is not a setting of the environment.
         """
         import gymnasium
-        from gymnasium.envs.registration import load_env_creator
 
         from swgjoint.envs.bench import settings_of
 
         # reject arguments of gymnasium itself, such as the restart mode
-        single: Any = load_env_creator(str(gymnasium.spec(environment).entry_point))
-        settings = settings_of(single.settings_type, dict(arguments))
+        settings = settings_of(settings_type(environment), dict(arguments))
         if (kind := getattr(settings, "action", "torque")) != "torque":
             raise InputError(f"action {kind!r} of a tuning run; accepted: torque")
         self.seeds, self.candidates = tuple(seeds), candidates

@@ -19,7 +19,7 @@ plans remains.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from swgjoint.control.motor_side import (
     rigid_plan,
 )
 from swgjoint.errors import InputError
+from swgjoint.explore.tune.added import COMPENSATION, Compensation
 from swgjoint.explore.tune.own import OwnController
 from swgjoint.explore.tune.tunable import Act, GainParameter, Tunable
 from swgjoint.sim.controller import KnownJoints, KnownLoop, Measured, ReadingAge, Task
@@ -54,8 +55,8 @@ class PlannedControl:
     """Function that plans the motor motion and torque of a task."""
     keys: tuple[str, ...]
     """Keys of the tuned parameters."""
-    untuned = "by rule"
-    content = ""
+    untuned, content = "by rule", ""
+    needs: Mapping[str, Any] = field(default_factory=dict)
 
     def parameters(
         self, joints: KnownJoints, loop: KnownLoop | None
@@ -141,50 +142,6 @@ class PlannedControl:
         return lambda k, measured, alive: loop.torque(k, measured)
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoopAlone:
-    """No torque in addition to that of the motor loops."""
-
-    name: str = "motor loop"
-    untuned = ""
-    content = ""
-
-    def parameters(
-        self, joints: KnownJoints, loop: KnownLoop | None
-    ) -> tuple[GainParameter, ...]:
-        """None.
-
-        Args:
-            joints: Unused.
-            loop: Unused.
-        """
-        return ()
-
-    def gains(
-        self, values: Mapping[str, Array], joints: KnownJoints
-    ) -> dict[str, Array]:
-        """None.
-
-        Args:
-            values: Unused.
-            joints: Unused.
-        """
-        return {}
-
-    def begin(
-        self, values: Mapping[str, Array], task: Task, kept: dict[str, Any]
-    ) -> Act:
-        """Torques of zero.
-
-        Args:
-            values: Empty.
-            task: Motions of all episodes.
-            kept: Unused.
-        """
-        zero = np.zeros(task.position.shape[1:])
-        return lambda k, measured, alive: zero
-
-
 class AddedPID(MotorPID):
     """PID control whose torque replaces that of a motor loop, if the task has one."""
 
@@ -217,8 +174,7 @@ class AddedPID(MotorPID):
         return np.asarray(whole - by_loop)
 
 
-LOOP = LoopAlone()
-CONTROLLERS = {
+PLANNED = {
     one.name: one
     for one in (
         PlannedControl(
@@ -257,6 +213,13 @@ CONTROLLERS = {
         ),
     )
 }
+
+
+CONTROLLERS: dict[str, PlannedControl | Compensation] = {
+    **PLANNED,
+    COMPENSATION.name: COMPENSATION,
+}
+"""Controllers by name."""
 
 
 def controller_named(name: Any) -> Tunable:

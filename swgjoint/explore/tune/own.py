@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ class OwnController:
     """Parameters, which are keyword arguments of ``make``."""
     content: str
     """Source text and bounds, as far as they are known."""
+    needs: Mapping[str, Any] = field(default_factory=dict)
     untuned = "initial"
 
     @classmethod

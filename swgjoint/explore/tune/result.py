@@ -125,6 +125,8 @@ class Tuned:
 
     settings: TuneSettings
     environment: str
+    arguments: Mapping[str, Any]
+    """Arguments of the environment; ``randomise`` is true unless set otherwise."""
     candidates: tuple[GainCandidate, ...]
     """Compared controllers, from the baseline to the tuned controller."""
     searches: dict[str, GainSearch]
@@ -175,7 +177,7 @@ class Tuned:
             "improvement_percent": rows[-1]["improvement_percent"],
             "candidates": rows,
             "environment": self.environment,
-            "arguments": arguments_of(self.settings),
+            "arguments": self.arguments,
             "controller": self.best.controller,
             "optimiser": self.settings.optimiser,
             "seed": self.settings.seed,
@@ -188,8 +190,3 @@ class Tuned:
             f"worst_cost_{unit}": self.worst / size,
             "wall_s": self.wall,
         }
-
-
-def arguments_of(settings: TuneSettings) -> dict[str, Any]:
-    """Arguments of the environment; ``randomise`` is true unless set otherwise."""
-    return {"randomise": True, **settings.arguments}

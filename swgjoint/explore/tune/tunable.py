@@ -63,6 +63,10 @@ class Tunable(Protocol):
     def content(self) -> str:
         """Text that differs between controllers of the same name, empty for none."""
 
+    @property
+    def needs(self) -> Mapping[str, Any]:
+        """Arguments that the environment must have."""
+
     def parameters(
         self, joints: KnownJoints, loop: KnownLoop | None
     ) -> tuple[GainParameter, ...]:

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.explore.tune.cost import Trace, Trials, environment_named
+from swgjoint.explore.tune.added import LOOP
+from swgjoint.explore.tune.cost import Trace, Trials, arguments_for, environment_named
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
-    LOOP,
     anti_resonance,
     controller_named,
 )
@@ -33,7 +33,6 @@ from swgjoint.explore.tune.result import (
     GainCandidate,
     Tuned,
     TuneSettings,
-    arguments_of,
 )
 from swgjoint.explore.tune.search import (
     JOURNAL,
@@ -82,7 +81,10 @@ def tune(
     """
     began = time.perf_counter()
     environment = environment_named(settings.environment)
-    named, arguments = controller_named(settings.controller), arguments_of(settings)
+    named = controller_named(settings.controller)
+    arguments = arguments_for(
+        named, environment, {"randomise": True, **settings.arguments}
+    )
     if folder is None and resume:
         raise InputError(
             "resume without a folder; accepted: with the folder of the run (--out)"
@@ -156,6 +158,7 @@ def tune(
     return Tuned(
         settings=settings,
         environment=environment,
+        arguments=arguments,
         candidates=tuple(candidates),
         searches=searches,
         parameters=list(parameters.values())[-1],
