@@ -180,12 +180,16 @@ def simulate(
 
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
     """Raise an error if a run diverged, because the engine would reset and continue."""
+    from swgjoint.sim.loop_stability import explain_divergence
+
     nq, nv = assembly.model.nq, assembly.model.nv
     if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
+        cause = explain_divergence(assembly)
         raise ComputationError(
-            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
-            " command of a motor or a disturbance exceeded 1e10, which the engine does"
-            " not apply; use lower controller gains"
+            f"scene {assembly.scene.name!r}: {f'{cause}; ' if cause else ''}before"
+            f" t = {states[-1, 0]:.3f} s the command of a motor or a disturbance"
+            " exceeded 1e10, which the engine does not apply; use lower controller"
+            " gains"
         )
     if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
         raise ComputationError(
@@ -204,6 +208,8 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
     )
     speed = np.abs(states[:, 1 + nq : 1 + nq + nv])
     if bad or not np.isfinite(states).all() or speed.max() > 1e6:
+        if (cause := explain_divergence(assembly)) is not None:
+            raise ComputationError(f"scene {assembly.scene.name!r}: {cause}")
         step, integrator = assembly.step, assembly.scene.simulation.integrator
         other = "lower gains" if integrator == "discrete" else "integrator discrete"
         # the engine restarts at t = 0 after it has diverged

@@ -18,7 +18,7 @@ from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
 from swgjoint.maps.sheet.validity_marks import joint_doubt
 from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.figures.signals import error_figures, ripple_figures
-from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.own_drives import scene_of_run
 from swgjoint.units import arcmin, deg
 from swgjoint.view.ratings_text import rule_mark
 from swgjoint.view.run import run_scene
@@ -58,7 +58,7 @@ def step_error(run: Run) -> dict[str, Any]:
     steps = run.assembly.scene.simulation.duration_s / step
     if steps > MAX_STEPS:
         return {"step_s": step, "reason": f"not run: it would take {steps:.3g} steps"}
-    scene, drives = _same_orders(run)
+    scene, drives = scene_of_run(run.assembly)
     try:
         fine = run_scene(
             scene.with_changes({"simulation.step_s": step, "cycle": []}),
@@ -75,18 +75,6 @@ def step_error(run: Run) -> dict[str, Any]:
             for key, path in STEP_KEYS.items()
         }
     return {"step_s": step, "joints": joints}
-
-
-def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
-    """The scene and its drives, reduced to the orders that the run simulates."""
-    scene = run.assembly.scene
-    sections, drives = {}, {}
-    for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
-        name = f"simulated drive of {joint}"
-        section = scene.joint_settings(joint)
-        sections[joint] = section.with_drive(name)
-        drives[name] = transmission.attached.drive
-    return scene.model_copy(update={"joints": sections}), drives
 
 
 def _step_figures(run: Run, j: int) -> dict[str, Any]:

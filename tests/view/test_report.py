@@ -12,12 +12,13 @@ from validation_record import validated_map
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.own_drives import scene_of_run
 from swgjoint.sim.run import Run
 from swgjoint.view.report.plots import envelope
 from swgjoint.view.report.report import write_report
 from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.run import run_scene
-from swgjoint.view.validity import STEP_KEYS, _same_orders, step_error
+from swgjoint.view.validity import STEP_KEYS, step_error
 from swgjoint.view.words import format_figure, words
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
@@ -149,7 +150,7 @@ def test_halving_the_step_keeps_the_orders(synthetic_map):
     fast = {**SHORT, "trajectory.speed_deg_s.joint": 6.0}
     run = run_scene("bench", overrides=fast, drives={"reference-2d": synthetic_map})
     assert [u.order for u in run.assembly.transmissions[0].attached.unresolved] == [122]
-    scene, drives = _same_orders(run)
+    scene, drives = scene_of_run(run.assembly)
     fine = run_scene(scene.with_changes({"simulation.step_s": 0.0005}), drives=drives)
     kept = [r.assembly.transmissions[0].attached.kept_orders for r in (run, fine)]
     assert kept[0] == kept[1]
