@@ -10,6 +10,7 @@ from messages import naming
 from swgjoint.envs import plans
 from swgjoint.envs.arm_tracking import ArmTrackingEnv, ArmTrackingVectorEnv
 from swgjoint.errors import InputError
+from swgjoint.models_path import models_path
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.units import mm
 
@@ -135,6 +136,37 @@ def test_the_scene_is_one_path():
     found = naming("reference", "('scene', 'line')", "scene", "line, arc, spline")
     with pytest.raises(InputError, match=found):
         ArmTrackingEnv(reference=("scene", "line"))
+
+
+@pytest.mark.parametrize("payload", [None, (1.0, 2.0)])
+def test_drawn_paths_start_without_the_motion_of_the_scene(payload, tmp_path):
+    """The path of the scene accelerates at once; drawn paths begin with the weight."""
+    text = (models_path() / "scenes" / "ur5e-catalogue.toml").read_text("utf-8")
+    head, tail = text.split("[trajectory]\n")
+    rest = tail[tail.index("[controller]") :]
+    motion = """[trajectory]
+kind = "trapezoid"
+hold_s = 0.0
+max_speed_deg_s = 30.0
+max_acceleration_deg_s2 = 200.0
+start_deg = { shoulder_lift_joint = -60.0, elbow_joint = 80.0 }
+end_deg = { shoulder_lift_joint = -40.0 }
+
+"""
+    path = tmp_path / "scene.toml"
+    path.write_text(head + motion + rest, "utf-8")
+    keys = {"friction": False, "kinematic_error_arcmin": 0.0, "payload_kg": payload}
+    env = ArmTrackingEnv(scene=str(path), reference="multisine", **keys)
+    _, first = env.reset(seed=0)
+    assert env.core._assembly.scene.trajectory.hold_s == 0.0
+    if payload is None:
+        weight = env.task.link_torque[0]
+        # links sag by some 1e-4 rad
+        np.testing.assert_allclose(first["output_torque_Nm"], weight, atol=0.02)
+    for _ in range(15):  # the multisine has hardly begun
+        *_, info = env.step(np.zeros(6))
+    moved = info["link_angle_rad"] - first["link_angle_rad"]
+    assert np.abs(moved).max() < 1e-6
 
 
 TOUCHING = """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.arm.paths import ArmPaths, JointPath, ToolPath, tool_slopes
 from swgjoint.envs.arm.payload import DrawnPayloads, start_of
-from swgjoint.envs.arm.scene import check_assembly, drives_of, scene_of
+from swgjoint.envs.arm.scene import check_assembly, drives_of, scene_of, standing
 from swgjoint.envs.arm.settings import ArmSettings
 from swgjoint.envs.core import Core, Rows
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
@@ -59,6 +59,8 @@ class ArmCore(Core):
             scene, drives=drives_of(scene), variable=variable, top_speed=fastest
         )
         check_assembly(scene, assembly)
+        if s.kinds:
+            assembly = standing(assembly)
         self._assembly, task = assembly, task_of(assembly)
         steps = round(s.episode_s / task.period)
         drives = [t.attached for t in assembly.transmissions]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from swgjoint.drives.references import names_catalogue
@@ -14,6 +16,7 @@ from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import is_arm, scene_of_arm
 from swgjoint.sim.assembly import Assembly
+from swgjoint.sim.control import feedforward
 from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.scene.feature_sections import Payload
 from swgjoint.sim.scene.scene import Scene
@@ -104,3 +107,28 @@ def check_assembly(scene: Scene, assembly: Assembly) -> None:
         raise InputError(
             f"{where}: integrator {scene.simulation.integrator!r}; accepted: discrete"
         )
+
+
+def standing(assembly: Assembly) -> Assembly:
+    """Copy of an assembled scene that rests in its start pose, for drawn paths."""
+    path, load = assembly.trajectory, assembly.load
+    still = np.zeros_like(path.position[:2])
+    position = path.position[0] + still
+    return replace(
+        assembly,
+        trajectory=replace(
+            path,
+            time=path.time[:2],
+            position=position,
+            velocity=still,
+            acceleration=still,
+        ),
+        link_torque=load + assembly.arm.gravity(position),
+        feedforward=feedforward(
+            assembly.scene.controller.feedforward,
+            link_torque=load + assembly.known_arm.gravity(position),
+            acceleration=still,
+            ratio=assembly.ratio,
+            rotor_inertia=assembly.rotor_inertia,
+        ),
+    )
