@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shift_errors
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.files import write_whole
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design

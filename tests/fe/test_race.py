@@ -27,8 +27,8 @@ from swgjoint.fe.plane.race import PlaneRace
 from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.tolerances.cycle import gap_errors, pitches_of
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design

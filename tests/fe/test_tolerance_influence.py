@@ -12,8 +12,8 @@ from solved import coarse
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.tolerances.cycle import MEMBERS, pitch_of, pitches_of, shift_errors
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import Rest, influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import tooth_errors
 

@@ -14,6 +14,7 @@ from swgjoint.errors import DesignError
 from swgjoint.explore.lot import run_lot
 from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.lot import (
     outline_change,
     perfect_positions,
@@ -21,7 +22,6 @@ from swgjoint.fe.tolerances.lot import (
     superposition_error,
 )
 from swgjoint.fe.tolerances.rest import influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 

@@ -7,8 +7,8 @@ import pytest
 
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.tolerances.cycle import pitch_of
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.drive_map import DriveMap

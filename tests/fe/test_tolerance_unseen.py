@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from solved import coarse
 
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.fe.tolerances.unseen import (
     HARD,
     spread_positions,

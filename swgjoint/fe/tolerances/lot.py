@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.drive2d import in_plane
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
-from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import (

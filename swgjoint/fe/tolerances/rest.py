@@ -64,6 +64,15 @@ class Rest:
     loaded: Mapping[float, tuple[Any, Influence]] = field(default_factory=dict)
     """States and influences under load, by torque [N·m]."""
 
+    def without_load(self, small: float) -> Unloaded[Any]:
+        """Equilibrium without load, from which to turn or load the drive.
+
+        Args:
+            small: Torque that takes up the clearance [N·m].
+        """
+        sides = None if self.opposite is None else (self.state, self.opposite[0])
+        return Unloaded(state=self.state, small=small, sides=sides)
+
     @property
     def sides(self) -> tuple[tuple[Any, Influence], tuple[Any, Influence]]:
         """State and influence for positive torques, then those for negative torques."""

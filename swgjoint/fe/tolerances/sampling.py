@@ -10,16 +10,15 @@ one pitch, and the errors of all pitches are superposed there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import with_mean_clearance
-from swgjoint.fe.common.following import Follower
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.fe.tolerances.unseen import (
     spread_positions,
@@ -32,10 +31,10 @@ from swgjoint.gear.design.tolerances import (
     with_perfect_teeth,
     without_errors,
 )
-from swgjoint.maps.samples import FullSolves, ToleranceSamples
+from swgjoint.maps.samples import ToleranceSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array
 
 PHASES = {"2d": 6, "3d": 4}
 """Number of positions within a pitch if :data:`POSITIONS` allows it; the effect of
@@ -70,7 +69,7 @@ free [-]."""
 CHUNK = 2048
 """Number of sets of errors that are superposed between two progress reports: a few
 seconds. Among many sets, more are similar."""
-_PHASE, _CHECK = "superposition-{:04d}", "full-solves-{:04d}"
+_PHASE = "superposition-{:04d}"
 
 
 def sample_tolerances(
@@ -167,12 +166,20 @@ def sample_tolerances(
     chosen = spread_positions(pitches.size, phases, CHECKS[model])
     torques, signs = np.array([0.0, rated_torque]), np.ones(chosen.size)
     if model == "2d":
-        # half way to the next positions
         chosen, signs = unseen_positions(table[0], torque, chosen)
-        follow, linear = influences(design, phases=2 * phases)
-        chosen = 2 * chosen + 1
         torques = unseen_torques(levels, rated_torque, has_play=has_play)
-    solved = full_solves(design, follow, linear, chosen, torques, signs, tick, keep)
+    solved = full_solves(
+        design,
+        follow,
+        linear,
+        chosen,
+        torques,
+        signs,
+        # half way to the next positions
+        offset=0.5 * pitch_of(design) / phases if model == "2d" else 0.0,
+        tick=tick,
+        keep=keep,
+    )
     if has_play:
         table, torque = with_mean_clearance(table, levels)
         flawless_table, _ = with_mean_clearance(flawless_table, levels)
@@ -185,78 +192,6 @@ def sample_tolerances(
         onsets=has_play,
         free=free,
         solved=solved,
-    )
-
-
-def full_solves(
-    design: Design,
-    follow: Follower[Any],
-    rests: Sequence[Rest],
-    positions: Index,
-    torques: Array | Sequence[float],
-    signs: Array | None = None,
-    tick: Callable[[], None] = lambda: None,
-    keep: Unfinished | None = None,
-) -> FullSolves:
-    """Equilibria with errors at some positions of the cycle, without linearisation.
-
-    Args:
-        design: A drive with manufacturing errors.
-        follow: Solver of the drive with perfect teeth and axis.
-        rests: Unloaded positions of that drive within a pitch.
-        positions: Numbers of the positions in the cycle, which has ``len(rests)``
-            positions per pitch (n,).
-        torques: Torques T at each position [N·m].
-        signs: Factors of the torques, one per position (n,) [-]; None for one.
-        tick: Called after every position.
-        keep: Store of solved positions, which a resumed run reads; None stores none.
-
-    Returns:
-        Results at all positions and torques whose solve succeeded.
-    """
-    tables = []
-    step = pitch_of(design) / len(rests)
-    pitch, phase = np.divmod(positions, len(rests))
-
-    factors = np.ones(len(positions)) if signs is None else signs
-
-    def solved(k: int, errors: tuple[Array, ...], loads: Array) -> Array:
-        rows = []
-        flawed, rest = follow.with_errors(*errors), rests[phase[k]]
-        state = rest.state
-        for torque in loads.tolist():
-            if torque == 0.0 and rest.opposite is not None:
-                # midway between both ends of the clearance
-                states = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
-            else:
-                state = flawed.to_torque(state, torque)
-                states = [state]
-            angle = np.mean(
-                [flawed.output_angle(s) if s.outcome.ok else np.nan for s in states]
-            )
-            error = angle - step * phase[k] / follow.ratio
-            moment = np.mean([flawed.input_torque(s) for s in states])
-            rows.append((step * positions[k], torque, error, moment))
-        return np.array(rows)
-
-    for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
-        loads = factors[k] * np.asarray(torques) + 0.0  # no negative zero
-        at = np.array([(step * positions[k], torque) for torque in loads])
-        name = _CHECK.format(k)
-        table = None if keep is None else keep.read(name, partial(_checked, at))
-        if table is None:
-            table = solved(k, errors, loads)
-            if keep is not None:
-                keep.write(name, {"table": table})
-        tables.append(table)
-        tick()
-    table = np.concatenate(tables).T
-    table = table[:, np.isfinite(table[2])]
-    return FullSolves(
-        input_angle=table[0],
-        torque=table[1],
-        output_error=table[2],
-        input_torque=table[3],
     )
 
 
@@ -382,11 +317,3 @@ def _kept(
         return table, int(arrays["free"])
 
     return None if keep is None else keep.read(_PHASE.format(phase), taken)
-
-
-def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
-    """Rows that an interrupted run stored for a position, see :func:`full_solves`."""
-    table = np.asarray(arrays["table"], float)
-    if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
-        raise ValueError("stored rows belong to another position of the cycle")
-    return table
