@@ -22,7 +22,7 @@ from golden import load
 COMPARED = tuple(
     name
     for name in (*map_accuracy.DESIGNS, *map_accuracy.OTHERS)
-    if name not in ("dca-80-to-1", "reference-2d-asymmetric", "own-140")
+    if name not in ("dca-80-to-1", "reference-2d-asymmetric")
 )
 PAGES = Path(__file__).parents[2] / "notebooks" / "guide" / "validation"
 
@@ -65,6 +65,12 @@ TABLES: dict[str, Table] = {
         title="Fatigue safety factor",
         cells=guide_cells.of_rows(guide_cells.fatigue),
         frozen=("study-articles-fatigue",),
+    ),
+    "study-control": Table(
+        page="controllers",
+        title="Ten specimens of CSG-25-100",
+        cells=guide_cells.of_rows(guide_cells.controllers),
+        frozen=("study-control-ten",),
     ),
     "study-experiments": Table(
         page="catalogue",
