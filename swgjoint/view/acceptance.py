@@ -103,14 +103,23 @@ def _draw_bars(ax: Any, accepted: Acceptance) -> None:
             y = k + (offset - 0.5) * height if both else k
             color = "tab:red" if missed else _COLORS[which]
             ax.barh(y, share, height=height, color=color)
-            text = f" {format_figure(value)} {words(row.figure)[1]}"
-            ax.text(share, y, text, va="center", fontsize="x-small", clip_on=True)
+            text = f"{format_figure(value)} {words(row.figure)[1]}"
+            ax.annotate(
+                text,
+                (share, y),
+                (4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize="x-small",
+                annotation_clip=True,
+                bbox={"fc": "white", "ec": "none", "pad": 0.8},  # above the limit line
+            )
     names = [
         f"{words(row.figure)[0]}{f', {row.condition}' if row.condition else ''}"
         for row in rows
     ]
     ax.set_yticks(range(len(rows)), names, fontsize="small")
-    ax.invert_yaxis()
+    ax.set_ylim(len(rows) - 0.5, -0.5)  # rows without a value have no bar
     ax.axvline(1.0, color="tab:red", ls="--", lw=1.2)
     ax.set_xlim(0.0, max(1.5, min(4.0, 1.4 * ax.get_xlim()[1])))
     ax.set_xlabel("share of the limit; above 1 it is missed")
@@ -133,10 +142,15 @@ def _draw_logs(ax: Any, accepted: Acceptance, test: str) -> None:
             shown = (angle > 180.0) & (
                 angle < 180.0 + TURNS * 360.0 / abs(accepted.ratio)
             )
-            gaps = np.where(shown, error, np.nan)  # between the two directions
-            ax.plot(angle, gaps, **style)
+            ahead = np.gradient(log.link_angle) > 0.0
+            for forth, dash in ((True, "-"), (False, "--")):
+                part = np.where(shown & (ahead == forth), error, np.nan)
+                way = "forth" if forth else "back"
+                ax.plot(angle, part, **style | {"label": f"{which}, {way}", "ls": dash})
     if ax.lines:
-        ax.legend(fontsize="small")
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.12 * (high - low))  # room for the legend
+        ax.legend(fontsize="small", loc="upper left", ncols=2)
     else:
         ax.text(0.5, 0.5, "not tested", ha="center", transform=ax.transAxes)
     ax.grid(alpha=0.3)

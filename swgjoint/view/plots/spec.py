@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 from swgjoint.pictures import png
@@ -19,8 +21,18 @@ _AT_MOST = 20_000
 """Largest number of drawn samples of an output turn."""
 _MANY = 200
 """Number of periods per output turn above which only two periods are drawn."""
-_FEW = 5
-"""Largest number of orders that get one tick each."""
+_WAVES = 60
+"""Number of waves per output turn above which a line would be a solid area; its
+envelope is drawn instead, and below it the first input turns."""
+_INPUT_TURNS = 3
+_PIECES = 240
+"""Largest number of pieces of an envelope."""
+_LINES = 40
+"""Largest number of orders that are drawn for each signal."""
+_FLOOR = 1e-3
+"""Smallest drawn amplitude relative to the largest [-]."""
+_APART = 0.11
+"""Smallest distance of the labels of two orders, as a part of the axis [-]."""
 _ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab:red")}
 
 
@@ -80,30 +92,78 @@ def _loop(ax: Any, sheet: SpecSheet) -> None:
 
 
 def _turn(ax: Any, sheet: SpecSheet) -> None:
-    ax.set_title("transmission error over one output turn")
+    title = "transmission error over one output turn"
+    ax.set_title(title)
     ax.set_xlabel("output angle [deg]")
     ax.set_ylabel("deviation from the mean [arcmin]")
     shown = [key for key in _ERRORS if key in sheet.turns]
     if not shown:
         _absent(ax, sheet.missing.get("transmission_accuracy_arcmin", "not computed"))
         return
-    for key in reversed(shown):
-        label, colour = _ERRORS[key]
+    lines, waves = {}, 0
+    for key in shown:
         turn = sheet.turns[key]
         periods = turn.turns / float(turn.period_turns)
         angle, error = turn.output_turn()
+        error = (error - turn.signal.mean()) / arcmin
         if periods > _MANY:  # a whole turn would be drawn as a solid area
             part = slice(0, 2 * turn.signal.size + 1)
             angle, error = angle[part], error[part]
             ax.set_title(f"transmission error, 2 of {periods:.0f} periods per turn")
         else:
-            stride = -(-angle.size // _AT_MOST)
-            angle, error = angle[::stride], error[::stride]
-        error = (error - turn.signal.mean()) / arcmin
-        output = 360.0 * angle / (2.0 * np.pi * turn.turns)
-        ax.plot(output, error, color=colour, lw=0.9, alpha=0.8, label=label)
-    ax.legend(fontsize="small", loc="upper right")
-    ax.grid(alpha=0.3)
+            crossings = int(np.count_nonzero(np.diff(np.sign(error))))
+            waves = max(waves, crossings // 2)
+        lines[key] = angle, error, turn.turns
+    whole = None
+    if waves > _WAVES:
+        # the envelope of the output turn above, its waves below
+        whole, ax = _split(ax)
+        whole.set_title(title)
+        whole.set_ylabel("envelope [arcmin]")
+        ax.set_ylabel("[arcmin]")
+        ax.set_xlabel(f"output angle [deg]   (the first {_INPUT_TURNS} input turns)")
+    for key in reversed(shown):
+        label, colour = _ERRORS[key]
+        angle, error, turns = lines[key]
+        output = 360.0 * angle / (2.0 * np.pi * turns)
+        if whole is not None:
+            pieces = min(_PIECES, waves // 3)  # each contains whole waves
+            _envelope(whole, output, error, pieces, color=colour, label=label)
+            first = angle <= 2.0 * np.pi * _INPUT_TURNS
+            output, error = output[first], error[first]
+        stride = -(-error.size // _AT_MOST)
+        ax.plot(output[::stride], error[::stride], color=colour, lw=0.9, label=label)
+    for axis in [ax] if whole is None else [ax, whole]:
+        axis.grid(alpha=0.3)
+        axis.margins(x=0)
+    top = whole or ax
+    low, high = top.get_ylim()
+    top.set_ylim(low, high + 0.2 * (high - low))  # room for the legend
+    top.legend(fontsize="small", loc="upper right", ncols=2)
+
+
+def _split(ax: Any) -> tuple[Any, Any]:
+    """Replace axes by two axes, one above the other."""
+    figure, place = ax.figure, ax.get_subplotspec()
+    ax.remove()
+    grid = place.subgridspec(2, 1)
+    return figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+
+
+def _envelope(
+    ax: Any,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    pieces: int,
+    **style: Any,
+) -> None:
+    """Draw the lower and upper bound of a dense line as a band."""
+    edges = np.linspace(0, x.size, pieces + 1).astype(np.intp)
+    low, high = (f.reduceat(y, edges[:-1]) for f in (np.minimum, np.maximum))
+    middle = 0.5 * (x[edges[:-1]] + x[edges[1:] - 1])
+    ax.fill_between(middle, low, high, alpha=0.25, lw=0.0, **style)
+    for bound in (low, high):
+        ax.plot(middle, bound, color=style["color"], lw=0.9)
 
 
 def _orders(ax: Any, sheet: SpecSheet) -> None:
@@ -114,27 +174,53 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
     if not shown:
         _absent(ax, sheet.missing.get("orders", "not computed"))
         return
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import NullFormatter, NullLocator
 
-    largest, drawn = 0.0, set()
+    largest, strongest, cut = 0.0, dict[float, float](), False
     for k, key in enumerate(shown):
         label, colour = _ERRORS[key]
         order, amplitude = sheet.turns[key].lines()
         amplitude = amplitude / arcmin
         largest = max(largest, float(amplitude.max(initial=0.0)))
-        keep = amplitude > 1e-4 * amplitude.max(initial=1e-300)
-        drawn |= set(order[keep].tolist())
+        keep = np.argsort(amplitude)[::-1]
+        keep = keep[amplitude[keep] > _FLOOR * amplitude.max(initial=1e-300)]
+        cut |= keep.size > _LINES
+        keep = keep[:_LINES]
+        for at, size in zip(order[keep], amplitude[keep], strict=True):
+            strongest[float(at)] = max(size, strongest.get(float(at), 0.0))
         shift = 1.0 + 0.02 * k  # draws the lines side by side on a logarithmic axis
-        ax.vlines(order[keep] * shift, 0.0, amplitude[keep], color=colour, label=label)
+        x, y = order[keep] * shift, amplitude[keep]
+        ax.vlines(x, 0.0, y, color=colour, lw=1.0)
+        ax.plot(x, y, "o^"[k], color=colour, ms=3.5, label=label)
     ax.set_xscale("log")
     ax.xaxis.set_minor_formatter(NullFormatter())
-    if len(drawn) <= _FEW:  # all of them may be between two labelled powers of ten
-        ax.set_xticks(sorted(drawn), [f"{order:.4g}" for order in sorted(drawn)])
+    if cut:
+        ax.set_title(f"transmission error: the {_LINES} strongest orders")
+    if ticks := _ticks(strongest):
+        ax.set_xticks(ticks, [f"{order:.4g}" for order in ticks])
+        ax.xaxis.set_minor_locator(NullLocator())
     if largest > 0.0:
         ax.set_yscale("log")
-        ax.set_ylim(1e-4 * largest, 2.0 * largest)
-    ax.legend(fontsize="small")
+        ax.set_ylim(_FLOOR * largest, 3.0 * largest)
+    ax.legend(fontsize="small", loc="upper right", ncols=2)
     ax.grid(alpha=0.3)
+
+
+def _ticks(strongest: Mapping[float, float]) -> list[float]:
+    """The strongest orders whose labels do not overlap on the logarithmic axis.
+
+    Args:
+        strongest: Amplitudes by order.
+    """
+    if not strongest:
+        return []
+    low, high = min(strongest), max(strongest)
+    apart = max((high / low) ** _APART, 1.0 + 1e-9)
+    ticks: list[float] = []
+    for order in sorted(strongest, key=lambda order: -strongest[order]):
+        if all(max(order / one, one / order) >= apart for one in ticks):
+            ticks.append(order)
+    return sorted(ticks)
 
 
 def _losses(ax: Any, sheet: SpecSheet) -> None:
