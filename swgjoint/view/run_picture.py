@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.maps.sheet.validity_marks import joint_mark, mark_legend
+from swgjoint.maps.sheet.validity_marks import NOT_VALID, UNCERTAIN, joint_mark
 from swgjoint.pictures import png
 from swgjoint.units import arcmin, mm
 from swgjoint.view.plots.runs import draw_orders
@@ -29,7 +30,7 @@ def run_png(run: Run) -> bytes:
     """Draw torque, torsion, errors and torque ripple of all joints of a run.
 
     Torque, torsion and transmission error are drawn for the :data:`MOST` joints with
-    the largest torque deviation, the spectrum of the ripple for the first of them. The
+    the largest torque deviation, and the spectrum for that with the largest ripple. The
     bars repeat the figures of the printed table, with the same marks.
 
     Args:
@@ -74,17 +75,8 @@ def run_png(run: Run) -> bytes:
         axis.set_xlabel("time [s]   (shaded: used for the figures)")
         axis.margins(x=0)
     _ripple_bars(axes[2, 0], run)
-    worst, metrics = order[0], run.metrics()
-    if metrics["joints"][worst]["ripple_missing"]:
-        _absent(axes[2, 1], "this joint has no ripple: the run names the reason")
-    else:
-        style = {"color": colors[worst], "lw": 0.9}
-        draw_orders(axes[2, 1], run, run.joints.index(worst), style)
-        if not axes[2, 1].lines:
-            _absent(axes[2, 1], "no half turn of the input at constant speed")
-    title = f"orders of the output torque ripple: {short(worst)}"
-    _label(axes[2, 1], title, "amplitude [% of rated torque]")
-    axes[2, 1].set_xlabel("order [cycles per input turn]")
+    metrics = run.metrics()
+    _spectrum(axes[2, 1], run, metrics["joints"], colors)
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper right", ncols=min(4, len(names)))
     title = f"scene {run.name}: {metrics['verdict']}{_rest(run)}"
@@ -124,12 +116,35 @@ def _ripple_bars(axis: Any, run: Run) -> None:
     axis.set_ylim(bottom=0.0)
     axis.legend(fontsize="small")
     _label(axis, "output torque ripple", "ripple [% of rated torque]")
-    legend = []
+    meanings = {">": "lower bound", UNCERTAIN: "uncertain", NOT_VALID: "not valid"}
     if any(joint["ripple_is_lower_bound"] for joint in joints.values()):
-        legend.append("> lower bound")
-    if marks - {""}:
-        legend.append(mark_legend(marks))
-    axis.set_xlabel("\n".join(legend))
+        marks.add(">")
+    axis.set_xlabel(
+        "   ".join(f"{sign} {text}" for sign, text in meanings.items() if sign in marks)
+    )
+
+
+def _spectrum(
+    axis: Any, run: Run, joints: Mapping[str, Any], colors: Mapping[str, str]
+) -> None:
+    """Draw the order spectrum of the joint with the largest ripple in % of rated."""
+    ripples = {
+        name: joint["ripple_pp_percent"]
+        for name, joint in joints.items()
+        if not joint["ripple_missing"]
+    }
+    title = "orders of the output torque ripple"
+    if not ripples:
+        _absent(axis, "no joint has a ripple: the run names the reason")
+    else:
+        worst = max(ripples, key=lambda name: float(ripples[name]))
+        title += f": {short(worst)}"
+        style = {"color": colors.get(worst, "0.2"), "lw": 0.9}
+        draw_orders(axis, run, run.joints.index(worst), style)
+        if not axis.lines:
+            _absent(axis, "no half turn of the input at constant speed")
+    _label(axis, title, "amplitude [% of rated torque]")
+    axis.set_xlabel("order [cycles per input turn]")
 
 
 def _absent(axis: Any, reason: str) -> None:

@@ -48,4 +48,16 @@ def test_rounding_is_not_drawn_as_a_result(synthetic_map, figures):
         assert top - bottom >= 0.999 * run_picture.FINEST
     assert [text.get_text() for text in bars.texts] == ["-"]
     assert not orders.lines
-    assert "no ripple" in orders.texts[0].get_text()
+    assert "no joint has a ripple" in orders.texts[0].get_text()
+
+
+def test_marks_of_the_table_are_above_the_bars(synthetic_map, figures):
+    """A joint that is too fast for the tooth order has a lower bound."""
+    run = run_of(synthetic_map, **{"trajectory.speed_deg_s.joint": 6.0})
+    run_picture.run_png(run)
+    *_, bars, _ = figures[0].axes
+    joint = run.metrics()["joints"]["joint"]
+    assert joint["ripple_is_lower_bound"]
+    mark = "-" if joint["ripple_missing"] else ">"
+    assert [text.get_text() for text in bars.texts] == [mark]
+    assert bars.get_xlabel() == "> lower bound"
