@@ -46,6 +46,23 @@ def test_paths_keep_their_limits(kind):
         assert distance.max() > 2.0 * mm
 
 
+@pytest.mark.parametrize(
+    "limit", [{"max_angle_rad": 0.03}, {"max_speed_rad_s": 0.03}], ids=str
+)
+def test_curves_are_cut_off_at_the_limits_of_the_joints(limit):
+    """In either direction, and close to the limit, because more would fit."""
+    found = []
+    for seed in range(4):
+        env = drawn(reference=TOOL, **limit)
+        env.reset(seed=10 * seed)
+        q, v = env.task.position, env.task.velocity
+        # shape (directions, instants, episodes, joints)
+        found.append([q - q[0], q[0] - q] if "max_angle_rad" in limit else [v, -v])
+    top = np.max(found, axis=(0, 2, 3, 4))
+    (bound,) = limit.values()
+    assert (top <= bound * ROUND_OFF).all() and (top > 0.8 * bound).all()
+
+
 @pytest.mark.parametrize("kind", JOINT + TOOL)
 def test_speeds_and_accelerations_are_derivatives(kind):
     """Central differences of position and speed over two periods."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from messages import naming
 
+from swgjoint.envs.arm import core
 from swgjoint.envs.arm_tracking import ArmTrackingEnv, ArmTrackingVectorEnv
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -145,6 +146,21 @@ def test_a_drawn_payload_starts_at_rest():
     want = np.outer(first["payload_kg"] - 2.0, G * J[2])
     np.testing.assert_allclose(missing, want, atol=0.05)
     assert np.abs(want).max() > 5.0
+
+
+def test_the_step_is_checked_with_the_lightest_payload(monkeypatch):
+    """Its link inertias are those without a payload, if the range begins with zero."""
+    checked, check = [], core.check_region
+
+    def record(drive, **keys):
+        checked.append(drive.link_inertia)
+        return check(drive, **keys)
+
+    monkeypatch.setattr(core, "check_region", record)
+    for mass in (0.0, (0.0, 4.0)):
+        ArmTrackingEnv(payload_kg=mass, payload_centre_mm=CENTRE, **SHORT)
+    empty, lightest = checked[:6], checked[6:]
+    np.testing.assert_allclose(lightest, empty, rtol=1e-9)
 
 
 def test_payloads_are_drawn_anew_and_from_the_seed():

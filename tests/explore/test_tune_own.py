@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -13,15 +14,18 @@ import swgjoint
 import swgjoint.envs
 from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.errors import InputError
+from swgjoint.explore.tune import tune as run
 from swgjoint.explore.tune.cost import Trials
 from swgjoint.explore.tune.gains import PLANNED
 from swgjoint.explore.tune.own import OwnController
 from swgjoint.explore.tune.result import TuneSettings
+from swgjoint.explore.tune.tunable import GainParameter
 from swgjoint.explore.tune.tune import tune
 from swgjoint.json_text import json_text
 
 NAME = "swgjoint/JointTracking-v0"
 SHORT = {"episode_s": 0.5, "max_speed_rad_s": 0.3}
+ARM = {"scene": "two-link", "episode_s": 0.5}
 
 
 class Mine:
@@ -116,6 +120,32 @@ def test_its_cost_is_that_of_the_same_law():
     trials.close()
 
 
+@pytest.mark.parametrize("low", [0.1, -0.5])
+def test_positions_between_bounds_are_reversible(low):
+    """On the logarithmic and on the linear scale; bounds are at 0 and 1."""
+    one = GainParameter(key="a", low=low, high=2.0, neutral=0.7)
+    np.testing.assert_allclose(one.value(np.array([0.0, 1.0])), [low, 2.0])
+    assert one.value(np.array(one.start)) == pytest.approx(0.7)
+    assert one.place(1.2) == pytest.approx(
+        (1.2 + 0.5) / 2.5 if low < 0.0 else np.log(12.0) / np.log(20.0)
+    )
+
+
+def test_values_beyond_the_bounds_are_kept_if_they_cost_less(monkeypatch):
+    """As no integral, which no search reaches: then the start is the result."""
+    own = OwnController.from_object(Mine)
+    wrong = GainParameter(key="torque_share", low=-3.0, high=-2.0, neutral=1.0)
+    bounds = (*own.bounds[:2], wrong)
+    monkeypatch.setattr(
+        run, "controller_named", lambda name: replace(own, bounds=bounds)
+    )
+    found = tune(settings("any", environment="ArmTracking-v0", arguments=ARM))
+    _, first, best = found.candidates
+    assert first.values["torque_share"] == 1.0
+    assert best.values == first.values and best.name == "Mine tuned"
+    np.testing.assert_array_equal(best.held_out, first.held_out)
+
+
 @pytest.mark.parametrize("name", ["RippleSuppression-v0", "ArmTracking-v0"])
 def test_its_torque_is_added_to_motor_loops(name):
     """No torque is the motor loop alone; all joints of an arm take part."""
@@ -136,7 +166,7 @@ def test_its_torque_is_added_to_motor_loops(name):
 
     arguments = {"episode_s": 1.6, "period_s": 4e-3}
     if name.startswith("Arm"):
-        arguments = {"scene": "two-link", "episode_s": 0.5}
+        arguments = ARM
     found = tune(settings(Nothing, environment=name, arguments=arguments))
     loop, first, best = found.candidates
     np.testing.assert_array_equal(first.training, loop.training)
