@@ -172,33 +172,6 @@ def tooth_profiles(rows: list[Row]) -> list[list[str]]:
     ]
 
 
-def agreement(results: Sequence[Row]) -> list[list[str]]:
-    """Printed values within 15 % and trends that the whole study finds."""
-    (result,) = results
-    shares, trends, rows = result["shares"], result["trends"], result["rows"]
-    printed = [row for row in rows if row["source_value"] is not None]
-    tables = [row for row in printed if row["part"].startswith("table-")]
-
-    def share(key: str) -> str:
-        return f"{shares[key]['within']} of {shares[key]['printed']}"
-
-    def within(key: str) -> str:
-        found = sum(abs(row[key]) <= result["within_percent"] for row in tables)
-        return f"{found} of {len(tables)}"
-
-    def found(tenth: bool) -> str:
-        some = [trend for trend in trends if trend["tenth"] is tenth]
-        return f"{sum(trend['agrees'] for trend in some)} of {len(some)}"
-
-    cells = "deviation_tenth_percent", "deviation_percent"
-    return [
-        ["agreement with the thesis", "ours, T/10", "ours, T"],
-        ["printed values within 15 %", share("tenth"), share("nominal")],
-        ["those of Tables 5.6, 6.7, 6.11 and 6.12", *map(within, cells)],
-        ["stated trends that are found", found(True), found(False)],
-    ]
-
-
 def controllers(rows: list[Row]) -> list[list[str]]:
     """Mean and standard deviation of each controller over its specimens."""
     units = {
@@ -279,21 +252,6 @@ def fatigue(rows: list[Row]) -> list[list[str]]:
     return table
 
 
-def springs(rows: list[Row]) -> list[list[str]]:
-    """Deflection, force, play and tooth force of a cup on springs."""
-    head = ["springs of a lobe", "deflection [mm]", "force [N]", "play [arcmin]"]
-    table = [[*head, "force on the teeth [N]"]]
-    found: dict[str, list[float]] = {}
-    for row in rows:
-        if row["quantity"].startswith("springs, "):
-            name = row["quantity"].removeprefix("springs, ").rpartition(":")[0]
-            found.setdefault(name, []).append(row["ours"])
-    for name, (deflection, force, play, teeth) in found.items():
-        cells = f"{deflection:.3f}", f"{force:.1f}", f"{play:.2f}", f"{teeth:.1f}"
-        table.append([name, *cells])
-    return table
-
-
 def experiments(results: Sequence[Row]) -> list[list[str]]:
     """Stiffness at ratio 50 over that at ratio 100 after one change."""
     names = {
@@ -336,45 +294,6 @@ def coning(results: Sequence[Row]) -> list[list[str]]:
             for name, at in rows.items()
         ),
     ]
-
-
-def finite_elements(results: Sequence[Row]) -> list[list[str]]:
-    """Errors, CPU time and memory of finite-element models of one drive."""
-    (result,) = results
-    settings = {
-        ("ring", "closed form"): ("closed form", ""),
-        ("ring", "thin rings, refinement 1"): ("thin rings", "1"),
-        ("2d", "refinement 1, linear"): ("2D, linear", "1"),
-        **{
-            ("2d", f"refinement {n}"): ("2D, closed-form cup", n)
-            for n in ("0.5", "1", "2", "4")
-        },
-        ("3d", "refinement 0.5, linear"): ("3D, linear", "0.5"),
-        **{("3d", f"refinement {n}"): ("3D", n) for n in ("0.5", "0.7", "1")},
-    }
-    head = ["model", "refinement", "stiffness", "unloaded error [arcsec]"]
-    table = [[*head, "tensile stress", "rim shape", "CPU time [s]", "memory [MB]"]]
-    for (model, setting), labels in settings.items():
-        found = {
-            row["quantity"]: row
-            for row in result["rows"]
-            if (row["model"], row["setting"]) == (model, setting)
-        }
-        stiffness, error, tensile, rim = (
-            found[key]["error"]
-            for key in (
-                "torsional_stiffness_Nm_rad",
-                "kinematic_error_pp_arcsec",
-                "tensile_MPa",
-                "rim_shape_mm",
-            )
-        )
-        row = found["tensile_MPa"]
-        cells = [f"{100.0 * stiffness:+.1f} %", f"{error:.2f}"]
-        cells += [f"{100.0 * tensile:+.1f} %", f"{100.0 * rim:.2f} %"]
-        cells += [f"{row['cpu_s']:.0f}", f"{row['peak_MB']:.0f}"]
-        table.append([*labels, *cells])
-    return table
 
 
 def bearing_in_plane(results: Sequence[Row]) -> list[list[str]]:
