@@ -7,6 +7,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
+import rerun as rr
 from messages import naming
 from rerun.chunk import RrdReader
 
@@ -19,6 +20,7 @@ from swgjoint.view.plots.runs import comparison_png, draw_ripple
 from swgjoint.view.recording import recording
 from swgjoint.view.recording.blueprint import joints_shown
 from swgjoint.view.recording.entities import pose_rows, signals_of
+from swgjoint.view.recording.paths import body_path, joint_path, phase_path
 from swgjoint.view.recording.recording import write_recording
 from swgjoint.view.recording.viewer import STARTED
 from swgjoint.view.run import run_scene
@@ -153,6 +155,22 @@ def test_a_layout_of_what_is_not_there_is_refused(synthetic_map, key, value, mes
             overrides={**SHORT, f"recording.{key}": value},
             drives={"reference-2d": synthetic_map},
         )
+
+
+def test_names_of_an_arm_are_one_part_of_a_path_each(tmp_path, capfd):
+    """The viewer need not guess what spaces and slashes in names mean."""
+    name = "left arm/joint 1"
+    part = "left\\ arm\\/joint\\ 1"
+    paths = [joint_path(name, "a b"), phase_path(name, ""), body_path("", name)]
+    assert paths == [f"a\\ b/joint/{part}", f"phase/{part}/run", f"arm/{part}"]
+    stream = rr.RecordingStream("names")
+    stream.save(tmp_path / "names.rrd")
+    for path in paths:
+        stream.log(path, rr.Scalars(1.0), static=True)
+    stream.disconnect()
+    found = {chunk.entity_path for chunk in RrdReader(tmp_path / "names.rrd").stream()}
+    assert {f"/{path}" for path in paths} <= found
+    assert "WARN" not in capfd.readouterr().err
 
 
 def test_several_runs_share_one_recording(run, synthetic_map, tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 from swgjoint.sim.figures.metrics import strongest_left_out, torque_deviation
 from swgjoint.view.recording.drive_view import drives_shown, eye, fields_of
 from swgjoint.view.recording.joint_pictures import WIDTH
-from swgjoint.view.recording.paths import drive_path, prefix_of
+from swgjoint.view.recording.paths import drive_path, joint_path, phase_plot, prefix_of
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -55,7 +55,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
     flexible = flexible or list(scenes)
 
     def plot(joint: str, title: str, signal: str, labels: Iterable[str]) -> Any:
-        paths = [f"{prefixes[label]}joint/{joint}" for label in labels]
+        paths = [f"/{joint_path(joint, label)}" for label in labels]
         return _plot(title, paths, signal)
 
     bounds = rrb.VisualBounds2D(
@@ -66,9 +66,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
         j = first.joints.index(joint)
         pictures = []
         if any(scene.trajectory.steady_velocity[j] for scene in scenes.values()):
-            bars = [
-                f"{prefixes[label]}joint/{joint}/ripple_orders" for label in flexible
-            ]
+            bars = [f"/{joint_path(joint, label)}/ripple_orders" for label in flexible]
             title = "torque ripple over order per input turn [% of rated torque]"
             pictures.append(
                 rrb.BarChartView(
@@ -81,7 +79,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
             pictures.append(
                 rrb.Spatial2DView(
                     name="torque against torsion",
-                    origin=f"/phase/{joint}",
+                    origin=f"/{phase_plot(joint)}",
                     contents="$origin/**",
                     visual_bounds=bounds,
                 )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from swgjoint.view.recording.columns import Column
 from swgjoint.view.recording.geometry import quaternion_xyzw
+from swgjoint.view.recording.paths import body_path, part_of_path
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -81,9 +82,10 @@ def send_loads(
 
 def _paths(prefix: str, assembly: Assembly) -> list[str]:
     model = assembly.arm.model
+    bodies = [model.body(model.joint(name).bodyid[0]).name for name in assembly.joints]
     return [
-        f"{prefix}arm/{model.body(model.joint(name).bodyid[0]).name}/drive/{name}"
-        for name in assembly.joints
+        f"{body_path(prefix, body)}/drive/{part_of_path(name)}"
+        for body, name in zip(bodies, assembly.joints, strict=True)
     ]
 
 

@@ -57,7 +57,9 @@ from swgjoint.view.recording.joint_pictures import (
     send_phase,
 )
 from swgjoint.view.recording.paths import (
+    body_path,
     drive_path,
+    joint_path,
     part_of_path,
     phase_path,
     prefix_of,
@@ -145,7 +147,7 @@ def log_known(
             assembly.joints, assembly.transmissions, strict=True
         ):
             style = _style(label or joint, color)
-            stream.log(f"{prefix}joint/{joint}", style, static=True)
+            stream.log(joint_path(joint, label), style, static=True)
             if has_torsion(transmission):
                 log_phase_axes(stream, joint)
                 log_phase_point(stream, phase_path(joint, label), color)
@@ -178,7 +180,7 @@ def log_measured(stream: Any, runs: Mapping[str, Run], scales: Scales) -> None:
         for j, joint in enumerate(run.joints):
             bars = ripple_bars(run, j)
             if bars is not None:
-                log_ripple(stream, f"{prefix}joint/{joint}", bars, color)
+                log_ripple(stream, joint_path(joint, label), bars, color)
             if (of_joint := scales[joint]) is not None:
                 path = phase_path(joint, label)
                 log_phase_path(stream, path, run, j, of_joint, color)
@@ -222,7 +224,7 @@ def log_moving(
                 for name, values in signals_of(run, j, part).items()
             ]
             stream.send_columns(
-                f"{prefix_of(label)}joint/{joint}", indexes=[time], columns=columns
+                joint_path(joint, label), indexes=[time], columns=columns
             )
     for label, joint in drives.items():
         run = runs[label]
@@ -275,7 +277,8 @@ def _log_shapes(stream: Any, prefix: str, assembly: Assembly) -> None:
         if shape is None:
             continue
         body = model.body(model.geom_bodyid[geom]).name
-        path = f"{prefix}arm/{body}/{model.geom(geom).name or geom}"
+        name = part_of_path(model.geom(geom).name or str(geom))
+        path = f"{body_path(prefix, body)}/{name}"
         place = rr.Transform3D(
             translation=model.geom_pos[geom],
             quaternion=quaternion_xyzw(model.geom_quat[geom]),
@@ -293,7 +296,7 @@ def _send_poses(
     arm, model = run.assembly.arm, run.assembly.arm.model
     places, turns = arm.body_poses(run.position[rows])
     for body in range(1, model.nbody):
-        path = f"{prefix}arm/{model.body(body).name}"
+        path = body_path(prefix, model.body(body).name)
         place, turn = places[:, body], quaternion_xyzw(turns[:, body])
         if model.body_weldid[body] == 0:
             pose = rr.Transform3D(translation=place[0], quaternion=turn[0])

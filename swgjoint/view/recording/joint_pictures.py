@@ -12,6 +12,7 @@ from swgjoint.sim.figures.metrics import highest_resolved_order, torque_ripple
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.view.recording.columns import Column, Numbers
+from swgjoint.view.recording.paths import phase_plot
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -143,7 +144,7 @@ def log_phase_axes(stream: Any, joint: str) -> None:
 
     axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
     strips = rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004])
-    stream.log(f"phase/{joint}/axes", strips, static=True)
+    stream.log(f"{phase_plot(joint)}/axes", strips, static=True)
 
 
 def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None:
@@ -158,7 +159,7 @@ def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None
 
     torsion, torque = scales
     stream.log(
-        f"phase/{joint}/ends",
+        f"{phase_plot(joint)}/ends",
         rr.Points2D(
             [[WIDTH, 0.0], [0.0, -1.0]],
             labels=[f"{torsion:.3g} arcmin", f"{torque:.3g} N·m"],

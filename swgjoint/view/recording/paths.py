@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def part_of_path(label: str) -> str:
-    """Name of a run, possibly a file name, escaped as one part of an entity path."""
+    """Name of a run, joint, body or geom, escaped as one part of an entity path."""
     import rerun as rr
 
     return str(rr.escape_entity_path_part(label))
@@ -15,6 +15,26 @@ def prefix_of(label: str) -> str:
     return f"{part_of_path(label)}/" if label else ""
 
 
+def joint_path(joint: str, label: str) -> str:
+    """Entity path of the signals of a joint.
+
+    Args:
+        joint: Name of the joint.
+        label: Name of the run; empty for a single, unnamed run.
+    """
+    return f"{prefix_of(label)}joint/{part_of_path(joint)}"
+
+
+def body_path(prefix: str, body: str) -> str:
+    """Entity path of a body.
+
+    Args:
+        prefix: Path of the run with a trailing slash, or empty.
+        body: Name of the body.
+    """
+    return f"{prefix}arm/{part_of_path(body)}"
+
+
 def drive_path(joint: str, label: str) -> str:
     """Entity path of the drawing of a joint's drive.
 
@@ -22,7 +42,17 @@ def drive_path(joint: str, label: str) -> str:
         joint: Name of the joint.
         label: Name of the run; empty for a single run.
     """
-    return f"drive/{joint}/{part_of_path(label)}" if label else f"drive/{joint}"
+    drive = f"drive/{part_of_path(joint)}"
+    return f"{drive}/{part_of_path(label)}" if label else drive
+
+
+def phase_plot(joint: str) -> str:
+    """Entity path of the plots of torque against torsion of all runs.
+
+    Args:
+        joint: Name of the joint.
+    """
+    return f"phase/{part_of_path(joint)}"
 
 
 def phase_path(joint: str, label: str) -> str:
@@ -32,4 +62,4 @@ def phase_path(joint: str, label: str) -> str:
         joint: Name of the joint.
         label: Name of the run; empty for a single run.
     """
-    return f"phase/{joint}/{part_of_path(label or 'run')}"
+    return f"{phase_plot(joint)}/{part_of_path(label or 'run')}"
