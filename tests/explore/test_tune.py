@@ -25,7 +25,7 @@ from swgjoint.explore.tune.tune import tune
 from swgjoint.json_text import json_text
 from swgjoint.sim.controller import ReadingAge
 from swgjoint.units import arcmin
-from swgjoint.view.plots.tune import claims, write_files
+from swgjoint.view.plots.tune import claims, picture, write_files
 
 NAME = "swgjoint/JointTracking-v0"
 SHORT = {"episode_s": 0.5, "max_speed_rad_s": 0.3}
@@ -254,6 +254,30 @@ def test_report_states_what_feed_forward_alone_brings(tmp_path):
     assert "Cost by held-out seed" in page and "data:image/png" in page
     assert "Joints" not in page and len(files) == 3
     assert (tmp_path / "tune.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_picture_shows_every_cost(monkeypatch):
+    """Also one far above that of the baseline, and costs that are all equal."""
+    figures = []
+    monkeypatch.setattr(
+        "swgjoint.view.plots.tune.png", lambda f, **_: figures.append(f)
+    )
+    found = tune(settings())
+    bad = replace(found.candidates[2], held_out=1e3 * found.baseline.held_out)
+    far = (*found.candidates[:2], bad, found.best)
+    search = list(found.searches.values())[-1]
+    level = found.baseline.training.mean()
+    search = replace(search, costs=[np.full_like(x, level) for x in search.costs])
+    pair = (found.baseline, found.best)
+    same = {"candidates": pair, "searches": {"pd-feedforward": search}}
+    for changes in ({"candidates": far}, same):
+        picture(replace(found, **changes))
+        for ax in figures[-1].axes[:2]:
+            low, high = ax.get_ylim()
+            assert 1.1 * low < high
+            for line in ax.lines:
+                y = np.asarray(line.get_ydata(), float)
+                assert np.all((low < y) & (y < high))
 
 
 def test_names_that_are_not_there():

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 COLORS = ("0.45", "C1", "C2", "C0")
 """Colours of the candidates; the baseline has the first one, the tuned controller the
 last one."""
+_ROOM = 1.25  # smallest ratio of the ends of an axis to the costs it shows
 
 
 def claims(tuned: Tuned) -> list[str]:
@@ -124,6 +125,10 @@ def _draw_search(ax: Any, tuned: Tuned) -> None:
         ylabel=f"mean cost [{tuned.unit}]",
         title=f"search on {tuned.settings.training} training seeds",
     )
+    # an axis fitted to equal costs would show their rounding errors
+    low, high = ax.get_ylim()
+    if high < _ROOM * low:
+        ax.set_ylim(low / _ROOM, high * _ROOM)
     _plain_ticks(ax)
     ax.legend()
 
@@ -140,8 +145,10 @@ def _draw_seeds(ax: Any, tuned: Tuned) -> None:
         ylabel=f"cost [{tuned.unit}]",
         title="cost on held-out seeds (lines: means)",
     )
-    # leave room for the legend above the points
-    ax.set_ylim(top=4.0 * tuned.baseline.held_out.max() / tuned.unit_size)
+    costs = np.concatenate([one.held_out for one in tuned.candidates])
+    low, high = np.array([costs.min(), costs.max()]) / tuned.unit_size
+    # leave a share of the height for the legend above the points
+    ax.set_ylim(low / _ROOM, high * _ROOM * (high / low) ** 0.3 * _ROOM)
     ax.ticklabel_format(axis="x", useOffset=False)
     _plain_ticks(ax)
     ax.legend(loc="upper center", ncols=2)
