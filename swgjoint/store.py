@@ -207,7 +207,7 @@ def warn_ignored(where: Path | str, why: Exception) -> None:
     _log.warning("%s is ignored and computed again: %s", where, one_line(why))
 
 
-def one_line(error: Exception) -> str:
+def one_line(error: BaseException) -> str:
     """First line of an error message, or the class name if there is no message."""
     lines = str(error).splitlines() or [type(error).__name__]
     return lines[0]

@@ -182,6 +182,10 @@ def failing(self, *_, **__):
     raise RuntimeError("first line\nsecond line")
 
 
+def leaving(self, *_, **__):
+    raise SystemExit(0)
+
+
 def nan_later(self, k, measured):
     return np.full(1, np.nan if k == 7 else 0.0)
 
@@ -203,6 +207,9 @@ def nan_later(self, k, measured):
         (made(torque=lambda self, k, m: np.zeros(2)), ("torque", "(2,)", "(1,)")),
         (made(torque=lambda self, k, m: None), ("torque", "None", "(1,)")),
         (made(torque=lambda self, k, m: "x"), ("torque", "'x'", "(1,)")),
+        (made(torque=lambda self, k, m: ["1.0"]), ("torque", "['1.0']", "(1,)")),
+        (made(torque=lambda self, k, m: np.array([1j])), ("torque", "1.j", "(1,)")),
+        (made(torque=leaving), ("torque", "SystemExit", "0")),
         (made(torque=None), ("start", "torque", "methods")),
         (3, ("controller", "3", "class", "pd-flexible")),
     ],
@@ -280,10 +287,17 @@ def test_a_file_names_a_controller(tmp_path):
     ):
         with pytest.raises(InputError, match=naming(*match)):
             tune(settings(name))
-    path.write_text("import nothing_of_this_name")
-    found = naming("own.py", "ModuleNotFoundError", "nothing_of_this_name")
-    with pytest.raises(InputError, match=found):
-        tune(chosen)
+    for text, match in (
+        (
+            "import nothing_of_this_name",
+            ("ModuleNotFoundError", "nothing_of_this_name"),
+        ),
+        ("raise SystemExit(0)", ("SystemExit", "0")),
+        ("", ("'Own'", "class", "parameters")),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=naming("own.py", *match)):
+            tune(chosen)
 
 
 def test_environments_drive_it_as_trials_do():

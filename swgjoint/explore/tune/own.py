@@ -97,13 +97,12 @@ class OwnController:
         sys.modules[module.__name__] = module  # dataclasses look it up
         try:
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise InputError(f"{path}: {_told(error)}") from error
         if not hasattr(module, name):
             known = [key for key, one in vars(module).items() if _is_own(one)]
-            raise InputError(
-                f"{path}: no {name!r}; accepted: {', '.join(known) or 'its names'}"
-            )
+            accepted = ", ".join(known) or "a class or function with parameters"
+            raise InputError(f"{path}: no {name!r}; accepted: {accepted}")
         found = cls.from_object(getattr(module, name), f"{path.name}:{name}")
         return replace(found, content=path.read_text(encoding="utf-8"))
 
@@ -137,7 +136,7 @@ class OwnController:
         """
         try:
             made = self.make(**values)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._fault(values, "", error) from error
         methods = (getattr(made, key, None) for key in ("start", "torque"))
         if not all(map(callable, methods)):
@@ -168,7 +167,7 @@ class OwnController:
         for k, (one, given) in enumerate(zip(controllers, each, strict=True)):
             try:
                 one.start(task.select(k))
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise self._fault(given, "start", error) from error
 
         def act(instant: int, measured: Measured, alive: NDArray[np.bool_]) -> Array:
@@ -176,7 +175,7 @@ class OwnController:
             for k in np.flatnonzero(alive).tolist():
                 try:
                     torque = controllers[k].torque(instant, _of_one(measured, k))
-                except Exception as error:
+                except (Exception, SystemExit) as error:
                     where = f"torque at instant {instant}"
                     raise self._fault(each[k], where, error) from error
                 torques[k] = self._checked(torque, joints, instant, each[k])
@@ -189,15 +188,16 @@ class OwnController:
     ) -> Array:
         """Torques of one episode, if they are finite numbers of the right shape."""
         try:
-            array = np.asarray(torque, float)
-            good = torque is not None and array.shape == (joints,)
-        except (TypeError, ValueError):
+            array = np.asarray(torque)
+            # a text or a complex number would be cast without an error
+            good = array.dtype.kind in "iuf" and array.shape == (joints,)
+        except ValueError:
             good = False
         if good and np.isfinite(array).all():
             return array
         shape = getattr(torque, "shape", None)
         found = " ".join(format_value(torque).split())
-        if shape is not None and not good:
+        if shape not in (None, (joints,)):
             found = f"shape {shape}"
         raise InputError(
             f"{self._head(values)}: torque at instant {instant}: {found};"
@@ -205,7 +205,7 @@ class OwnController:
         )
 
     def _fault(
-        self, values: Mapping[str, float], where: str, error: Exception
+        self, values: Mapping[str, float], where: str, error: BaseException
     ) -> InputError:
         place = f": {where}" if where else ""
         return InputError(f"{self._head(values)}{place}: {_told(error)}")
@@ -247,5 +247,5 @@ def _is_own(thing: Any) -> bool:
     return callable(thing) and isinstance(getattr(thing, "parameters", None), Mapping)
 
 
-def _told(error: Exception) -> str:
+def _told(error: BaseException) -> str:
     return f"{type(error).__name__}: {one_line(error)}"
