@@ -43,6 +43,14 @@ CASES = {
         {"randomise": True, "identify": True},
         "ppo",
     ),
+    "arm, drawn": (
+        "arm",
+        {
+            "reference": ("multisine", "point_to_point", "line", "arc", "spline"),
+            "payload_kg": (0.0, 4.0),
+        },
+        "ppo",
+    ),
     "joint, 10 ms, SAC": ("joint", {"period_s": 0.01}, "sac"),
 }
 """Environment, its keywords and the algorithm."""

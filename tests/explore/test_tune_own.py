@@ -211,6 +211,7 @@ def nan_later(self, k, measured):
         (made(torque=lambda self, k, m: np.array([1j])), ("torque", "1.j", "(1,)")),
         (made(torque=leaving), ("torque", "SystemExit", "0")),
         (made(torque=None), ("start", "torque", "methods")),
+        (type("pd", (Mine,), {}), ("'pd'", "name", "pd-flexible")),
         (3, ("controller", "3", "class", "pd-flexible")),
     ],
 )

@@ -34,7 +34,7 @@ from swgjoint.control.motor_side import (
     rigid_plan,
 )
 from swgjoint.errors import InputError
-from swgjoint.explore.tune.added import COMPENSATION, Compensation
+from swgjoint.explore.tune.added import COMPENSATION, LOOP, Compensation
 from swgjoint.explore.tune.own import OwnController
 from swgjoint.explore.tune.tunable import Act, GainParameter, Tunable
 from swgjoint.sim.controller import KnownJoints, KnownLoop, Measured, ReadingAge, Task
@@ -230,10 +230,17 @@ def controller_named(name: Any) -> Tunable:
             the user, see :class:`~swgjoint.explore.tune.own.OwnController`.
 
     Raises:
-        InputError: If there is no such controller.
+        InputError: If there is no such controller, or if a class of the user has the
+            name of another controller.
     """
     if not isinstance(name, str):
-        return OwnController.from_object(name)
+        own = OwnController.from_object(name)
+        if own.name in (*CONTROLLERS, LOOP.name):
+            raise InputError(
+                f"controller {own.name!r} of your own: accepted: a name other than"
+                f" {', '.join(CONTROLLERS)}"
+            )
+        return own
     if name in CONTROLLERS:
         return CONTROLLERS[name]
     if ".py:" in name:
