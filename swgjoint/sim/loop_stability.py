@@ -111,7 +111,8 @@ def growing_mode(assembly: Assembly) -> GrowingMode | None:
             growth = np.where(np.abs(np.angle(values)) > RESOLVED, 0.0, growth)
         worst = int(np.argmax(growth))
         if growth[worst] > 1.0 + GROWING:
-            rate = np.log(values[worst]) / model.period
+            # a real eigenvalue is negative if the sign changes every period
+            rate = np.log(complex(values[worst])) / model.period
             return GrowingMode(
                 joint=_busiest(assembly, model, vectors[:, worst]),
                 frequency=float(np.abs(rate.imag) / (2.0 * np.pi)),

@@ -200,6 +200,19 @@ def test_a_torque_that_fails_at_one_angle_is_no_common_one():
     assert len(columns.levels) > 2
 
 
+def test_errors_are_compared_with_a_larger_ripple():
+    """A thousand times the own one leaves nothing to divide and misses less."""
+    columns = grid(KnownDrive(drops=((3.0, 2e-4), (5.0, 3e-4), (7.0, 1e-4))))
+    others = [columns.unseen_column(0.5)]
+    missed = columns.largest_miss(6, others, columns.levels)
+    _, *heights = columns.peaks(6, 1.0)
+    ripple = [1e3 * height.max() for height in heights]
+    columns.ripple = lambda torque: np.multiply.outer(ripple, np.ones_like(torque))
+    assert columns.divide(6, 300, 0.02) <= 0.02
+    assert columns.levels == [2.0, PEAK]
+    assert columns.largest_miss(6, others, columns.levels) < 0.01 * missed
+
+
 def test_predicted_events_need_no_torques_next_to_them():
     """Where every equilibrium knows the events of its angle the first torques do."""
     drops = ((3.0, 2e-4), (5.0, 3e-4), (7.0, 1e-4))

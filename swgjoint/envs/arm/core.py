@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.arm.paths import ArmPaths, JointPath, ToolPath, tool_slopes
 from swgjoint.envs.arm.payload import DrawnPayloads, start_of
-from swgjoint.envs.arm.scene import check_assembly, drives_of, scene_of, standing
+from swgjoint.envs.arm.scene import at_rest, check_assembly, drives_of, scene_of
 from swgjoint.envs.arm.settings import ArmSettings
 from swgjoint.envs.core import Core, Rows
 from swgjoint.envs.entries import Entry, ceiling, error_bounds
@@ -60,7 +60,7 @@ class ArmCore(Core):
         )
         check_assembly(scene, assembly)
         if s.kinds:
-            assembly = standing(assembly)
+            assembly = at_rest(assembly)
         self._assembly, task = assembly, task_of(assembly)
         steps = round(s.episode_s / task.period)
         drives = [t.attached for t in assembly.transmissions]

@@ -109,7 +109,7 @@ def check_assembly(scene: Scene, assembly: Assembly) -> None:
         )
 
 
-def standing(assembly: Assembly) -> Assembly:
+def at_rest(assembly: Assembly) -> Assembly:
     """Copy of an assembled scene that rests in its start pose, for drawn paths."""
     path, load = assembly.trajectory, assembly.load
     still = np.zeros_like(path.position[:2])
