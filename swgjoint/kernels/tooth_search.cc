@@ -305,7 +305,7 @@ std::vector<double> ToothSearch::elastic_gaps(const std::vector<Vec>& points,
     }
     // a foot near a close point has almost its radius; far from ends there is one
     const double start = interpolate(radii_, stations_, samples_, size(there));
-    const bool close = !beside && !rigid() && known > -limit;
+    const bool close = !beside && !rigid() && known > -limit && moved < limit;
     const Vec outward = samples.at[i].normal;
     gaps.push_back(see(points[i], outward, pose, rigid(), close ? &start : nullptr,
                        close ? 3 : 2)

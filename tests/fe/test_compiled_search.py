@@ -73,6 +73,26 @@ def test_candidates_are_those_of_numpy(contact, monkeypatch, thorough, reach):
 
 
 @pytest.mark.fe
+def test_far_displaced_flanks_omit_no_candidate(contact, monkeypatch):
+    """Teeth of the circular spline moved by up to a third of the lobe height."""
+    search, flank, _, height = contact
+    if not search.circular_spline.flank_dofs:
+        return  # rigid teeth do not move
+    rng = np.random.default_rng(5)
+    nodes = search.circular_spline_flank
+    shift = rng.uniform(-0.3, 0.3, (len(nodes), 1, 2)) * height
+    moved = (nodes.reshape(len(nodes), -1, 2) + shift).reshape(nodes.shape)
+    search = replace(search, circular_spline_flank=moved)
+    found, wanted = (
+        one.search(flank, 0.02 * height, None) for one in both(monkeypatch, search)
+    )
+    assert len(wanted) > 5
+    for field in ("sector", "side", "station", "gap"):
+        ours, theirs = getattr(found, field), getattr(wanted, field)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.fe
 def test_no_candidate_has_the_same_columns(contact, monkeypatch):
     """Flanks that all stay apart, as in a wide clearance."""
     search, flank, _, height = contact
