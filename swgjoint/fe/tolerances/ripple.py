@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.fe.common.torque_choice import Ripple
 from swgjoint.maps.fit.tolerance_modes import relative_amplitudes
 from swgjoint.maps.samples import ToleranceSamples
 from swgjoint.typing import Array
@@ -18,7 +19,24 @@ errors. In size-25-100-bought, the largest error of the superposition is 1.6 to 
 the input torque and 0.4 to 9 % of the output error."""
 
 
-def ripple_with_errors(tolerances: ToleranceSamples, pitches_per_turn: int) -> Ripple:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TabulatedRipple:
+    """Peak-to-peak values between torques, a :data:`Ripple` that can be stored."""
+
+    error: tuple[Array, Array]
+    """Torques [N·m] and peak-to-peak values of the output error [rad], each (n,)."""
+    moment: tuple[Array, Array]
+    """The same of the input torque [N·m], each (m,)."""
+
+    def __call__(self, torque: ArrayLike) -> Array:
+        """Peak-to-peak values at torques [N·m] of any shape (...), (2, ...)."""
+        at = np.asarray(torque, float)
+        return np.array([np.interp(at, *one) for one in (self.error, self.moment)])
+
+
+def ripple_with_errors(
+    tolerances: ToleranceSamples, pitches_per_turn: int
+) -> TabulatedRipple:
     """Peak-to-peak values with tooth errors, times :data:`SHARE`.
 
     Args:
@@ -26,14 +44,9 @@ def ripple_with_errors(tolerances: ToleranceSamples, pitches_per_turn: int) -> R
         pitches_per_turn: Number of pitches per input turn.
     """
     _, (moment, error) = relative_amplitudes(tolerances, pitches_per_turn)
-    heights = []
+    tables = []
     for height in (error, moment):
         # the input torque is not known within a clearance
         known = np.isfinite(height)
-        heights.append((tolerances.torque[known], SHARE * height[known]))
-
-    def ripple(torque: ArrayLike) -> Array:
-        at = np.asarray(torque, float)
-        return np.array([np.interp(at, *height) for height in heights])
-
-    return ripple
+        tables.append((tolerances.torque[known], SHARE * height[known]))
+    return TabulatedRipple(error=tables[0], moment=tables[1])
