@@ -21,6 +21,19 @@ PLACES = (np.arange(4, 11) + 0.37) / 12
 """Angles in parts of the pitch."""
 
 
+def followed(follow, torques, theta):
+    """Output angles [rad] and input torques [N·m] along a path (n, 2)."""
+    rows = []
+    state = follow.engage(follow.deflect(float(theta[0])))
+    for torque in torques:
+        state = follow.to_torque(state, torque)
+        for angle in theta:
+            state = follow.to_angle(state, float(angle))
+            assert state.outcome.ok
+            rows.append((follow.output_angle(state), follow.input_torque(state)))
+    return np.array(rows)
+
+
 @pytest.mark.fe
 def test_equilibria_of_conforming_flanks_are_converged():
     """Output and input torque are those of a solver with a 500 times finer tolerance.
@@ -31,16 +44,10 @@ def test_equilibria_of_conforming_flanks_are_converged():
     design = Design.load("dca-80-to-1")
     torque = PART * ratings_of(design).repeated_peak
     theta = 2.0 * pi / design.periodicity * PLACES
-    rows = []
-    for solver in (SOLVER, NewtonSolver()):
-        follow = replace(follower_in_plane(design), solver=solver)
-        state = follow.engage(follow.deflect(float(theta[0])))
-        state = follow.to_torque(state, torque)
-        for angle in theta:
-            state = follow.to_angle(state, float(angle))
-            assert state.outcome.ok
-            rows.append((follow.output_angle(state), follow.input_torque(state)))
-    found, exact = np.split(np.array(rows), 2)
+    found, exact = (
+        followed(replace(follower_in_plane(design), solver=solver), [torque], theta)
+        for solver in (SOLVER, NewtonSolver())
+    )
     output, moment = np.abs(found - exact).max(axis=0)
     assert output < 1e-9
     assert moment < 5e-6
@@ -53,18 +60,10 @@ def test_a_short_reach_after_small_steps_omits_no_contact(name, monkeypatch):
     design = Design.load(name)
     peak = ratings_of(design).repeated_peak
     theta = 2.0 * pi / design.periodicity * PLACES[:3]
-    rows = []
-    for followed in (equilibrium.FOLLOWED, np.inf):
-        monkeypatch.setattr(equilibrium, "FOLLOWED", followed)
-        follow = follower_in_plane(design)
-        state = follow.engage(follow.deflect(float(theta[0])))
-        for part in (PART, 0.4):
-            state = follow.to_torque(state, part * peak)
-            for angle in theta:
-                state = follow.to_angle(state, float(angle))
-                assert state.outcome.ok
-                rows.append((follow.output_angle(state), follow.input_torque(state)))
-    found, exact = np.split(np.array(rows), 2)
+    torques = [PART * peak, 0.4 * peak]
+    found = followed(follower_in_plane(design), torques, theta)
+    monkeypatch.setattr(equilibrium, "FOLLOWED", np.inf)
+    exact = followed(follower_in_plane(design), torques, theta)
     output, moment = np.abs(found - exact).max(axis=0)
     assert output < 1e-12
     assert moment < 1e-8

@@ -122,7 +122,7 @@ class ArmSettings:
             )
 
     def _check_payload(self) -> None:
-        """Reject what is no mass, no range of masses, or no point."""
+        """Reject anything but a mass, a range of masses, or a point."""
         mass, centre = self.payload_kg, self.payload_centre_mm
         if mass is not None:
             ranged = isinstance(mass, tuple | list)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from swgjoint.control.error_compensation import ErrorCompensation
-from swgjoint.explore.tune.tunable import Act, GainParameter
+from swgjoint.explore.tune.tunable import Act, GainParameter, WithoutGains
 from swgjoint.sim.controller import KnownJoints, KnownLoop, Task
 from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopAlone:
+class LoopAlone(WithoutGains):
     """No torque in addition to that of the motor loops."""
 
     name: str = "motor loop"
@@ -33,17 +33,6 @@ class LoopAlone:
         """
         return ()
 
-    def gains(
-        self, values: Mapping[str, Array], joints: KnownJoints
-    ) -> dict[str, Array]:
-        """None.
-
-        Args:
-            values: Unused.
-            joints: Unused.
-        """
-        return {}
-
     def begin(
         self, values: Mapping[str, Array], task: Task, kept: dict[str, Any]
     ) -> Act:
@@ -59,7 +48,7 @@ class LoopAlone:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compensation:
+class Compensation(WithoutGains):
     """Compensation of the kinematic error that ``RippleSuppression-v0`` estimates."""
 
     name: str = "compensation"
@@ -90,17 +79,6 @@ class Compensation:
             *(GainParameter(key=key, low=0.2, high=2.0, neutral=1.0) for key in shares),
             GainParameter(key=lead, low=0.0, high=5e-3, neutral=0.0),
         )
-
-    def gains(
-        self, values: Mapping[str, Array], joints: KnownJoints
-    ) -> dict[str, Array]:
-        """None.
-
-        Args:
-            values: Unused.
-            joints: Unused.
-        """
-        return {}
 
     def controller(self, values: Mapping[str, float]) -> ErrorCompensation:
         """Controller with the given values."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import format_value, is_number
 from swgjoint.errors import InputError
-from swgjoint.explore.tune.tunable import Act, GainParameter
+from swgjoint.explore.tune.tunable import Act, GainParameter, WithoutGains
 from swgjoint.sim.controller import Controller, KnownJoints, KnownLoop, Measured, Task
 from swgjoint.store import one_line
 from swgjoint.typing import Array
@@ -24,7 +24,7 @@ _WANTED = "{'gain_Nm_rad': (low, high), ...} or (low, high, start), low < high"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class OwnController:
+class OwnController(WithoutGains):
     """A class, or a function that returns a controller, with ``parameters``.
 
     ``make(**values)`` returns a :class:`~swgjoint.sim.controller.Controller` of one
@@ -116,17 +116,6 @@ class OwnController:
             loop: Unused.
         """
         return self.bounds
-
-    def gains(
-        self, values: Mapping[str, Array], joints: KnownJoints
-    ) -> dict[str, Array]:
-        """None, because nothing is known of them.
-
-        Args:
-            values: Unused.
-            joints: Unused.
-        """
-        return {}
 
     def controller(self, values: Mapping[str, float]) -> Controller:
         """Controller with the given values.

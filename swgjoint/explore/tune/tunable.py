@@ -101,3 +101,18 @@ class Tunable(Protocol):
         Returns:
             Function for the torques of all episodes.
         """
+
+
+class WithoutGains:
+    """A controller without gains at the motor."""
+
+    def gains(
+        self, values: Mapping[str, Array], joints: KnownJoints
+    ) -> dict[str, Array]:
+        """No gains.
+
+        Args:
+            values: Unused.
+            joints: Unused.
+        """
+        return {}
