@@ -206,6 +206,8 @@ class BenchCore(Core):
         if loop_Hz is not None:
             motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
             motor.biasprm[:3] = [0.0, -loop.stiffness[0], -loop.damping[0]]
+        self.spec = spec
+        """Specification of the model, with drive and motor."""
         model = compile_spec(spec, where="environment on the bench")
         plant = Plant(
             model,
@@ -216,10 +218,12 @@ class BenchCore(Core):
             threads=threads,
             variable=variable,
         )
-        self._body = int(model.body(BODY).id)
-        self._inertia = None
+        self._place = int(model.body(BODY).id), int(model.joint(JOINT).dofadr[0])
+        self._inertias: tuple[Array, Array] | None = None
         if tolerances is not None and tolerances.load_inertia:
-            self._inertia = plant.batch.expand("body_inertia")
+            # the engine takes dof_M0 for a body whose part of the matrix is diagonal
+            names = "body_inertia", "dof_M0"
+            self._inertias = tuple(plant.batch.expand(name) for name in names)
         self.joint = attached
         super().__init__(
             plant,
@@ -257,9 +261,22 @@ class BenchCore(Core):
             index: Index of the simulation.
             shares: Change of the inertia relative to its nominal value [-]. Shape (1,).
         """
-        if self._inertia is not None:
+        if self._inertias is not None:
             inertia = (1.0 + float(shares[0])) * self.settings.link_inertia
-            self._inertia[index, self._body, 2] = inertia
+            (of_bodies, of_dofs), (body, dof) = self._inertias, self._place
+            of_bodies[index, body, 2] = of_dofs[index, dof] = inertia
+
+    @property
+    def varies_load(self) -> bool:
+        """Whether the simulations have load inertias of their own."""
+        return self._inertias is not None
+
+    @property
+    def load_inertia(self) -> Array:
+        """Load inertia of every simulation [kg·m²]. Shape (n,)."""
+        if self._inertias is None:
+            return np.full(len(self.instant), self.settings.link_inertia)
+        return np.asarray(self._inertias[0][:, self._place[0], 2])
 
     def motor_entries(self) -> tuple[Entry, ...]:
         """Entries of the measured motor angle and speed."""

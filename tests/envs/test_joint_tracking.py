@@ -145,8 +145,7 @@ def test_specimens_differ_within_their_tolerances():
     for key, top in tolerances.items():
         values = np.array([getattr(v, key) for v in drawn])
         assert 0.8 * top < np.abs(values).max() <= top
-    inertia = batch.core.plant.batch.expanded("body_inertia")
-    loads = inertia[:, batch.core.plant.model.body("load").id, 2]
+    loads = batch.core.load_inertia
     assert 0.04 < np.abs(loads - 1.0).max() <= 0.05
     assert batch.task.joints.link_inertia[0] == 1.0
     nominal = JointTrackingEnv().task.joints.drives[0]
@@ -316,10 +315,29 @@ def test_linear_joints_draw_the_load_alone(said):
     """Loads differ within their tolerance; drives are all nominal."""
     batch = JointTrackingVectorEnv(20, level="linear", randomise=said)
     batch.reset(seed=0)
-    inertia = batch.core.plant.batch.expanded("body_inertia")
-    loads = inertia[:, batch.core.plant.model.body("load").id, 2]
+    loads = batch.core.load_inertia
     assert 0.1 < np.abs(loads - 1.0).max() <= 0.2
     assert {v for (v,) in batch.core.variations} == {Variation()}
+
+
+def test_momentum_balances_with_the_drawn_load():
+    """Every link moves with its own inertia: i J_m w_m + J w grows by i u dt."""
+    batch = JointTrackingVectorEnv(
+        5, level="linear", randomise=True, load_of_rated=0.0, friction=False
+    )
+    batch.reset(seed=0)
+    core, (low, high) = batch.core, (0.8, 1.2)
+    inertia, ratio = core.load_inertia, core.joint.ratio
+    assert low < inertia.min() < inertia.max() < high
+    assert np.ptp(inertia) > 0.1
+    for _ in range(50):
+        batch.step(np.full((5, 1), 0.2))
+    plant, rotor = core.plant, core.settings.rotor_inertia_kgm2
+    momentum = (
+        ratio * rotor * plant.motor_speed[:, 0] + inertia * plant.link_speed[:, 0]
+    )
+    impulse = ratio * 0.2 * core.limits.motor_torque[0] * 50e-3
+    np.testing.assert_allclose(momentum, impulse, rtol=1e-9)
 
 
 @settings(max_examples=30, deadline=None)
