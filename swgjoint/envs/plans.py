@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.errors import InputError
 from swgjoint.typing import Array
 
 MEMORY = 512 * 10**6
@@ -167,6 +168,21 @@ class Plans:
         Shapes (instants, 5) and (instants, n_channels).
         """
         return self._plan[0, :, :, 0], self._noise[0]
+
+    def whole_noise(self) -> Array:
+        """Copy of the whole noise. Shape (n, instants, n_channels).
+
+        Raises:
+            InputError: If only windows of the episodes fit into the memory.
+        """
+        size = self._size
+        if not self._whole:
+            fitting = size.count * self._window // size.instants
+            raise InputError(
+                f"{size.count} whole episodes of {size.instants} instants; accepted: up"
+                f" to {fitting}, which fill {MEMORY / 1e6:g} MB"
+            )
+        return self._noise.copy()
 
     def whole_plans(self) -> Array:
         """Copy of the whole plans. Shape (n, instants, n_rows, n_joints)."""

@@ -137,6 +137,28 @@ def respond(
         weight[world, dof] = total
 
 
+@wp.func
+def taken_torques(drive: WarpDrive, last: WarpStep, h: real, rm: real, rl: real):
+    """Mean torques that a drive took from rotor and link over a step [N·m].
+
+    Args:
+        drive: The drive.
+        last: Its state after the evaluation for that step.
+        h: Duration of the step [s].
+        rm: Change of the rotor speed over the step [rad/s].
+        rl: Change of the link speed [rad/s].
+    """
+    force = last.force + h * last.metric * (last.g_theta * rm + last.g_psi * rl)
+    on_rotor = last.g_theta * force + last.e_theta
+    on_link = last.g_psi * force + last.e_psi
+    if drive.friction >= 0:
+        change = drive.b_theta * rm + drive.b_psi * rl
+        rubbed = last.rub.force + h * last.rub.metric * change
+        on_rotor += drive.b_theta * rubbed
+        on_link += drive.b_psi * rubbed
+    return wp.vec2d(on_rotor, on_link)
+
+
 @wp.kernel
 def law(
     timestep: wp.array(dtype=float),
@@ -197,21 +219,16 @@ def law(
     last = steps[world, index]
     if time[world] > last.time:
         rm, rl = vm - last.v_rotor, vl - last.v_link
-        done = last.force + h * last.metric * (last.g_theta * rm + last.g_psi * rl)
-        on_rotor = last.g_theta * done + last.e_theta
-        on_link = last.g_psi * done + last.e_psi
+        taken = taken_torques(drive, last, h, rm, rl)
         if drive.friction >= 0:
             change = drive.b_theta * rm + drive.b_psi * rl
-            rubbed = last.rub.force + h * last.rub.metric * change
-            on_rotor += drive.b_theta * rubbed
-            on_link += drive.b_psi * rubbed
             was = drive.b_theta * last.v_rotor + drive.b_psi * last.v_link
             dx = h * (was + HALF * change)
             last.relaxed = last.rotation + dx - stretch_after(drive, last.rub, dx)
             last.known = 1
-        last.a_rotor = rm / h + last.w_rotor * on_rotor
-        last.a_link = rl / h + last.w_link * on_link
-        torque[world, index] = float(-on_link)
+        last.a_rotor = rm / h + last.w_rotor * taken[0]
+        last.a_link = rl / h + last.w_link * taken[1]
+        torque[world, index] = float(-taken[1])
         moved = last.g_theta * (last.v_rotor + HALF * rm)
         moved = h * (moved + last.g_psi * (last.v_link + HALF * rl))
         relax(
