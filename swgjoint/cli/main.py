@@ -174,7 +174,11 @@ def command_parser(name: str) -> Parser:
 
 def _command(name: str, arguments: list[str]) -> int:
     module = import_module(f"swgjoint.cli.{name}")
-    args = command_parser(name).parse_args(arguments)
+    parser = command_parser(name)
+    args = parser.parse_args(arguments)
+    for option in ("out", "output"):
+        if getattr(args, option, None) == "":
+            parser.error(f"--{option} '': expected a path, not an empty text")
     progress = StderrProgress(verbose=args.verbose)
     args.progress = silent if args.quiet else progress
     incomplete: list[str] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from typing import Any
 
 from swgjoint.cli.shared.arm_arguments import (
@@ -17,6 +18,7 @@ from swgjoint.cli.shared.life_text import (
     life_lines,
     thermal_lines,
 )
+from swgjoint.cli.shared.load_text import design_line, load_line
 from swgjoint.cli.shared.model_text import (
     assumed_lines,
     left_out_lines,
@@ -44,6 +46,8 @@ JOINT_HEADER = (
 )
 JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
 """Units of the columns of :data:`JOINT_HEADER`."""
+_MODEL_OF_A_JOINT = re.compile(r"\s*joints\.[^=]+\.model\s*=")
+"""Changes of a scene that state the model of one joint."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -122,7 +126,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     scene, choice, assumed_rotors = scene_of(args, args.overrides)
     of_arm = choice is not None
     if args.model is not None:
-        scene = scene.with_model(args.model)
+        # models of single joints on the command line have priority
+        own = [text for text in args.overrides if _MODEL_OF_A_JOINT.match(text)]
+        scene = scene.with_model(args.model).with_changes(own)
     recording = folder / "run.rrd" if folder is not None else None
     result = run_scene(scene, recording=recording, progress=args.progress)
     files: list[str] = []
@@ -185,13 +191,18 @@ def report(result: dict[str, Any]) -> str:
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
+        load_line(result["joints"]),
         ripple_line(result),
         tool_line(result["tool"], random="sensors" in contains),
         *life_lines(result),
         *bearing_lines(result),
         *gauge_lines(result),
         *thermal_lines(result),
-        *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
+        *(
+            [*choice_lines(choice), design_line(choice)]
+            if (choice := result.get("drive_choice"))
+            else []
+        ),
         f"model: degrees of freedom: {contains['degrees_of_freedom']}, tendons:"
         f" {contains['tendons']}, plugin instances: {contains['plugin_instances']};"
         f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
@@ -207,13 +218,14 @@ def report(result: dict[str, Any]) -> str:
 
 def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     """Format the verdict: whether the results describe the scene, and why not."""
-    from swgjoint.sim.figures.verdict import VALID
+    from swgjoint.sim.figures.verdict import NEXT, VALID
 
     if metrics["verdict"] == VALID:
         return [metrics["verdict"]]
+    shown_next = f"\n  {NEXT.removeprefix('; ')}"
     return [
         f"{metrics['verdict']}: the results below do not describe this scene",
-        *(f"  {reason}" for reason in metrics["reasons"]),
+        *(f"  {reason.replace(NEXT, shown_next)}" for reason in metrics["reasons"]),
     ]
 
 

@@ -91,7 +91,7 @@ def _without_options(
     reference, model = section.drive, section.model
     wanted, seed = section.kinematic_error_arcmin, section.seed or 0
     where = f"joints.{joint}: " if joint else ""
-    if model is not None and (reference is None or not _may_be_built(reference)):
+    if model is not None and (reference is None or not may_be_built(reference)):
         stated = "linear" if section.linear else "numbers"
         drive_name = stated if reference is None else f"drive {reference!r}"
         raise InputError(
@@ -323,7 +323,7 @@ def names_catalogue(reference: str) -> bool:
     )
 
 
-def _may_be_built(reference: str) -> bool:
+def may_be_built(reference: str) -> bool:
     """Whether a reference may name a design, from which a map can be built."""
     return not reference.endswith(".swg") and not names_catalogue(reference)
 

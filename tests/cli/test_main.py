@@ -131,6 +131,8 @@ def test_version(capsys):
         (["doctor", "--bad"], ("arguments", "--bad")),
         (["doctor", "--js"], ("arguments", "--js")),
         (["map", "reference-2d"], ("required", "-o/--output")),
+        (["run", "bench", "--out", ""], ("--out", "''", "path")),
+        (["map", "reference-2d", "-o", ""], ("--output", "''", "path")),
         (["meshing", "reference-2d", "--steps", "x"], ("--steps", "int", "'x'")),
         (
             ["meshing", "reference-2d", "--linear", "--nonlinear"],

@@ -8,6 +8,7 @@ from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.cli.run import tool_line
+from swgjoint.cli.shared.load_text import design_line, load_line
 from swgjoint.maps.drive_map import DriveMap
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
@@ -149,6 +150,9 @@ def test_the_fidelity_of_designs_is_an_option(capsys, monkeypatch, synthetic_map
     short = ["--set", "simulation.duration_s=1.0"]
     assert main(["run", "bench", "--model", "ring", *short]) == 0
     assert asked == [("reference-2d", "ring")]
+    single = ["--set", "joints.joint.model=2d"]
+    assert main(["run", "bench", *single, "--model", "ring", *short]) == 0
+    assert asked[1:] == [("reference-2d", "2d")]
     capsys.readouterr()
     arguments = ["run", "bench", "--drive", "CSG-25-100", "--model", "ring", *short]
     assert main(arguments) == 2
@@ -160,3 +164,19 @@ def test_repeatability_of_a_scene_without_chance_is_a_dash():
     tool = {"path_rms_mm": None, "rp_mm": 1e-12, "ap_mm": 0.58}
     assert names(tool_line(tool, random=False), "AP 0.5800 mm", "RP -", "random")
     assert names(tool_line(tool | {"rp_mm": 0.01}, random=True), "RP 0.0100 mm")
+
+
+def joint_at(peak: float, rated: float) -> dict:
+    return {"ratings": {"peak_Nm": peak, "rated_Nm": rated}}
+
+
+def test_the_most_loaded_joint_and_the_designs_of_its_size_are_named():
+    """Relative to the rated torque; a design has the size and ratio of its drive."""
+    joints = {"a": joint_at(5.0, 50.0), "b": joint_at(4.0, 10.0), "c": joint_at(1, 40)}
+    line = load_line(joints)
+    assert names(line, "b", "4 N·m", "40 %", "a 10 %", "c 2.5 %")
+    assert line.index("b ") < line.index("a 10") < line.index("c 2.5")
+    assert load_line({"a": joint_at(5.0, 50.0)}) == ""
+    choice = {"a": "CSG-20-100", "b": "CSG-14-100", "c": "CSG-20-100"}
+    line = design_line({joint: {"drive": drive} for joint, drive in choice.items()})
+    assert names(line, "design new", "size-20-100 (a, c)", "size-14-100 (b)")

@@ -136,6 +136,20 @@ def test_a_joint_inherits_what_it_does_not_say():
     assert mixed.linear.stiffness_Nm_rad == 1e4
 
 
+def test_a_model_of_the_defaults_is_that_of_designs():
+    """Other drives of single joints have none; without a design it is refused."""
+    scene = Scene.from_toml(GOOD).with_model("ring")
+    assert scene.joint_settings("joint").model == "ring"
+    for drive in ("CSG-25-100", "a.swg"):
+        other = scene.with_changes({"joints.joint.drive": drive})
+        assert other.joint_settings("joint").model is None
+    own = {"joints.joint.drive": "size-25-50", "joints.joint.model": "2d"}
+    assert scene.with_changes(own).joint_settings("joint").model == "2d"
+    catalogue = Scene.from_toml(GOOD).with_drive("CSG-25-100")
+    with pytest.raises(InputError, match="'CSG-25-100'"):
+        catalogue.with_model("ring")
+
+
 def test_one_drive_or_level_for_all_joints():
     """Comparisons replace the drive and the level of every joint and nothing else."""
     scene = Scene.from_toml(

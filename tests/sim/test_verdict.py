@@ -1,6 +1,7 @@
 """Verdict of a run, ripple that is a lower bound, ripple that is none."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -237,6 +238,10 @@ def test_ripple_that_the_map_misses_at_these_torques_makes_a_run_invalid(
     (reason,) = found["reasons"]
     assert names(reason, "joint", "synthetic", "input torque", "20 N·m", "30 %")
     assert found["joints"]["joint"]["ripple_valid"] is False
+    assert names(reason, "meshing DESIGN", "joints.joint.level=linear")
+    ring = replace(bad, level="ring")
+    (reason,) = judged(bench, ring)["reasons"]
+    assert names(reason, "--set joints.joint.model=2d", "CPU minutes")
     far = {10.0: (0.0, 0.0), 40.0: (0.05, 0.05), 80.0: (0.9, 0.9)}
     found = judged(bench, validated_map(synthetic_map, far))
     joint = found["joints"]["joint"]
@@ -244,6 +249,14 @@ def test_ripple_that_the_map_misses_at_these_torques_makes_a_run_invalid(
     low, high = joint["map_difference"]["torque_range_Nm"]
     assert 15.0 < low < high < 25.0
     assert not warnings_of(found["joints"])
+
+
+def test_the_torque_from_which_a_map_is_valid(bench, synthetic_map):
+    """Where the line between the last bad row and the next one crosses the limit."""
+    rows = {0.0: (0.0, 0.0), 20.0: (0.5, 0.1), 30.0: (0.1, 0.2), 40.0: (0.0, 0.0)}
+    found = judged(bench, validated_map(synthetic_map, rows))
+    assert found["joints"]["joint"]["map_difference"]["valid_from_Nm"] == 25.0
+    assert names(found["reasons"][0], "at least 25 N·m")
 
 
 def test_only_the_torques_of_the_figures_count(bench, synthetic_map):
@@ -322,8 +335,9 @@ def test_run_prints_the_judgement_and_turns_the_status(synthetic_map, tmp_path, 
     arguments = ["run", "bench", *load, *short]
     validated_map(synthetic_map, {20.0: (0.5, 0.1)}).save(path)
     assert main(arguments) == 1
-    first, reason, *lines = capsys.readouterr().out.splitlines()
+    first, reason, then, *lines = capsys.readouterr().out.splitlines()
     assert first.startswith("NOT VALID") and names(reason, "joint", "50 %", "20 N·m")
+    assert then.startswith("  next: ")
     assert any(line.startswith("! not valid") for line in lines)
     validated_map(synthetic_map, {20.0: (0.2, 0.1)}).save(path)
     assert main(arguments) == 0

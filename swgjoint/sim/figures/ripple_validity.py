@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.maps.sheet.map_validity import LIMIT, map_validation
+from swgjoint.maps.sheet.map_validity import LIMIT, MapValidation, map_validation
 from swgjoint.sim.figures.verdict import PHASE_STEP
 from swgjoint.typing import Array
 from swgjoint.units import deg
@@ -93,8 +93,10 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         ``ripple_valid``: whether the differences of the map from finite elements are
         within the limit; None if there is no ripple to assess or no record.
         ``map_difference``: the largest differences under ``input_torque`` and
-        ``output_error``, and the torques of the run under ``torque_range_Nm``; None
-        without a record. ``map_difference_missing``: the reason for None.
+        ``output_error``, the torques of the run under ``torque_range_Nm`` and, of a map
+        that is not valid there, under ``valid_from_Nm`` the torque from which on it is
+        (None if it is not at its largest torque either); None without a record.
+        ``map_difference_missing``: the reason for None.
     """
     transmission = run.assembly.transmissions[j]
     record, reason = map_validation(transmission.drive)
@@ -117,9 +119,39 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         "map_difference": {
             **{key: one.to_json() for key, one in differences.items()},
             "torque_range_Nm": [low, high],
+            **({"valid_from_Nm": valid_from(record)} if worst > LIMIT else {}),
         },
         "map_difference_missing": None,
     }
+
+
+def valid_from(record: MapValidation) -> float | None:
+    """Smallest torque from which on a map is valid up to the end of its record [N·m].
+
+    Between two rows of the record the differences are interpolated linearly.
+
+    Args:
+        record: The validation record of the map.
+
+    Returns:
+        The torque; None if the map is not valid at the largest torque of its record.
+    """
+    start = 0.0
+    for rows in record.rows.values():
+        # the larger difference of torques of either sign
+        largest: dict[float, float] = {}
+        for torque, value, _ in rows:
+            largest[abs(torque)] = max(value, largest.get(abs(torque), 0.0))
+        torques = sorted(largest)
+        values = [largest[torque] for torque in torques]
+        bad = [k for k, value in enumerate(values) if value > LIMIT]
+        if not bad:
+            continue
+        if (k := bad[-1]) == len(torques) - 1:
+            return None
+        share = (values[k] - LIMIT) / (values[k] - values[k + 1])
+        start = max(start, torques[k] + share * (torques[k + 1] - torques[k]))
+    return start
 
 
 def has_harmonics(run: Run, j: int) -> bool:

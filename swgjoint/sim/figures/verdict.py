@@ -43,6 +43,8 @@ ENERGY_SHARE, ENERGY_FLOOR = 0.1, 1e-3
 """Largest accepted balance error: the first value is relative to the sum of work,
 losses and stored energy; the second, which applies if that sum is small, is relative to
 the sum of the rated torques times 1 rad. Bundled scenes reach 0.4 % of the former."""
+NEXT = "; next: "
+"""Text in a reason before its remedy, which terminals show in a line of its own."""
 MAPPED = ("native", "full")
 """Levels at which the torque follows the map."""
 
@@ -161,9 +163,7 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
         seen = _range(joint["map_difference"]["torque_range_Nm"])
         lines.append(
             f"{name}: torque ripple not valid at {seen}: the map of {joint['drive']}"
-            f" {doubt}; accepted: {percent(LIMIT)}; 'swgjoint meshing DESIGN --torque"
-            " NM' computes the ripple of the drive itself, and level 'linear' has no"
-            " ripple"
+            f" {doubt}; accepted: {percent(LIMIT)}{NEXT}{_remedy(name, joint)}"
         )
     if joint["phase_step_rad"] > FAST * PHASE_STEP:
         lines.append(
@@ -173,6 +173,23 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
             " simulation.step_s"
         )
     return lines
+
+
+def _remedy(name: str, joint: Mapping[str, Any]) -> str:
+    """What to do about a map that differs too much at the torques of a run."""
+    if joint["source"] == "ring":
+        first = (
+            "a 2D map, which also has the teeth (one to three CPU minutes; for a"
+            f" design: --set joints.{name}.model=2d)"
+        )
+    else:
+        first = (
+            "'swgjoint meshing DESIGN --torque NM' computes the ripple at one torque"
+        )
+    start = joint["map_difference"]["valid_from_Nm"]
+    if start is None:
+        return f"{first}; or --set joints.{name}.level=linear, which has no ripple"
+    return f"{first}; or a load of at least {start:.2g} N·m, where this map is valid"
 
 
 def _range(torques: Sequence[float]) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from swgjoint.drives.references import may_be_built
 from swgjoint.drives.sections import DRIVE_KEYS, JointSection, Level
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, validate
@@ -290,7 +291,21 @@ class Scene(Section):
         return self._with_all(**{**none, "drive": drive})
 
     def with_model(self, model: str) -> Self:
-        """A copy whose drives, which must all be designs, get maps of this fidelity."""
+        """A copy whose designs get maps of this fidelity.
+
+        Raises:
+            InputError: If the scene states drives and none of them is a design.
+        """
+        stated = [
+            one for one in (self.defaults, *self.joints.values()) if one.has_drive
+        ]
+        if stated and not any(map(_names_design, stated)):
+            drives = sorted({repr(one.drive or "linear or numbers") for one in stated})
+            raise InputError(
+                f"{self.where}: model {model!r}: no joint has a design, its drives are"
+                f" {', '.join(drives)}; accepted: a design, e.g. --set"
+                " joints.JOINT.drive=DESIGN, or no model"
+            )
         return self._with_all(model=model)
 
     def with_level(self, level: Level) -> Self:
@@ -330,8 +345,20 @@ class Scene(Section):
         return copy
 
     def joint_settings(self, name: str) -> JointSection:
-        """Settings of one joint; its own values override the defaults."""
-        return self.joints.get(name, JointSection()).fill_from(self.defaults)
+        """Settings of one joint; its own values override the defaults.
+
+        The model of the defaults does not apply to a joint whose own drive is not a
+        design.
+        """
+        own, base = self.joints.get(name, JointSection()), self.defaults
+        if own.has_drive and not _names_design(own):
+            base = base.model_copy(update={"model": None})
+        return own.fill_from(base)
+
+
+def _names_design(section: JointSection) -> bool:
+    """Whether the drive of a section may be a design, from which a map is built."""
+    return section.drive is not None and may_be_built(section.drive)
 
 
 def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:

@@ -1,0 +1,49 @@
+"""Which joint of an arm carries the most, and the designs of the size of its drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+_SHOWN = 3
+"""Largest number of joints that the line on the load names."""
+
+
+def load_line(joints: Mapping[str, Any]) -> str:
+    """Name the most loaded joints, relative to their ratings; empty for one joint.
+
+    Args:
+        joints: Figures by joint, see :meth:`swgjoint.sim.run.Run.metrics`.
+    """
+    if len(joints) < 2:
+        return ""
+    loads = {
+        name: joint["ratings"]["peak_Nm"] / joint["ratings"]["rated_Nm"]
+        for name, joint in joints.items()
+    }
+    first, *others = sorted(loads, key=lambda name: -loads[name])[:_SHOWN]
+    rest = ", ".join(f"{name} {100.0 * loads[name]:.2g} %" for name in others)
+    return (
+        f"load: {first} carries the most, up to"
+        f" {joints[first]['ratings']['peak_Nm']:.3g} N·m or {100.0 * loads[first]:.2g}"
+        f" % of its rated torque; then {rest}"
+    )
+
+
+def design_line(choice: Mapping[str, Any]) -> str:
+    """Name the designs with size and ratio of the selected catalogue drives.
+
+    Args:
+        choice: JSON objects of the selected drives by joint.
+    """
+    names_by_design: dict[str, list[str]] = {}
+    for joint, one in choice.items():
+        _, size, ratio = one["drive"].split("-")[:3]
+        names_by_design.setdefault(f"size-{size}-{ratio}", []).append(joint)
+    designs = ", ".join(
+        f"{design} ({', '.join(joints)})" for design, joints in names_by_design.items()
+    )
+    return (
+        "designs of these sizes, whose teeth you can change (swgjoint design new NAME"
+        f" -o FILE): {designs}"
+    )
