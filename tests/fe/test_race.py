@@ -484,3 +484,31 @@ def test_three_lobes_keep_the_rigid_wave_generator():
     )
     assert three.lobes == 3
     assert not carries_bearing(three)
+
+
+def test_exchanges_at_one_linearisation_lead_to_the_same_equilibrium():
+    """The nodes on the race settle without another search for contact."""
+    follow, state = drive(), turned_on()
+    plain = replace(follow, solver=replace(follow.solver, exchanges=0))
+    one, other = (f.to_torque(state, 2.0 * TORQUE) for f in (follow, plain))
+    assert len(one.history) < len(other.history)
+    assert np.abs(one.faces - other.faces).max() < 1e-11
+    assert one.touching.tobytes() == other.touching.tobytes()
+
+
+def test_an_exchange_changes_the_tangent_as_the_node_on_the_race_does():
+    """Taken in or out of the linearised ring, or linearised anew."""
+    model, state = drive().model, turned_on()
+    linear, found = (linearise(model, state, state.torque) for _ in range(2))
+    stations = np.abs(linear.gap) < 8e-8
+    assert (stations & state.touching).any() and (stations & ~state.touching).any()
+    sectors = found.exchange(stations, state.touching)
+    assert sectors.tolist() == np.flatnonzero(stations.any(axis=1)).tolist()
+    other = replace(state, touching=state.touching ^ stations)
+    wanted = linearise(model, other, state.torque)
+    scale = np.abs(wanted.gradient).max()
+    assert np.abs(found.gradient - wanted.gradient).max() < 1e-12 * scale
+    # but for the curvature of the race, in proportion to the gap
+    size = np.abs(wanted.hessian).max()
+    assert np.abs(linear.hessian - wanted.hessian).max() > 1e-3 * size
+    assert np.abs(found.hessian - wanted.hessian).max() < 1e-4 * size

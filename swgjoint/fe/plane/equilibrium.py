@@ -158,11 +158,10 @@ def _stations_to_exchange(
 
     Returns:
         Whether to switch each station (N, q). None if none switches, if all contact
-        would be lost, if the step is too large, or if the bore is on a race, whose
-        tangent depends on more than the stations.
+        would be lost, or if the step is too large.
     """
-    linear, state = problem.linear, problem.state
-    if linear.race_rows is not None or not step.largest < below:
+    state = problem.state
+    if not step.largest < below:
         return None
     bad = _wrong_stations(state, step.gap) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():

@@ -146,8 +146,8 @@ class Linearised:
     def exchange(self, stations: Mask, touching: Mask) -> Index:
         """Invert the contact state of some stations, in place.
 
-        It is valid for a rigid wave generator only. The curvature of the outline is
-        neglected, because the gap of a station that opens or closes is almost zero.
+        The curvature of wave generator or race is neglected, because the gap of a
+        station that opens or closes is almost zero.
 
         Args:
             stations: Whether to switch each station (N, q).
@@ -159,10 +159,16 @@ class Linearised:
         sectors = np.flatnonzero(stations.any(axis=1))
         change = np.where(touching[sectors], -1.0, 1.0) * stations[sectors]
         k, normal = change * self.stations.stiffness, self.normal[sectors]
-        push = (k * self.gap[sectors])[..., None] * normal
-        into, sign = self.gap_dofs, self.sign[sectors][:, self.gap_dofs]
-        forces = self.stations.forces_of(push).reshape(sectors.size, -1)
-        springs = self.stations.stiffness_of(normal, k)
+        push, into = k * self.gap[sectors], self.gap_dofs
+        if self.race_rows is None:
+            forces = self.stations.forces_of(push[..., None] * normal)
+            springs = self.stations.stiffness_of(normal, k)
+        else:
+            rows = self.race_rows[sectors]
+            forces = np.einsum("sq,sqm->sm", push, rows)
+            springs = np.swapaxes(rows, 1, 2) @ (k[..., None] * rows)
+        sign = self.sign[sectors][:, into]
+        forces = forces.reshape(sectors.size, -1)
         self.gradient[sectors[:, None], into] += sign * forces
         self.hessian[sectors[:, None, None], into[:, None], into] += (
             sign[:, :, None] * springs * sign[:, None, :]

@@ -166,8 +166,8 @@ class NewtonProblem:
     def exchange(self, stations: Mask) -> NewtonProblem:
         """The problem with the contact state of some bore stations inverted.
 
-        It is valid for a rigid wave generator only. The linearised ring and its factor
-        are updated in place, so that the original problem cannot be solved afterwards.
+        The linearised ring and its factor are updated in place, so that the original
+        problem cannot be solved afterwards.
 
         Args:
             stations: Whether to switch each station (N, q).
