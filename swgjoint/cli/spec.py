@@ -193,11 +193,13 @@ def _details(result: dict[str, Any]) -> list[str]:
         )
     if path := result.get("ratcheting"):
         end = "" if path["passed"] else "; the search ended before a maximum"
+        support = "on its bearing" if path["on_bearing"] else "without a bearing"
         lines.append(
             "ratcheting: the torque is largest after"
             f" {path['at_largest_pitches']:.3g} of a pitch, with"
-            f" {path['at_largest_pairs']} teeth in contact; 2D model with a rigid and"
-            f" locked wave generator{end}"
+            f" {path['at_largest_pairs']} teeth in contact; 2D model with a locked and"
+            f" centred wave generator {support} (one that floats in its coupling holds"
+            f" less){end}"
         )
     if slow := result.get("running"):
         lines.append(

@@ -292,7 +292,7 @@ class _Figures:
             rim = design.circular_spline.outer_rim
             self.reasons[RATCHETING_KEY] = (
                 f"more than {path['limit_Nm']:.4g} N·m (lower bound; the search ended"
-                f" with: {path['outcome']}): the 2D model has a rigid wave generator"
+                f" with: {path['outcome']}): the 2D model has a centred wave generator"
                 f" and a circular spline whose outside is {rim}"
             )
 

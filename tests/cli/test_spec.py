@@ -488,6 +488,7 @@ def test_ratcheting_torque_of_a_design(capsys, monkeypatch, tmp_path, passes):
         turned=np.arange(4) * 1e-3,
         torque=np.array(torque),
         energy=np.zeros(4),
+        offset=np.zeros((4, 2)),
         pairs=np.arange(4),
         pitch=1e-2,
         outcome=Outcome.CONVERGED if passes else Outcome.ACTIVE_SET_CYCLES,

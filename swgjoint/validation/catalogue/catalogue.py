@@ -184,6 +184,10 @@ def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
             tasks.append(_teeth(name, oval(design), ratio))
             if size == REFERENCE and flank == first_flank:
                 tasks.append(_teeth(f"{name} fixed", design, 0.5 * ratio))
+                tasks += [
+                    _teeth(f"{name} {mounting}", oval(design), ratio, mounting)
+                    for mounting in ("floating", "rigid")
+                ]
     return tasks
 
 
@@ -197,8 +201,9 @@ def _path(size: int, ratio: int, design: Design, section: str) -> CatalogueTask:
     )
 
 
-def _teeth(name: str, design: Design, work: float) -> CatalogueTask:
-    return CatalogueTask(name=name, kind="ratcheting", design=design, work=work)
+def _teeth(name: str, design: Design, work: float, mounting: str = "") -> CatalogueTask:
+    kind = f"ratcheting {mounting}".strip()
+    return CatalogueTask(name=name, kind=kind, design=design, work=work)
 
 
 def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:

@@ -191,8 +191,9 @@ def ratcheting_rows(
 ) -> list[Row]:
     """Row of the ratcheting torque, scaled from one size by the cube of the size.
 
-    The bracket covers all flank angles. Results for a circular spline fixed outside and
-    flank angles without a limit are part of the reason.
+    The bracket covers all flank angles, and a wave generator that floats in its
+    coupling. Results for a rigid one, for a circular spline fixed outside, and flank
+    angles without a limit are part of the reason.
 
     Args:
         study: Study file.
@@ -212,14 +213,21 @@ def ratcheting_rows(
             notes.append(f"{flank:g} deg: no limit up to {above[-1]:.3g} N·m")
         else:
             values.append(scale * one["limit_Nm"])
-    fixed = found[
-        f"ratcheting {size} {row.ratio} {study.variants[0].flank_deg:g} fixed"
-    ]
-    if "fault" not in fixed:
-        bound = scale * fixed["limit_Nm"]
-        sign = "limit" if fixed["passed"] else "no limit up to"
-        notes.append(f"circular spline fixed outside: {sign} {bound:.3g} N·m")
-    notes.insert(0, "2D, circular spline free outside, wave generator rigid")
+    first = f"ratcheting {size} {row.ratio} {study.variants[0].flank_deg:g}"
+    for name, mounting in (
+        ("floating", "wave generator floating"),
+        ("rigid", "without the bearing"),
+        ("fixed", "circular spline fixed outside"),
+    ):
+        one = found[f"{first} {name}"]
+        if "fault" in one:
+            continue
+        limit = scale * one["limit_Nm"]
+        sign = "" if one["passed"] else "no limit up to "
+        notes.append(f"{mounting}: {sign}{limit:.3g} N·m")
+        if name == "floating" and one["passed"]:
+            values.append(limit)
+    notes.insert(0, "2D, circular spline free outside, wave generator on its bearing")
     if row.size != size:
         notes.append(f"scaled from size {size}")
     return [

@@ -118,7 +118,10 @@ def _ratcheting(task: CatalogueTask) -> Found:
     """Ratcheting torque of the 2D model, with the outer rim as in the design."""
     from swgjoint.fe.plane.figures.ratcheting import ratcheting_path
 
-    return ratcheting_path(task.design).as_dict()
+    mounting = task.kind.removeprefix("ratcheting").strip()
+    return ratcheting_path(
+        task.design, bearing=mounting != "rigid", floating=mounting == "floating"
+    ).as_dict()
 
 
 def _individual(task: CatalogueTask) -> Found:
@@ -194,6 +197,8 @@ KINDS: dict[str, Callable[[CatalogueTask], Found]] = {
     "path": _path,
     "individual": _individual,
     "ratcheting": _ratcheting,
+    "ratcheting floating": _ratcheting,
+    "ratcheting rigid": _ratcheting,
     "accuracy": _accuracy,
     "running": _running,
     "coning rigid": _coning,
