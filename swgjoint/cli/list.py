@@ -17,6 +17,7 @@ HEADERS = {
     "momentary_peak_Nm": "momentary [N·m]",
     "K1_Nm_rad": "K1 [N·m/rad]",
     "transmission_accuracy_arcmin": "accuracy [arcmin]",
+    "ratings": "torques and K1",
     "teeth": "teeth",
     "module_mm": "module [mm]",
     "pitch_diameter_mm": "diameter [mm]",

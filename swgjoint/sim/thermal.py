@@ -312,7 +312,9 @@ class Warming:
             drive = at_temperature(one.drive, temperature, where=where)
         except InputError as error:
             raise ComputationError(
-                f"{error}; enlarge thermal.conductance_W_K or shorten the motion"
+                f"{error}; to keep it cooler: a slower or shorter motion, less load, a"
+                " larger drive, a lower thermal.ambient_C, or a housing with a larger"
+                " thermal.conductance_W_K or thermal.heat_capacity_J_K"
             ) from error
         region = check_region(
             replace(one.transmission.attached, drive=drive),

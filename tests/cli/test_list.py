@@ -10,6 +10,7 @@ from messages import names
 from swgjoint.cli.list import KINDS
 from swgjoint.cli.main import main
 from swgjoint.cli.shared.text import table
+from swgjoint.gear.ratings import rule_of
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.from_catalogue import catalogue_names
 from swgjoint.models_path import bundled_names
@@ -34,6 +35,7 @@ def test_every_name_is_a_row_and_a_line(kind, capsys):
 
 def test_drives_have_the_figures_of_their_maps(capsys):
     """Torques of the ratings and K1 within what rounded corners change."""
+    kinds = set()
     for row in listed(capsys, "drives")[::5]:
         drive = DriveMap.from_catalogue(row["name"])
         assert row["rated_torque_Nm"] == drive.ratings.rated_torque
@@ -41,6 +43,10 @@ def test_drives_have_the_figures_of_their_maps(capsys):
         assert abs(drive.ratio) == row["ratio"]
         K1 = drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"]
         assert row["K1_Nm_rad"] == pytest.approx(K1, rel=0.02)
+        by_rule = bool(rule_of(drive.ratings.source)[0])
+        assert row["ratings"] == ("by rule" if by_rule else "stated")
+        kinds.add(row["ratings"])
+    assert kinds == {"stated", "by rule"}
 
 
 def test_an_arm_has_its_joints_and_mass(capsys):

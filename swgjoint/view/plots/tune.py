@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 COLORS = ("0.45", "C1", "C2", "C0")
 """Colours of the candidates; the baseline has the first one, the tuned controller the
 last one."""
+_SAME = 0.05  # percentage that one decimal shows as zero
+_FACTOR = 2.0  # from here on a ratio is shown as a factor
 _ROOM = 1.25  # smallest ratio of the ends of an axis to the costs it shows
 
 
@@ -30,20 +32,19 @@ def claims(tuned: Tuned) -> list[str]:
     count = best.held_out.size
     lines = [
         f"{best.name}: cost {_cost(tuned, best)} on {count} held-out seeds,"
-        f" {_less(tuned, best)} than {baseline.name} ({_cost(tuned, baseline)}),"
+        f" {_compared(tuned, best)} {baseline.name} ({_cost(tuned, baseline)}),"
         f" lower on {better} of them"
     ]
     for one in tuned.candidates[1:-1]:
         if one.tuned:
             lines.append(
                 f"tuning the two gains of PD alone: {_cost(tuned, one)},"
-                f" {_less(tuned, one)}"
+                f" {_compared(tuned, one)} {baseline.name}"
             )
             continue
-        change = best.held_out.mean() / one.held_out.mean() - 1.0
         lines.append(
-            f"{one.name}: {_cost(tuned, one)}, {_less(tuned, one)}; tuning changes this"
-            f" cost by {100.0 * change:+.0f} %"
+            f"{one.name}: {_cost(tuned, one)}, {_compared(tuned, one)} {baseline.name};"
+            f" after tuning {_ratio(best.held_out.mean() / one.held_out.mean())} this"
         )
     wide = best.held_out.mean() / best.training.mean() - 1.0
     lines.append(
@@ -313,7 +314,20 @@ def _cost(tuned: Tuned, one: GainCandidate) -> str:
     return f"{mean / size:.3g} ± {spread / size:.2g} {tuned.unit}"
 
 
-def _less(tuned: Tuned, one: GainCandidate) -> str:
-    """Reduction of the cost compared with the textbook rule as text."""
-    saved = 100.0 * tuned.improvement(one)
-    return f"{abs(saved):.1f} % {'less' if saved >= 0 else 'more'}"
+def _compared(tuned: Tuned, one: GainCandidate) -> str:
+    """Cost compared with that of the baseline, whose name follows, as text."""
+    return _ratio(1.0 - tuned.improvement(one))
+
+
+def _ratio(ratio: float) -> str:
+    """Words before the second of two costs, for the first over the second.
+
+    >>> _ratio(0.7), _ratio(1.2), _ratio(1.0), _ratio(356.0)
+    ('30.0 % less than', '20.0 % more than', 'the same as', '356 times')
+    """
+    percent = 100.0 * (ratio - 1.0)
+    if abs(percent) < _SAME:
+        return "the same as"
+    if ratio >= _FACTOR:
+        return f"{ratio:.3g} times"
+    return f"{abs(percent):.1f} % {'less' if percent < 0.0 else 'more'} than"
