@@ -8,9 +8,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.fe.common.sampling import SOLVER, follower_in_plane
+from swgjoint.fe.common.sampling import follower_in_plane
 from swgjoint.fe.plane import equilibrium
-from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.equilibrium import MAP_SOLVER, NewtonSolver
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 
@@ -46,7 +46,7 @@ def test_equilibria_of_conforming_flanks_are_converged():
     theta = 2.0 * pi / design.periodicity * PLACES
     found, exact = (
         followed(replace(follower_in_plane(design), solver=solver), [torque], theta)
-        for solver in (SOLVER, NewtonSolver())
+        for solver in (MAP_SOLVER, NewtonSolver())
     )
     output, moment = np.abs(found - exact).max(axis=0)
     assert output < 1e-9

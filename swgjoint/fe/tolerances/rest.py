@@ -11,6 +11,7 @@ from swgjoint.fe.common.following import Follower, Unloaded
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
+from swgjoint.fe.plane.equilibrium import MAP_SOLVER
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.tolerances.cycle import pitch_of
@@ -43,7 +44,9 @@ def perfect_drive(
         solid = solid_sector_model(perfect)
         return SolidContinuation(model=solid, ratio=design.ratio, layout=layout)
     plane = sector_model(perfect, friction=False, bearing=bearing, cage_held=True)
-    return Continuation(model=plane, ratio=design.ratio, layout=layout)
+    return Continuation(
+        model=plane, ratio=design.ratio, layout=layout, solver=MAP_SOLVER
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
