@@ -91,5 +91,5 @@ def test_figures_of_the_run(drive):
     np.testing.assert_allclose(found, rows()[3], rtol=5e-3)
     assert lines[610] == pytest.approx(0.75, rel=0.01)
     assert np.ptp(torque_ripple(run, 0)) == pytest.approx(0.2 * rows()[3, 1], rel=5e-3)
-    assert rows()[3, 0] / rows()[2, 0] == pytest.approx(1 / 8, rel=0.1)
+    assert rows()[3, 0] / rows()[2, 0] == pytest.approx(0.12, rel=0.05)
     assert "simulation.step_s=0.0001" in PAGE.read_text(encoding="utf-8")

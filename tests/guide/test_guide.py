@@ -304,7 +304,38 @@ def test_first_drive_tutorial(tmp_path, monkeypatch, capsys):
     page = GUIDE / "tutorials" / "first-drive.md"
     slow = ("meshing", "map", "spec", "compare", "run", "view")
     follow(page, tmp_path, monkeypatch, capsys, skip=slow)
-    assert {"my.toml", "steeper.toml", "teeth"} == {p.name for p in tmp_path.iterdir()}
+    made = {"my.toml", "steeper.toml", "teeth", "fine.toml", "coarse.toml"}
+    assert made == {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.slow
+@pytest.mark.fe
+def test_first_drive_in_an_arm(tmp_path, monkeypatch, capsys):
+    """The named joint and design, and ripple and error with both pitch errors."""
+    page = GUIDE / "tutorials" / "first-drive.md"
+    monkeypatch.chdir(tmp_path)
+    urdf = blocks(GUIDE / "tutorials" / "my-own-arm.md", "xml")[0]
+    (tmp_path / "arm.urdf").write_text(urdf)
+    section = text_of(page).partition("## In an arm of your own\n")[2]
+    lines = re.search(r"(?s)```sh\n(.*)\n```", section)[1].splitlines()
+    figures = []
+    for line in (line for line in lines if re.match("swgjoint (run|design)", line)):
+        assert main([*shlex.split(line)[1:], "--quiet"]) == 0, line
+        out = capsys.readouterr().out
+        if "arm.urdf" in line:
+            assert (
+                "shoulder carries the most" in out and "size-20-100 (shoulder)" in out
+            )
+        elif " run " in line:
+            row = re.search(r"^shoulder +full (.*)", out, re.MULTILINE)[1].split()
+            figures.append((row[4], row[3]))
+    (fine, error), (coarse, more) = figures
+    shown = fine, coarse, error, more
+    text = " ".join(section.split())
+    stated = re.search(
+        r"rises from (\S+) to (\S+) % .* from (\S+) to (\S+) arcmin", text
+    )
+    assert stated.groups() == tuple(f"{float(value):.2f}" for value in shown)
 
 
 def test_linear_control_page(tmp_path, monkeypatch, capsys):

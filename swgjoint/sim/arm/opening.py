@@ -102,7 +102,13 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
             f" first is {unknown[0]}"
         )
     if missing:
-        reasons.append(f"{len(missing)} not found, the first is {missing[0]}")
+        package = missing[0].partition("://")[2].partition("/")[0]
+        place = (
+            f" (accepted: a folder {package!r} above the file or beside a folder above)"
+            if missing[0].startswith("package://")
+            else ""
+        )
+        reasons.append(f"{len(missing)} not found, the first is {missing[0]}{place}")
     if reasons:
         warnings.warn(
             f"{path}: shapes without a usable mesh are left out: {'; '.join(reasons)}",
