@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common import torque_columns
+from swgjoint.fe.common import torque_choice
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.common.torque_columns import ColumnGrid
@@ -275,6 +275,6 @@ def test_the_torque_beyond_the_peak_turns_the_stiffest_angle_as_far_as_the_softe
     assert softest > 1.07 * stiffest
     assert min(-drive.at(beyond, t).error for t in theta) > softest
     # what an ordinary drive needs, and no more
-    assert beyond <= (1.0 + torque_columns.BEYOND[1]) * PEAK
+    assert beyond <= (1.0 + torque_choice.BEYOND[1]) * PEAK
     tables, solved = columns.tables(6, 20)
     assert max(tables) == beyond and beyond in solved

@@ -9,7 +9,7 @@ import pytest
 from known_samples import RATINGS, N, samples_of
 
 from swgjoint.maps.fit.fit import fit_map
-from swgjoint.maps.fit.worst_positions import APART, EXTRA, worst_positions
+from swgjoint.maps.fit.worst_positions import EXTRA, worst_positions
 from swgjoint.maps.samples import FullSolves
 
 ANGLES = 24
@@ -43,10 +43,10 @@ def test_positions_are_at_the_corner(place):
     positions = worst_positions(fit_map(samples), samples)
     # the corner is between two samples; interpolation does not know where
     near = from_corner(positions, place) < 1.5
-    torques = {torque for torque, _ in positions}
-    assert {torque for (torque, _), at in zip(positions, near, strict=True) if at} == (
-        torques
-    )
+    # at every validation torque, and at other positions more often than by chance (1/8)
+    found = {torque for (torque, _), at in zip(positions, near, strict=True) if at}
+    assert set(UNSEEN.torque[UNSEEN.torque != 0.0]) <= found
+    assert near.mean() > 0.3
     # without the corner other places are worst
     smooth = replace(samples_of(n_angles=ANGLES), unseen=UNSEEN)
     others = worst_positions(fit_map(smooth), smooth)
@@ -61,10 +61,9 @@ def test_positions_lie_at_validation_torques_and_between_samples():
     angles = np.array([angle for _, angle in worst_positions(drive, samples)])
     assert {-33.0, -11.0, 11.0, 33.0} <= set(torques)
     assert 0.0 not in torques
-    others = np.setdiff1d(torques, UNSEEN.torque)
-    assert np.diff(others).min() >= APART * RATINGS.repeated_peak
+    other = ~np.isin(torques, UNSEEN.torque)
     for sign in (-1.0, 1.0):
-        assert 0 < np.count_nonzero(others * sign > 0.0) <= 2 * EXTRA
+        assert 0 < np.count_nonzero(torques[other] * sign > 0.0) <= 2 * EXTRA
     assert not np.isclose(angles / STEP, np.round(angles / STEP)).any()
     assert (np.abs(torques) < RATINGS.repeated_peak).all()
 

@@ -33,7 +33,7 @@ from swgjoint.fe.common.load_curves import (
     steps_on_cubic,
     two_jumps,
 )
-from swgjoint.typing import Array, Mask
+from swgjoint.typing import Array, Index, Mask
 
 CHANCE = 0.01
 """Error that is always assumed for an interval without predicted changes, as a fraction
@@ -164,6 +164,25 @@ class LoadPath:
         return torque[order], size[order]
 
     @property
+    def contact_changes(self) -> tuple[Array, Array, Index]:
+        """Contact changes that the equilibria predict, where the curve has its jumps.
+
+        Returns:
+            Torques [N·m], jumps of the compliance [rad/(N·m)] and numbers of the
+            contacts, each (m,).
+        """
+        merged = [three[2] for three in self._steps[1]]
+        place = [
+            low + one.place * h
+            for low, h, one in zip(self.torque, self.length, merged, strict=False)
+        ]
+        return (
+            np.concatenate(place),
+            np.concatenate([one.jump for one in merged]),
+            np.concatenate([one.contact for one in merged]),
+        )
+
+    @property
     def _jump(self) -> Array:
         """Change of the compliance over each interval (n - 1,) [rad/(N·m)]."""
         return np.diff(self.compliance)
@@ -200,12 +219,12 @@ class LoadPath:
         )
 
     @cached_property
-    def _predicted(self) -> tuple[Mask, Curves, Curves, Curves]:
-        """Curves from the contact changes that the ends of an interval predict.
+    def _steps(self) -> tuple[Mask, list[list[Steps]]]:
+        """Steps of the compliance that the ends of an interval predict.
 
         Returns:
-            Whether both ends predict changes (n - 1,), and the curves according to the
-            first end, to the last end and to both.
+            Whether both ends predict changes (n - 1,), and for each interval the steps
+            according to the first end, to the last end and to both.
         """
         n = self.torque.size - 1
         empty = np.zeros(0)
@@ -223,6 +242,18 @@ class LoadPath:
             steps[k][2] = steps[k][2].fit_moments(
                 mean[k] - change[k] / 2.0, moment[k] - change[k] / 6.0, smooth
             )
+        return known, steps
+
+    @cached_property
+    def _predicted(self) -> tuple[Mask, Curves, Curves, Curves]:
+        """Curves from the contact changes that the ends of an interval predict.
+
+        Returns:
+            Whether both ends predict changes (n - 1,), and the curves according to the
+            first end, to the last end and to both.
+        """
+        known, steps = self._steps
+        c0, change, mean, moment = self._known
         curves = [
             steps_on_cubic(c0, change, mean, moment, [three[which] for three in steps])
             for which in range(3)

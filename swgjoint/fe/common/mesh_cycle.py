@@ -17,6 +17,7 @@ from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import Ripple, no_ripple, unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
+from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
@@ -100,6 +101,8 @@ class Pattern(Generic[AnyState]):
     """Equilibria at all angles by torque [N·m]: zero and the solved initial torques."""
     info: dict[str, Any]
     """Record of the sampling, and of the checks of periodicity and mirror symmetry."""
+    corners: dict[float, ContactCorners]
+    """Predicted contact changes between the angles, by sign of the torque."""
     solve_at: Callable[[Sequence[tuple[float, float]]], FullSolves | None]
     """Solves for equilibria at further torques [N·m] and input angles [rad]."""
 
@@ -191,6 +194,7 @@ def solve_mesh_cycle(
         truncated=not {*torques} <= {*grid.levels},
         states=grid.states(reached.count, torques),
         info=info | {"sampling": _record(grid, reached)},
+        corners=grid.corners(reached.count),
         solve_at=partial(grid.solve_positions, reached.count),
     )
 

@@ -206,7 +206,8 @@ def sample_map(
         },
     )
     if effort.worst:
-        worst = pattern.solve_at(worst_positions(fit_map(samples), samples))
+        positions = worst_positions(fit_map(samples), samples, pattern.corners)
+        worst = pattern.solve_at(positions)
         worst = None if worst is None else worst.in_series(series)
         samples = replace(samples, worst=worst)
     # fewer solves than announced may have been needed

@@ -23,6 +23,13 @@ MISSED_JUMPS = 0.5
 """Largest number of jumps per angle at which the goal may be missed [-]."""
 MOST_MISSED = 0.04
 """Largest error at any jump, if permitted by the number of torques [-]."""
+REACH = 1.1
+"""Safety factor on the linear estimate of the torque beyond the largest one under which
+the output turns as far at the stiffest angle as it does at the softest angle under the
+largest torque [-]."""
+BEYOND = (0.02, 0.15)
+"""Bounds of the difference between this torque and the largest one, as fractions of the
+largest one [-]."""
 
 
 Ripple = Callable[[ArrayLike], Array]
@@ -127,6 +134,19 @@ def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
     wave = 2.0j * np.pi * np.arange(len(modes))
     phase = np.exp(parts[:, None] * wave)
     return (phase @ modes).real, ((phase * wave) @ modes).real
+
+
+def torque_beyond(top: float, torsion: Array, compliance: Array) -> float:
+    """Torque beyond the largest one, under which all angles turn far enough [N·m].
+
+    Args:
+        top: Largest torque, of either sign [N·m].
+        torsion: Torsion under this torque at all angles (n,) [rad].
+        compliance: Tangent compliance there (n,) [rad/(N·m)].
+    """
+    apart = REACH * float(np.ptp(torsion) / compliance.mean())
+    low, high = (abs(top) * part for part in BEYOND)
+    return top + float(np.sign(top)) * min(max(apart, low), high)
 
 
 def unseen_places(count: int, finest: int) -> list[float]:

@@ -18,6 +18,7 @@ from swgjoint.fe.common.torque_choice import (
     common_torques,
     no_ripple,
     periodic,
+    torque_beyond,
     unseen_parts,
 )
 from swgjoint.maps.fit.between_angles import (
@@ -27,6 +28,7 @@ from swgjoint.maps.fit.between_angles import (
     spread_evenly,
     steps_to_divide,
 )
+from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.samples import FullSolves
 from swgjoint.typing import Array
 
@@ -40,13 +42,6 @@ the largest peak-to-peak value over the torques [-]."""
 WORST = 0.5
 """Fraction of the largest estimated error above which intervals are divided together
 with the worst one [-]."""
-REACH = 1.1
-"""Safety factor on the linear estimate of the torque beyond the largest one under which
-the output turns as far at the stiffest angle as it does at the softest angle under the
-largest torque [-]."""
-BEYOND = (0.02, 0.15)
-"""Bounds of the difference between this torque and the largest one, as fractions of the
-largest one [-]."""
 AHEAD = 0.4
 """Range of a prediction of contact changes in either direction, as a fraction of the
 largest torque [-]. It exceeds the distance between neighbouring common torques."""
@@ -276,6 +271,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 return
         self.levels = sorted([*self.levels, torque])
 
+    def corners(self, count: int) -> dict[float, ContactCorners]:
+        """Contact changes between ``count`` columns, by sign of the torque."""
+        columns, angle = self.all_columns(count), self.period * self.parts(count)
+        found = {}
+        for sign in self.signs:
+            changes = [self.path(one, sign)[0].contact_changes for one in columns]
+            found[sign] = ContactCorners.from_changes(angle, self.period, changes)
+        return found
+
     def divide_angles(self, count: int, most: int, goal: float) -> bool:
         """Add columns where contacts change between the angles.
 
@@ -323,9 +327,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
             top = max((t for t in self.levels if t * sign > 0.0), key=abs)
             rest = self._row(columns, 0.0)[0]
             error, _, compliance, _ = self._row(columns, top)
-            apart = REACH * float(np.ptp(rest - error) / compliance.mean())
-            low, high = (abs(top) * part for part in BEYOND)
-            torque = top + sign * min(max(apart, low), high)
+            torque = torque_beyond(top, rest - error, compliance)
             for k, column in enumerate(columns):
                 self._more(column, [torque], columns[max(0, k - 1) : k])
                 if torque in column.failed:
@@ -342,18 +344,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
         """
         rows = []
         for column in others:
-            theta = column.theta
-            error, _, _, moment = self.figures(column.rest.state, theta)
-            rows.append((theta, 0.0, error, moment))
-            torques = []
+            theta, torques = column.theta, []
             for sign in self.signs:
                 top = max(abs(t) for t in self.levels if t * sign > 0.0)
                 torques += [sign * top * part for part in unseen_parts(count)]
             self._more(column, torques)
-            for torque in torques:
-                if torque in column.states:
-                    error, _, _, moment = self.figures(column.states[torque], theta)
-                    rows.append((theta, torque, error, moment))
+            solved = {t: column.states[t] for t in torques if t in column.states}
+            for torque, state in ({0.0: column.rest.state} | solved).items():
+                error, _, _, moment = self.figures(state, theta)
+                rows.append((theta, torque, error, moment))
         return FullSolves.from_rows(rows)
 
     def tables(

@@ -47,6 +47,20 @@ def output_error_at(samples: MapSamples, error: Array, theta: ArrayLike) -> Arra
     return np.asarray(Akima1DInterpolator(place, error[around])(theta))
 
 
+def smooth_output_error_at(
+    samples: MapSamples, error: Array, theta: ArrayLike
+) -> Array:
+    """Output error between the sampled angles by a cubic spline, which rounds corners.
+
+    Args:
+        samples: The samples.
+        error: Output error at their angles (n_angles,) [rad].
+        theta: Input angles within one period (n,) [rad].
+    """
+    place, around = _continued(samples)
+    return np.asarray(CubicSpline(place, error[around])(theta))
+
+
 def input_torque_at(
     samples: MapSamples, torque: float, potential: Array, theta: ArrayLike
 ) -> Array:

@@ -1,0 +1,157 @@
+r"""Corners over the angle at which contacts change between two sampled angles.
+
+A contact that opens or closes under the torque :math:`T_c(\theta)` changes the tangent
+compliance above it by w. Output error e and complementary potential G then contain
+
+.. math:: \Delta G = -\frac{w}{2} \langle T - T_c(\theta) \rangle^2, \quad
+    \Delta e = \frac{d \Delta G}{dT} = -w \langle T - T_c(\theta) \rangle .
+
+Over the angle, at the torque T, the slope of e jumps by :math:`-w |T_c'|` where
+:math:`T_c` passes T, and the slope of the input torque :math:`dG/d\theta` by
+:math:`w T_c' |T_c'|`. Harmonics and splines through the samples round these corners.
+The load curves at two neighbouring angles say where they are: each predicts the torque
+under which the contact changes, which is taken as linear between the two angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from swgjoint.typing import Array, Index
+
+ALIKE = 3.0
+"""Largest ratio of the jumps of the compliance that two neighbouring angles predict for
+one change of a contact [-]. It is 2.6 where two contacts exchange their order in
+reference-2d-dca. With 5, changes of other kinds are paired in reference-2d-simplified.
+"""
+_REACH = 5
+"""Number of samples by which a period is continued at both ends."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactCorners:
+    """Contact changes in the steps between sampled angles, for torques of one sign."""
+
+    angle: Array
+    """Sampled angles, increasing (n,) [rad]."""
+    period: float
+    """Period of the samples [rad]."""
+    start: Array
+    """Sampled angle before each change (m,) [rad]."""
+    step: Array
+    """Step from there to the next sampled angle (m,) [rad]."""
+    torque: Array
+    """Magnitude of the torque under which the contact changes, at both angles (m, 2)
+    [N·m]."""
+    jump: Array
+    """Jump of the compliance above this torque (m,) [rad/(N·m)]."""
+
+    @classmethod
+    def from_changes(
+        cls,
+        angle: Array,
+        period: float,
+        changes: Sequence[tuple[Array, Array, Index]],
+    ) -> ContactCorners:
+        """Changes that neighbouring angles predict alike.
+
+        The last step of the period is left out: the contacts of the first angle have
+        other numbers one pitch later.
+
+        Args:
+            angle: Sampled angles, increasing (n,) [rad].
+            period: Period of the samples [rad].
+            changes: Torques [N·m], jumps of the compliance [rad/(N·m)] and numbers of
+                the contacts that change, each (m,), at every angle.
+        """
+        rows = [np.zeros((0, 5))]
+        for k, (one, two) in enumerate(pairwise(changes)):
+            here, there = _pairs(one, two)
+            ends = np.stack([one[0][here], two[0][there]], axis=1)
+            jump = 0.5 * (one[1][here] + two[1][there])
+            step = np.broadcast_to([angle[k], angle[k + 1] - angle[k]], ends.shape)
+            rows.append(np.column_stack([step, ends, jump]))
+        start, step, first, last, jump = np.concatenate(rows).T
+        return cls(
+            angle=angle,
+            period=period,
+            start=start,
+            step=step,
+            torque=np.stack([first, last], axis=1),
+            jump=jump,
+        )
+
+    def spline_errors(self, torque: float, theta: Array) -> tuple[Array, Array]:
+        """Errors of cubic splines through the samples, as far as corners cause them.
+
+        Args:
+            torque: Magnitude of the torque [N·m].
+            theta: Input angles within the period (n,) [rad].
+
+        Returns:
+            Spline minus function, of the output error under torques of this sign [rad]
+            and of the input torque [N·m], each (n,).
+        """
+        there, place = self._crossings(torque)
+        if not place.size:
+            return np.zeros(theta.size), np.zeros(theta.size)
+        slope = np.diff(self.torque[there])[:, 0] / self.step[there]
+        images = self.period * np.array([[-1.0], [0.0], [1.0]])
+        place = (place + images).ravel()
+        of_error = np.tile(-self.jump[there] * np.abs(slope), 3)
+        of_moment = np.tile(self.jump[there] * slope * np.abs(slope), 3)
+
+        # corners with equal slopes on both sides; a spline is exact for the difference
+        around = np.arange(-_REACH, self.angle.size + _REACH + 1)
+        turns, own = np.divmod(around, self.angle.size)
+        samples = self.angle[own] + turns * self.period
+        apart, away = samples[:, None] - place, theta[:, None] - place
+        error = 0.5 * np.abs(apart) @ of_error
+        potential = 0.25 * (apart * np.abs(apart)) @ of_moment
+        return (
+            CubicSpline(samples, error)(theta) - 0.5 * np.abs(away) @ of_error,
+            CubicSpline(samples, potential)(theta, 1) - 0.5 * np.abs(away) @ of_moment,
+        )
+
+    def places(self, torque: float) -> Array:
+        """Angles at which contacts change under a torque of this magnitude (m,) [rad].
+
+        The errors of the input torque are largest there.
+        """
+        return self._crossings(torque)[1]
+
+    def _crossings(self, torque: float) -> tuple[Index, Array]:
+        """Indices of the changes under a torque, and their angles [rad], each (m,)."""
+        low, high = self.torque.min(axis=1), self.torque.max(axis=1)
+        there = np.flatnonzero((low <= torque) & (torque < high))
+        first, last = self.torque[there].T
+        way = (torque - first) / (last - first)
+        return there, self.start[there] + way * self.step[there]
+
+
+def _pairs(
+    one: tuple[Array, Array, Index], two: tuple[Array, Array, Index]
+) -> tuple[Index, Index]:
+    """Indices of the same contact changes at two angles.
+
+    Each is the nearest change of the same contact for the other one over the torque,
+    and their jumps are similar.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    if not one[0].size or not two[0].size:
+        return none, none
+    jump, other = one[1][:, None], two[1]
+    same = (jump * other > 0.0) & (one[2][:, None] == two[2])
+    apart = np.where(same, np.abs(one[0][:, None] - two[0]), np.inf)
+    there = apart.argmin(axis=1)
+    here = np.arange(there.size)
+    # a contact may change several times, which may be paired wrongly
+    sizes = np.abs(np.stack([one[1], two[1][there]]))
+    alike = sizes.max(axis=0) < ALIKE * sizes.min(axis=0)
+    mutual = (apart.argmin(axis=0)[there] == here) & np.isfinite(apart[here, there])
+    return here[mutual & alike], there[mutual & alike]
