@@ -78,16 +78,19 @@ class ThermalNode:
             [J].
         """
         x = self.conductance * duration / self.capacity
-        start, rise = temperature - self.ambient, power * duration / self.capacity
+        start = temperature - self.ambient
         if x < _SMALL:
+            rise = power * duration / self.capacity
             psi = 0.5 - x / 6.0 + x**2 / 24.0 - x**3 / 120.0 + x**4 / 720.0
             phi = 1.0 - x * psi
-        else:
-            phi = -np.expm1(-x) / x
-            psi = (1.0 - phi) / x
-        end = start * np.exp(-x) + rise * phi
-        mean = start * phi + rise * psi
-        return self.ambient + float(end), float(self.conductance * duration * mean)
+            end = start * np.exp(-x) + rise * phi
+            released = self.conductance * duration * (start * phi + rise * psi)
+        else:  # in this form a quick node does not overflow
+            decay = -np.expm1(-x)
+            end = start * np.exp(-x) + power / self.conductance * decay
+            released = self.capacity * start * decay
+            released += power * duration * (1.0 - decay / x)
+        return self.ambient + float(end), float(released)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -106,6 +106,14 @@ def test_heat_is_stored_or_released(x):
         assert released == pytest.approx(node.conductance * integral, rel=1e-9)
 
 
+@pytest.mark.parametrize("capacity", [1e-300, 1e-12, 1e-3])
+def test_a_node_without_capacity_releases_all_heat(capacity):
+    """At once, at P/G above the surroundings, also where rates overflow."""
+    node = ThermalNode(capacity=capacity, conductance=1e15, ambient=300.0)
+    end, released = node.advance(300.0, 40.0, 0.1)
+    assert end == pytest.approx(300.0) and released == pytest.approx(4.0, rel=1e-12)
+
+
 def test_run_with_constant_losses_approaches_ambient_plus_power_over_conductance(
     bench, constant
 ):
