@@ -22,6 +22,7 @@ from swgjoint.explore.tune.result import TuneSettings
 from swgjoint.explore.tune.tunable import GainParameter
 from swgjoint.explore.tune.tune import tune
 from swgjoint.json_text import json_text
+from swgjoint.view.plots.tune import claims
 
 NAME = "swgjoint/JointTracking-v0"
 SHORT = {"episode_s": 0.5, "max_speed_rad_s": 0.3}
@@ -171,6 +172,28 @@ def test_its_torque_is_added_to_motor_loops(name):
     loop, first, best = found.candidates
     np.testing.assert_array_equal(first.training, loop.training)
     np.testing.assert_array_equal(best.held_out, loop.held_out)
+    assert "Nothing: no parameter changes any cost" in claims(found)
+    assert not any("exceeds" in one for one in claims(found))
+
+
+def test_broken_limits_are_told():
+    """Of each candidate, with the number of its held-out episodes."""
+
+    class Pushing:
+        parameters = {"torque_Nm": (5.0, 9.0)}  # noqa: RUF012
+
+        def __init__(self, *, torque_Nm):
+            self.torque_Nm = torque_Nm
+
+        def start(self, task):
+            pass
+
+        def torque(self, k, measured):
+            return np.full(1, self.torque_Nm)
+
+    lines = claims(tune(settings(Pushing)))
+    assert "Pushing tuned: exceeds a limit in 2 of 2 held-out episodes" in lines
+    assert not any("pd by rule: exceeds" in one for one in lines)
 
 
 def made(**changes):

@@ -52,6 +52,16 @@ def claims(tuned: Tuned) -> list[str]:
         f" training seeds, {abs(100 * wide):.0f} % {'higher' if wide > 0 else 'lower'}"
         " on the held-out seeds"
     )
+    for one in tuned.candidates:
+        if one.broken:
+            lines.append(
+                f"{one.name}: exceeds a limit in {one.broken} of {count} held-out"
+                " episodes"
+            )
+    if search := tuned.searches.get("named"):
+        costs = np.concatenate(search.costs)
+        if np.ptp(costs, axis=0).max() == 0.0:
+            lines.append(f"{best.controller}: no parameter changes any cost")
     at_bound = [
         p.key for p in tuned.parameters if not 0.01 < p.place(best.values[p.key]) < 0.99
     ]
