@@ -59,7 +59,8 @@ class ArmTrackingEnv(SingleEnv):
     tool moves along the curve and half the way back, and arms with six or more joints
     keep its orientation. 40 to 100 % of the largest size that the limits allow is
     drawn; curves are cut off where a joint would exceed its limits. Paths do not leave
-    the ranges of the joints and are smaller where bodies would touch.
+    the ranges of the joints and are smaller where bodies would touch; one of which less
+    than a tenth would remain is drawn again.
 
     An episode starts at rest at the start of the scene, and the drives carry weight and
     load. It is ``truncated`` after ``episode_s``, or at the end of the scene if it is

@@ -8,6 +8,7 @@ import pytest
 from messages import naming
 
 from swgjoint.envs import plans
+from swgjoint.envs.arm.paths import ArmPaths
 from swgjoint.envs.arm_tracking import ArmTrackingEnv, ArmTrackingVectorEnv
 from swgjoint.errors import InputError
 from swgjoint.models_path import models_path
@@ -222,6 +223,116 @@ def test_paths_avoid_contacts_and_ends_of_joints(reference, tmp_path):
     assert 0.13 < far.max() <= 0.2 * ROUND_OFF
     # a path that meets no wall is the same without one
     assert any((near[:, k] == far[:, k]).all() for k in range(8))
+
+
+PLANAR = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="upper" pos="0 0 0.5">
+      <joint name="first" axis="0 1 0" range="{low} 2"/>
+      <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="1"/>
+      <body name="lower" pos="0.3 0 0">
+        <joint name="second" axis="0 1 0" range="-2 2" ref="0.6"/>
+        <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="1"/>
+        <site name="tool" pos="0.3 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+  <contact><exclude body1="upper" body2="lower"/></contact>
+</mujoco>
+"""
+
+
+def planar(folder, low):
+    """Scene of an arm of two links whose first joint starts at -0.4 rad."""
+    (folder / "arm.xml").write_text(PLANAR.format(low=low), encoding="utf-8")
+    path = folder / "scene.toml"
+    path.write_text(
+        """name = "planar"
+arm = "arm.xml"
+[defaults]
+drive = "CSG-25-100"
+rotor_inertia_kgm2 = 1e-4
+[trajectory]
+kind = "sweep"
+hold_s = 0.2
+ramp_s = 0.3
+settle_s = 0.2
+start_deg = {first = -22.918311805232928, second = 60.0}
+end_deg = {first = 0.0, second = 70.0}
+[controller]
+kind = "pd"
+natural_frequency_Hz = 8.0
+damping_ratio = 1.0
+[simulation]
+duration_s = 1.5
+step_s = 0.001
+""",
+        encoding="utf-8",
+    )
+    return {"scene": str(path), "episode_s": 0.5}
+
+
+def test_a_joint_without_room_is_named(tmp_path):
+    """Instead of motions in which it stands still: 1 % of max_angle_rad is needed."""
+    keys = {"reference": "sinusoid", "max_angle_rad": 0.5}
+    match = naming("reference", "first", "0.0049 rad", "0.005 rad", "max_angle_rad")
+    with pytest.raises(InputError, match=match):
+        ArmTrackingEnv(**keys, **planar(tmp_path, -0.4049))
+    env = ArmTrackingVectorEnv(4, threads=1, **keys, **planar(tmp_path, -0.4052))
+    env.reset(seed=1)
+    moved = np.abs(env.task.position - env.task.position[0]).max(axis=0)
+    assert (moved[:, 0] > 0.002).all() and (moved[:, 0] <= 0.0052 * ROUND_OFF).all()
+
+
+def test_curves_at_the_end_of_a_joint_neither_fail_nor_vanish(tmp_path):
+    """Of such curves about three in four leave the range of the joint."""
+    keys = {"reference": "arc", "max_distance_mm": 100.0}
+    env = ArmTrackingEnv(**keys, **planar(tmp_path, -0.4))
+    rng, moved = np.random.default_rng(5), []
+    for _ in range(60):
+        _, (position, *_) = env.core._paths.draw(rng)
+        moved.append(np.ptp(position, axis=0).max())
+        assert position[:, 0].min() >= -0.4 - 1e-9
+    # a tenth of an arc of 40 mm times 0.7^10 on an arm of 0.6 m
+    assert min(moved) > 1e-4 and np.median(moved) > 0.01
+
+
+def test_the_first_path_is_used_where_no_other_fits(tmp_path, monkeypatch):
+    """So that training does not end in an error."""
+    env = ArmTrackingEnv(reference="arc", **planar(tmp_path, -0.4))
+    paths = env.core._paths
+
+    def fail(*_):
+        raise InputError("no")
+
+    monkeypatch.setattr(paths, "_attempt", fail)
+    drawn, motion = paths.draw(np.random.default_rng(5))
+    assert drawn.kind == "arc" and np.ptp(motion[0], axis=0).max() > 1e-4
+
+
+def test_paths_next_to_a_wall_do_not_vanish(tmp_path, monkeypatch):
+    """A wall 0.2 mm below the link leaves only motions upwards, or no path at all."""
+    path = tmp_path / "arm.xml"
+    path.write_text(TOUCHING.format(wall=0.4698), encoding="utf-8")
+    keys = {"scene": str(path), "reference": "point_to_point", "episode_s": 1.0}
+    env = ArmTrackingVectorEnv(8, threads=1, **keys)
+    env.reset(seed=0)
+    assert (np.ptp(env.task.position, axis=0) > 0.02).all()
+    monkeypatch.setattr(ArmPaths, "_is_used", lambda *_: False)
+    with pytest.raises(InputError, match=naming("point_to_point", "touch", "start")):
+        ArmTrackingVectorEnv(1, threads=1, **keys)
+
+
+@pytest.mark.parametrize("reference", ["scene", "line", "sinusoid"])
+def test_a_tool_that_cannot_move_is_rejected(reference, tmp_path):
+    """On the axis of the only joint, every reward would be that of no error."""
+    path = tmp_path / "arm.xml"
+    text = TOUCHING.format(wall=-5.0)
+    path.write_text(text.replace('pos="0.4 0 0"', 'pos="0 0.1 0"'), encoding="utf-8")
+    with pytest.raises(InputError, match=naming("arm", "no joint moves the tool")):
+        ArmTrackingEnv(scene=str(path), reference=reference)
 
 
 @pytest.mark.parametrize(

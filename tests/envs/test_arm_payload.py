@@ -199,6 +199,10 @@ def test_a_payload_replaces_that_of_the_scene(tmp_path):
         ({"payload_kg": 2e3}, ("payload_kg", "2000.0 kg", "1000")),
         ({"payload_centre_mm": 5.0}, ("payload_centre_mm", "5.0 mm", "three")),
         (
+            {"payload_centre_mm": (0.0, 0.0, 60.0)},
+            ("payload_centre_mm", "without payload_kg"),
+        ),
+        (
             {"payload_centre_mm": (0.0, np.inf, 0.0)},
             ("payload_centre_mm", "(0.0, inf, 0.0) mm", "three"),
         ),
@@ -207,4 +211,13 @@ def test_a_payload_replaces_that_of_the_scene(tmp_path):
 def test_what_is_no_payload_gives_one_line(keys, match):
     """What, where, and what is accepted."""
     with pytest.raises(InputError, match=naming(*match)):
+        ArmTrackingEnv(**keys)
+
+
+@pytest.mark.parametrize("payload", [80.0, (1.0, 80.0)], ids=str)
+def test_a_payload_beyond_the_strength_of_the_arm_is_rejected(payload):
+    """Every episode with it would end at its first step."""
+    keys = {"payload_kg": payload, "payload_centre_mm": (0.0, 0.0, 60.0)}
+    match = naming("payload of 80 kg", "wrist_1_joint", "up to 58 N·m", "momentary")
+    with pytest.raises(InputError, match=match):
         ArmTrackingEnv(**keys)

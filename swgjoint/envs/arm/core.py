@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.arm.paths import ArmPaths, JointPath, ToolPath, tool_slopes
-from swgjoint.envs.arm.payload import DrawnPayloads, start_of
+from swgjoint.envs.arm.payload import DrawnPayloads, check_strength, start_of
 from swgjoint.envs.arm.scene import at_rest, check_assembly, drives_of, scene_of
 from swgjoint.envs.arm.settings import ArmSettings
 from swgjoint.envs.core import Core, Rows
@@ -93,6 +93,7 @@ class ArmCore(Core):
                 for m in maps
             ]
         ).T
+        check_strength(assembly, self.payloads, np.minimum(momentary, ratcheting))
         ratio, start = np.abs(task.joints.ratio), task.position[0]
         one = np.ones(len(drives))
         self.authority = s.authority_of_rated * rated / ratio

@@ -36,9 +36,14 @@ Curve = Callable[[Array], Array]
 """Points u(s) of a curve from the origin, shape (n, 3), for 0 <= s <= 1, shape (n,)."""
 
 ATTEMPTS = 20
-"""Number of curves after which an arm cannot follow a kind of curve."""
+"""Number of paths of a kind of which an arm must be able to follow one."""
 SMALLER = 0.7
 """Size of a curve relative to the preceding one, which the arm could not follow [-]."""
+LEAST = 0.1
+"""Share of its drawn size, or of one of its limits, that a path must use [-]."""
+ROOM = 0.01
+"""Room of every joint for motions to either side, relative to their largest angle
+[-]."""
 PROBED = 20
 """Number of periods between the poses that are checked for contacts."""
 _FLAT = 1e-3  # relative speed of the tool in a direction in which it does not move
@@ -187,7 +192,7 @@ class ArmPaths:
             max_distance: Largest distance of the tool from its start along curves [m].
 
         Raises:
-            InputError: If the arm cannot follow a kind of curve from its start.
+            InputError: If the arm cannot follow a kind of path from its start.
         """
         self._arm, self._start, self._instants = arm, start, instants
         self._kinds, self._distance = kinds, max_distance
@@ -205,30 +210,88 @@ class ArmPaths:
             axes, speeds, _ = np.linalg.svd(tool_slopes(arm, start[None])[0])
             self._axes = axes.T[: int((speeds > _FLAT * speeds[0]).sum())]
         self._touching = self._contacts(start[None])
-        for kind in set(kinds) & set(CURVES):
-            self._along_curve(kind, np.random.default_rng(0))
+        if set(kinds) & set(KINDS):
+            self._check_room(max_angle)
+        self._most = np.full(start.shape, max_angle)
+        self._known: dict[str, JointPath | ToolPath] = {}
+        for kind in dict.fromkeys(kinds):
+            self._known[kind] = self._first(kind, np.random.default_rng(0))
 
     def draw(self, rng: np.random.Generator) -> tuple[JointPath | ToolPath, Motion]:
-        """Draw a path.
+        """Draw a path, which uses some of its limits.
 
         Returns:
             The path, and its values at all instants.
-
-        Raises:
-            InputError: If the arm cannot follow the kind of curve from its start.
         """
         kind = self._kinds[int(rng.integers(len(self._kinds)))]
-        path = (
-            self._along_curve(kind, rng) if kind in CURVES else self._joint(kind, rng)
+        for k in range(10 * ATTEMPTS):
+            try:
+                path, motion = self._attempt(kind, rng, k)
+            except InputError:
+                continue
+            if self._is_used(path, motion):
+                return path, motion
+        # so few fit that the known one is better than an end of a training
+        path = self._known[kind]
+        return path, path.sample(self._instants, slice(None))
+
+    def _first(self, kind: str, rng: np.random.Generator) -> JointPath | ToolPath:
+        """Path of a kind that the arm can follow."""
+        why = "all paths shrink, because bodies would touch or a joint would leave its"
+        why += " range"
+        for k in range(ATTEMPTS):
+            try:
+                path, motion = self._attempt(kind, rng, k)
+            except InputError as failure:
+                why = str(failure)
+                continue
+            if self._is_used(path, motion):
+                return path
+        others = ", ".join(one for one in (*KINDS, *CURVES) if one != kind)
+        size = "max_distance_mm" if kind in CURVES else "max_angle_rad"
+        raise InputError(
+            f"reference {kind!r}: arm {self._arm.reference!r} cannot follow such a"
+            f" path from its start ({why}); accepted: another start, a smaller {size},"
+            f" or others of {others}"
         )
+
+    def _attempt(
+        self, kind: str, rng: np.random.Generator, k: int
+    ) -> tuple[JointPath | ToolPath, Motion]:
+        """Draw a path after k failures, and shorten it until it keeps the limits."""
+        path: JointPath | ToolPath
+        if kind in CURVES:
+            path = self._along_curve(kind, rng, SMALLER ** min(k, ATTEMPTS))
+        else:
+            path = self._joint(kind, rng)
         motion = path.sample(self._instants, slice(None))
-        while (excess := self._excess(motion)) > 1.0 + 1e-9:
+        limits = self._below, self._above
+        while (excess := self._excess(motion, *limits)) > 1.0 + 1e-9:
             path = path.shorten(0.99 / min(excess, 10.0))
             motion = path.sample(self._instants, slice(None))
         while not self._contacts(motion[0][::PROBED]) <= self._touching:
             path = path.shorten(0.5)
             motion = path.sample(self._instants, slice(None))
         return path, motion
+
+    def _is_used(self, path: JointPath | ToolPath, motion: Motion) -> bool:
+        """Whether a path is more than a remainder of what was drawn."""
+        if isinstance(path, ToolPath):
+            # limits are those of the settings, not what the end of a joint leaves
+            limits = self._most, self._most
+            return max(path.size, self._excess(motion, *limits)) >= LEAST
+        return self._excess(motion, self._below, self._above) >= LEAST
+
+    def _check_room(self, max_angle: float) -> None:
+        """Reject a joint that has no room for motions to either side of its start."""
+        names, room = self._arm.joints, np.minimum(self._below, self._above)
+        least = int(room.argmin())
+        if room[least] < ROOM * max_angle:
+            raise InputError(
+                f"reference: arm {self._arm.reference!r}: joint {names[least]!r} starts"
+                f" {room[least]:.3g} rad from an end of its range; accepted: at least"
+                f" {ROOM * max_angle:.3g} rad, {100.0 * ROOM:g} % of max_angle_rad"
+            )
 
     def _joint(self, kind: str, rng: np.random.Generator) -> JointPath:
         """Draw a motion of every joint, within the limits."""
@@ -246,39 +309,34 @@ class ArmPaths:
         ]
         return JointPath(kind=kind, start=self._start, motions=tuple(motions))
 
-    def _along_curve(self, kind: str, rng: np.random.Generator) -> ToolPath:
-        """Draw a curve that the arm can follow."""
+    def _along_curve(
+        self, kind: str, rng: np.random.Generator, share: float
+    ) -> ToolPath:
+        """Draw a curve, of a share of the drawn size.
+
+        Raises:
+            InputError: If the arm cannot follow it.
+        """
+        if len(self._axes) < (1 if kind == "line" else 2):
+            count = len(self._axes)
+            raise InputError(f"the tool moves in {count} direction only")
         place, _ = self._kinematics.pose(self._start)
-        why = f"the tool moves in {len(self._axes)} direction only"
-        for k in range(ATTEMPTS if len(self._axes) > 1 or kind == "line" else 0):
-            size = self._distance * rng.uniform(0.4, 1.0) * SMALLER**k
-            curve = CURVES[kind](rng, self._axes)
-            points = partial(_points, place, size, curve)
-            try:
-                joints = follow(self._kinematics, self._start, points, length=1.0)
-            except InputError as failure:
-                why = str(failure)
-                continue
-            end = float(self._instants.time[-1])
-            return ToolPath(
-                kind=kind,
-                joints=(joints, joints.derivative(), joints.derivative(2)),
-                profile=Move.draw(end, rng),
-                size=1.0,
-            )
-        others = ", ".join((*KINDS, *CURVES))
-        raise InputError(
-            f"reference {kind!r}: arm {self._arm.reference!r} cannot follow such a"
-            f" curve from its start ({why}); accepted: another start, a smaller"
-            f" max_distance_mm, or others of {others}"
+        size = self._distance * rng.uniform(0.4, 1.0) * share
+        points = partial(_points, place, size, CURVES[kind](rng, self._axes))
+        joints = follow(self._kinematics, self._start, points, length=1.0)
+        return ToolPath(
+            kind=kind,
+            joints=(joints, joints.derivative(), joints.derivative(2)),
+            profile=Move.draw(float(self._instants.time[-1]), rng),
+            size=1.0,
         )
 
-    def _excess(self, motion: Motion) -> float:
+    def _excess(self, motion: Motion, below: Array, above: Array) -> float:
         """Largest ratio of a motion to its limit [-]."""
         q, v, a = motion
         (speed, acceleration), moved = self._rates, q - self._start
         shares = [np.abs(v).max() / speed, np.abs(a).max() / acceleration]
-        for way, limit in ((-moved, self._below), (moved, self._above)):
+        for way, limit in ((-moved, below), (moved, above)):
             top = way.max(axis=0)
             # a joint at its end has only the round-off of inverse kinematics
             shares.append((top / np.maximum(limit, 1e-9)).max())

@@ -9,6 +9,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from swgjoint.errors import InputError
 from swgjoint.sim.arm.payload import BODY, POINT, arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.assembly import Assembly
@@ -50,6 +51,11 @@ class DrawnPayloads:
         qpos = self._arm.model.qpos0
         lightest = self._loaded(self._bounds[0]).inertia(qpos)
         return np.asarray(self._assembly.arm.inertia(qpos) - lightest)
+
+    def heaviest(self) -> tuple[float, Array]:
+        """Largest mass [kg], and the drive torques that carry it [N·m]."""
+        mass = self._bounds[1]
+        return mass, self._carried(mass)[1]
 
     def attach_to(self, batch: Batch) -> None:
         """Give every simulation its own payload, at first the nominal one."""
@@ -99,6 +105,36 @@ class DrawnPayloads:
         first = path.position[:2], path.velocity[:2], path.acceleration[:2]
         link_torque = assembly.load + arm.torques(*first)
         return start_of(replace(assembly, arm=arm, link_torque=link_torque))
+
+
+def check_strength(
+    assembly: Assembly, drawn: DrawnPayloads | None, strength: Array
+) -> None:
+    """Reject a load that the drives cannot carry at the start of an episode.
+
+    Args:
+        assembly: The scene with its nominal payload.
+        drawn: Drawn payloads, of which the heaviest must be carried; None for none.
+        strength: Largest torques of the drives [N·m]. Shape (n_joints,).
+
+    Raises:
+        InputError: If an episode would end at its first step.
+    """
+    scene = assembly.scene
+    mass = scene.payload.mass_kg if scene.payload is not None else 0.0
+    if drawn is None:
+        torque = start_of(assembly)[1]
+    else:
+        mass, torque = drawn.heaviest()
+    excess = np.abs(torque) / strength
+    worst = int(excess.argmax())
+    if not excess[worst] <= 1.0:
+        raise InputError(
+            f"scene {scene.name!r} with a payload of {mass:g} kg: joint"
+            f" {assembly.joints[worst]!r} carries {abs(torque[worst]):.4g} N·m at the"
+            f" start; accepted: up to {strength[worst]:.4g} N·m, its momentary peak or"
+            " ratcheting torque"
+        )
 
 
 def start_of(assembly: Assembly) -> tuple[Array, Array]:

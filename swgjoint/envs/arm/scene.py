@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from swgjoint.drives.references import names_catalogue
+from swgjoint.envs.arm.paths import tool_slopes
 from swgjoint.envs.arm.settings import ArmSettings
 from swgjoint.envs.specimen import load_drive_once
 from swgjoint.errors import InputError
@@ -21,6 +22,9 @@ from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.scene.feature_sections import Payload
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.typing import Array
+
+STILL = 1e-9
+"""Displacement of the tool per link angle below which it does not move [m/rad]."""
 
 
 def scene_of(settings: ArmSettings) -> Scene:
@@ -97,6 +101,12 @@ def check_assembly(scene: Scene, assembly: Assembly) -> None:
         InputError: If the scene has such a feature.
     """
     _check_motion(scene, assembly.arm, assembly.trajectory.velocity[0])
+    slopes = tool_slopes(assembly.arm, assembly.trajectory.position[:1])
+    if np.abs(slopes).max() < STILL:
+        raise InputError(
+            f"scene {scene.name!r}: no joint moves the tool from its start; accepted:"
+            " an arm whose tool moves, because the reward depends on its position"
+        )
     where, loops = f"scene {scene.name!r}", assembly.loops
     if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
         raise InputError(

@@ -141,6 +141,11 @@ class ArmSettings:
                 f"payload_centre_mm {format_value(centre)} mm; accepted: three numbers,"
                 f" up to {FARTHEST:g} mm from the tool"
             )
+        if mass is None and any(centre):
+            raise InputError(
+                f"payload_centre_mm {format_value(centre)} mm without payload_kg;"
+                " accepted: with payload_kg"
+            )
 
     @property
     def kinds(self) -> tuple[str, ...]:
