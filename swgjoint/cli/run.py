@@ -222,11 +222,18 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
 
     if metrics["verdict"] == VALID:
         return [metrics["verdict"]]
-    shown_next = f"\n  {NEXT.removeprefix('; ')}"
-    return [
-        f"{metrics['verdict']}: the results below do not describe this scene",
-        *(f"  {reason.replace(NEXT, shown_next)}" for reason in metrics["reasons"]),
-    ]
+    lines = [f"{metrics['verdict']}: the results below do not describe this scene"]
+    remedies: dict[str, list[str]] = {}
+    for reason in metrics["reasons"]:
+        fact, _, remedy = reason.partition(NEXT)
+        lines.append(f"  {fact}")
+        if remedy:
+            name = fact.partition(":")[0]
+            general = remedy.replace(f"joints.{name}.", "joints.JOINT.")
+            remedies.setdefault(general, []).append(remedy)
+    # joints with the same map share one line
+    shown = [g if len(same) > 1 else same[0] for g, same in remedies.items()]
+    return lines + [f"  {NEXT.removeprefix('; ')}{remedy}" for remedy in shown]
 
 
 def joint_table(joints: dict[str, Any]) -> str:

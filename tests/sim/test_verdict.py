@@ -9,7 +9,7 @@ from messages import names
 from validation_record import validated_map
 
 from swgjoint.cli.main import main
-from swgjoint.cli.run import joint_row, notes
+from swgjoint.cli.run import joint_row, notes, verdict_lines
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
 from swgjoint.sim.figures.ripple_validity import integration_noise
@@ -249,6 +249,15 @@ def test_ripple_that_the_map_misses_at_these_torques_makes_a_run_invalid(
     low, high = joint["map_difference"]["torque_range_Nm"]
     assert 15.0 < low < high < 25.0
     assert not warnings_of(found["joints"])
+
+
+def test_joints_of_one_map_share_a_remedy():
+    """Every fault has its line; the same advice for two joints is one line."""
+    reasons = [f"{j}: bad; next: --set joints.{j}.model=2d" for j in ("a", "b")]
+    lines = verdict_lines({"verdict": "NOT VALID", "reasons": reasons})
+    assert lines[1:] == ["  a: bad", "  b: bad", "  next: --set joints.JOINT.model=2d"]
+    lines = verdict_lines({"verdict": "NOT VALID", "reasons": [*reasons[:1], "c: far"]})
+    assert lines[1:] == ["  a: bad", "  c: far", "  next: --set joints.a.model=2d"]
 
 
 def test_the_torque_from_which_a_map_is_valid(bench, synthetic_map):

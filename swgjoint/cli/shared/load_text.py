@@ -45,5 +45,5 @@ def design_line(choice: Mapping[str, Any]) -> str:
     )
     return (
         "designs of these sizes, whose teeth you can change (swgjoint design new NAME"
-        f" -o FILE): {designs}"
+        f" -o FILE) and run in seconds with --model ring: {designs}"
     )
