@@ -183,8 +183,11 @@ def _remedy(name: str, joint: Mapping[str, Any]) -> str:
             f" design: --set joints.{name}.model=2d)"
         )
     else:
+        # without --model, meshing computes a design with a cup in 3D
+        model = f" --model {joint['source']}" if joint["source"] in ("2d", "3d") else ""
         first = (
-            "'swgjoint meshing DESIGN --torque NM' computes the ripple at one torque"
+            f"'swgjoint meshing DESIGN{model} --torque NM' computes the ripple at one"
+            " torque"
         )
     start = joint["map_difference"]["valid_from_Nm"]
     if start is None:
