@@ -229,9 +229,9 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     superposed = []
     table = tolerance_sampling.respond_over_torque
 
-    def counted(rest, errors, *others):
-        superposed.append(len(errors[0]))
-        return table(rest, errors, *others)
+    def counted(rest, gap_changes, *others):
+        superposed.append(len(gap_changes(rest.at)))
+        return table(rest, gap_changes, *others)
 
     monkeypatch.setattr(tolerance_sampling, "respond_over_torque", counted)
     found = sample_tolerances(design, **options, keep=keep)

@@ -25,10 +25,6 @@ class Spring:
     def __init__(self) -> None:
         self.solved: list[float] = []
 
-    def gap_change(self, errors: np.ndarray) -> np.ndarray:
-        """The errors themselves."""
-        return errors
-
     def respond(self, change: np.ndarray, torque: float, start: object) -> Response:
         """Angle of the spring; takes note of the torque."""
         self.solved.append(torque)
@@ -47,7 +43,7 @@ def test_both_ends_of_a_clearance_are_solved_once():
     rest = Rest(state=state, at=up, opposite=(state, down))
     errors, levels, parts = np.linspace(0.0, 1e-3, CHUNK), np.array([0.5, 4.0]), []
     table, free = respond_over_torque(
-        rest, (errors,), levels, 0.5, lambda n=1: parts.append(n)
+        rest, lambda _: errors, levels, 0.5, lambda n=1: parts.append(n)
     )
     assert up.solved == [0.5, 4.0] and down.solved == [-0.5, -4.0]
     torque = np.array([-4.0, -0.5, 0.0, 0.5, 4.0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from solved import coarse
 from swgjoint.errors import DesignError
 from swgjoint.explore.lot import run_lot
 from swgjoint.fe.plane.drive2d import unmodelled_parts
-from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.fe.tolerances.cycle import gap_changes, gap_errors, pitch_of
 from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.lot import (
     outline_change,
@@ -66,6 +66,25 @@ def test_errors_of_the_wave_generator_are_superposed(flawed, perfect, torque):
     left_out = perfect.respond(teeth, torque).output_angle
     # second order in micrometres, other contacts at the flanks
     assert np.abs(found - exact).max() < 0.03 * np.abs(left_out - exact).max()
+
+
+def test_gap_changes_over_the_cycle_are_those_of_its_errors(perfect):
+    """Added up from those of the teeth of either member, and of a turning axis."""
+    pitches = np.array([0, 1, 59, 60, 61, 3000, 7319])
+    slopes = np.random.default_rng(1).normal(size=perfect.by_tilt.shape) * 1e-3
+    at, seen = replace(perfect, by_tilt=slopes), []
+    for changes in (
+        {},
+        {"tolerances.misalignment_arcmin": 2.0},
+        {"drive.layout": "wave_generator_fixed"},
+    ):
+        design = DESIGN.with_changes(changes)
+        wanted = at.gap_change(*gap_errors(design, pitches))
+        found = gap_changes(at, design, pitches)
+        assert np.abs(found - wanted).max() < 1e-14 * np.abs(wanted).max()
+        seen.append(found[1:])
+    for other in seen[1:]:
+        assert np.abs(other - seen[0]).max() > 0.1 * np.abs(seen[0]).max()
 
 
 def test_an_influence_is_sent_without_what_it_determines(perfect):

@@ -281,7 +281,9 @@ def superpose(
         levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
         small: Torque that takes up the clearance [N·m].
     """
-    table, _ = respond_over_torque(rest, errors, levels, small)
+    table, _ = respond_over_torque(
+        rest, lambda at: at.gap_change(*errors), levels, small
+    )
     return np.where(table[2] > 0.0, table, np.nan)
 
 

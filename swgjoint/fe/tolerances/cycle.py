@@ -7,6 +7,7 @@ from math import lcm, pi
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt, tooth_errors
@@ -50,6 +51,36 @@ def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
     first = 2 * (np.asarray(onwards) % count)
     shifts = sliding_window_view(twice, 2 * count)[first]
     return np.asarray(shifts.reshape(-1, count, 2))
+
+
+def gap_changes(at: Influence, design: Design, pitches: Index) -> Array:
+    """Changes of the tooth gaps by the errors of teeth and axis after whole pitches.
+
+    The shifts of a member repeat after as many pitches as it has teeth, and the gap
+    changes of both members add up. They are therefore computed once per tooth of either
+    member.
+
+    Args:
+        at: Influence of the tooth gaps at the first pitch.
+        design: The drive.
+        pitches: Numbers of pitches by which the input has turned (n,).
+
+    Returns:
+        Gap changes, as :meth:`swgjoint.fe.common.influence.Influence.gap_change` gives
+        for :func:`gap_errors` (n, n_contacts) [m].
+    """
+    change = np.zeros((len(pitches), len(at.sector)))
+    for member, contact, by_shift in zip(
+        MEMBERS, (at.sector, at.tooth), at.direction, strict=True
+    ):
+        errors = tooth_errors(design, member)
+        count = len(errors.shift)
+        shifts = shift_errors(errors, np.arange(count), design.drive.layout)
+        own = np.einsum("pki,ki->pk", shifts[:, contact], by_shift)
+        change += own[pitches % count]
+    if (slope := axis_slope(design, pitches)).any():
+        change += slope @ at.by_tilt.T
+    return change
 
 
 def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:

@@ -11,13 +11,15 @@ one pitch, and the errors of all pitches are superposed there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import with_mean_clearance
-from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.common.influence import Influence
+from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.fe.tolerances.unseen import (
@@ -116,8 +118,8 @@ def sample_tolerances(
     if own_reference:
         ideal_drive, reference = influences(without_errors(design), **options)
     pitches = np.arange(pitches_of(design), dtype=np.int64)
-    errors = gap_errors(design, pitches)
-    none = tuple(np.zeros_like(one[:1]) for one in errors)
+
+    by_errors = partial(gap_changes, design=design, pitches=pitches)
     levels = np.array([part * repeated_peak for part in LEVELS[model]])
     small = SMALL * rated_torque
     has_play = any(rest.opposite is not None for rest in (*linear, *reference))
@@ -139,7 +141,7 @@ def sample_tolerances(
             if own_reference:
                 loaded = rest.under_both_signs(follow, under_load, tick)
             phase_table, count = respond_over_torque(
-                loaded, errors, levels, small, tick
+                loaded, by_errors, levels, small, tick
             )
         else:
             phase_table, count = there
@@ -152,7 +154,9 @@ def sample_tolerances(
             )
         if keep is not None and there is None:
             keep.write(_PHASE.format(k), {"table": phase_table, "free": count})
-        alone, _ = respond_over_torque(flawless, none, levels, small)
+        alone, _ = respond_over_torque(
+            flawless, lambda at: np.zeros((1, len(at.sector))), levels, small
+        )
         ideal = pitch_of(design) * k / phases / design.ratio
         phase_table[0] -= ideal
         alone[0] -= ideal
@@ -199,7 +203,7 @@ def sample_tolerances(
 
 def respond_over_torque(
     rest: Rest,
-    errors: tuple[Array, ...],
+    changes_of: Callable[[Influence], Array],
     levels: Array,
     small: float,
     tick: Callable[..., None] = lambda parts=1: None,
@@ -208,7 +212,8 @@ def respond_over_torque(
 
     Args:
         rest: Linearised drive with perfect teeth.
-        errors: Sets of errors, see :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+        changes_of: Changes of the gaps of a linearised drive, one set of errors per
+            row (n_sets, n) [m].
         levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
         small: Torque that takes up the clearance [N·m].
         tick: Called with the number of chunks that are done, one by default, of
@@ -218,15 +223,20 @@ def respond_over_torque(
         Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
         (3, n_torques, n_sets), and the number of sets whose unloaded output is free.
     """
-    changes: dict[int, Array] = {}
+    latest: dict[int, Array] = {}
+
+    def changes(at: Influence) -> Array:
+        """Gap changes, kept for the latest linearisation only: they fill 50 MB."""
+        if id(at) not in latest:
+            latest.clear()
+            latest[id(at)] = changes_of(at)
+        return latest[id(at)]
 
     def row(
         torque: float, chosen: Any, start: Any, tick: Callable[..., None]
     ) -> tuple[Array, Any]:
         state, at = rest.near(torque)
-        if id(at) not in changes:
-            changes[id(at)] = at.gap_change(*errors)
-        change = changes[id(at)][chosen]
+        change = changes(at)[chosen]
         tables, active = [], []
         for k in range(0, len(change), CHUNK):
             part = slice(k, k + CHUNK)
@@ -242,7 +252,7 @@ def respond_over_torque(
             tick()
         return np.concatenate(tables, axis=1), np.concatenate(active)
 
-    count = len(errors[0])
+    count = len(changes(rest.near(0.0)[1]))
     unloaded, at_rest = np.zeros((3, count)), None
     free = np.ones(count, dtype=bool)
     if rest.opposite is None:
