@@ -260,25 +260,6 @@ def check_loads(elements: Sequence[Jenkin], name: str, largest: float) -> None:
             )
 
 
-def play_hysteresis(
-    elements: Sequence[Jenkin], torsion: Array, elastic: Array | float = 0.0
-) -> Array:
-    """Total torque of the elements along a torsion history [N·m]. Shape (n,).
-
-    The elements start relaxed at zero torsion, as after a reset of the simulation
-    engine.
-
-    Args:
-        elements: Jenkin elements of the drive.
-        torsion: History of the torsion [rad]. Shape (n,).
-        elastic: History of the elastic torque [N·m]. Shape (n,), or one value.
-    """
-    total = np.zeros_like(torsion, dtype=float)
-    for element in elements:
-        total += element.stiffness * stretches(torsion, element.reach(elastic))
-    return total
-
-
 def stretches(torsion: Array, reach: ArrayLike) -> Array:
     r"""Stretch x - r of one element along a torsion history x [rad]. Shape (n,).
 

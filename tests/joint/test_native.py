@@ -7,13 +7,14 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from played import play_hysteresis
 
 from swgjoint.joint.native import fit_native, native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.from_catalogue import catalogue_names
-from swgjoint.maps.hysteresis import Jenkin, play_hysteresis
+from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.sheet.spec_sheet import spec_sheet
 
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from messages import naming
+from played import play_hysteresis
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import (
     Jenkin,
-    play_hysteresis,
     sticking_stiffness,
     stretches,
 )
