@@ -62,6 +62,8 @@ class Run:
     slipping_torque: Array
     """Hysteresis torque along the torsion [N·m]; zero if the drive has none. Shape
     (n, n_joints)."""
+    hysteresis_energy: Array
+    """Change of the energy stored in the hysteresis springs [J]. Shape (n_joints,)."""
     friction_torque: Array
     """Friction torque of the wave generator on the flexspline [N·m]. Shape
     (n, n_joints)."""
@@ -127,16 +129,6 @@ class Run:
         """
         reference = self.tool_reference if other is None else other.tool_position
         return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))
-
-    @cached_property
-    def hysteresis_energy(self) -> list[float]:
-        """Change of the energy stored in the hysteresis springs by joint [J]."""
-        return [
-            transmission.hysteresis_energy_change(
-                self.torsion[:, j], self.motor_position[:, j], self.position[:, j]
-            )
-            for j, transmission in enumerate(self.assembly.transmissions)
-        ]
 
     def metrics(self) -> dict[str, Any]:
         """Figures of the run under the keys of ``swgjoint run --json``."""

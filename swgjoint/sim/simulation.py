@@ -277,7 +277,7 @@ def _recorded(
     slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
     output = ratio * (motor - assembly.rotor_inertia * slowing)
     torsion, slipping, friction = np.zeros((3, *position.shape))
-    error = assembly.prescribed.copy()
+    error, stored = assembly.prescribed.copy(), np.zeros(len(assembly.joints))
     # the discrete integrator's positions are half a step ahead of its velocities
     ahead = 0.0
     if assembly.scene.simulation.integrator == "discrete":
@@ -291,7 +291,7 @@ def _recorded(
             course=warming.course(int(j)),
         )
         torsion[:, j], error[:, j] = signals.torsion, signals.transmission_error
-        output[:, j] = signals.torque
+        output[:, j], stored[j] = signals.torque, signals.stored
         slipping[:, j], friction[:, j] = signals.slipping, signals.friction
     return Run(
         name=name,
@@ -309,6 +309,7 @@ def _recorded(
         motor_torque=motor,
         wanted_torque=wanted,
         slipping_torque=slipping,
+        hysteresis_energy=stored,
         friction_torque=friction,
         tool_position=_tool_positions(assembly, q),
         tool_reference=assembly.arm.tool_positions(path.position),

@@ -82,3 +82,24 @@ def test_torque_of_a_sweep_follows_the_load(bench):
         replace(LOSSY, hysteresis=(element,)), defaults__level="native"
     ).contains
     assert any("with the load" in item["part"] for item in native["left_out"])
+
+
+def test_stored_energy_is_that_of_the_slipping_torque(bench, synthetic_map):
+    """T²/(2 k) of one element whose yield torque follows an angle-dependent torque."""
+    element = Jenkin(
+        stiffness=6e4, yield_torque=1.0, yield_curve=((10.0, 3.0), (30.0, 9.0))
+    )
+    run = bench(
+        replace(synthetic_map, hysteresis=(element,)),
+        trajectory={
+            "kind": "sweep",
+            "hold_s": 0.1,
+            "ramp_s": 0.05,
+            "end_deg": {"joint": 20.0},
+        },
+        simulation={"duration_s": 1.0, "step_s": 5e-4},
+    )
+    slipping = run.slipping_torque[:, 0]
+    assert np.abs(slipping[-1]) > 1.0
+    stored = (slipping[-1] ** 2 - slipping[0] ** 2) / (2.0 * element.stiffness)
+    assert run.hysteresis_energy[0] == pytest.approx(stored, rel=1e-9)

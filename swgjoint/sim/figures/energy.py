@@ -130,7 +130,7 @@ def dissipation(run: Run, j: int) -> float:
         torsion=run.torsion[:, j],
         slipping=run.slipping_torque[:, j],
         friction=run.friction_torque[:, j],
-        stored=run.hysteresis_energy[j],
+        stored=float(run.hysteresis_energy[j]),
         theta=run.motor_position[:, j],
         psi=run.position[:, j],
         step=run.assembly.scene.simulation.step_s,
@@ -290,7 +290,7 @@ def _elastic(run: Run, j: int) -> float:
         return 0.0
     theta, psi = run.motor_position[[0, -1], j], run.position[[0, -1], j]
     first, last = law.energy(law.torsion(theta, psi), theta, psi)
-    return float(last - first) + run.hysteresis_energy[j]
+    return float(last - first + run.hysteresis_energy[j])
 
 
 def _rigid_energies(run: Run) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from swgjoint.joint.native import native_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_error
 from swgjoint.maps.friction import FrictionCourse, continue_friction
-from swgjoint.maps.hysteresis import stretches, vary_with_load
+from swgjoint.maps.hysteresis import stretches
 from swgjoint.typing import Array
 
 _CHUNK = 1024  # samples per call: the coefficient table of a chunk fits in the cache
@@ -170,36 +170,6 @@ class Transmission:
             friction=rubs,
             stored=stored,
             rests=Rests(elements=tuple(ends), bristle=bristle),
-        )
-
-    def hysteresis_energy_change(
-        self, torsion: Array, theta: Array, psi: Array
-    ) -> float:
-        """Change of the energy stored in the hysteresis springs over a record [J].
-
-        Args:
-            torsion: Torsion of the drive [rad]. Shape (n,).
-            theta: Motor angles [rad]. Shape (n,).
-            psi: Link angles [rad]. Shape (n,).
-        """
-        total, elastic = 0.0, self._elastic(torsion, theta, psi)
-        torsion = torsion - self._relaxed(torsion)
-        for element in self.attached.elements:
-            first, last = stretches(torsion, element.reach(elastic))[[0, -1]]
-            total += 0.5 * element.stiffness * float(last**2 - first**2)
-        return total
-
-    def _elastic(self, torsion: Array, theta: Array, psi: Array) -> Array | float:
-        """Elastic torque on which yield torques depend [N·m]. Shape (n,).
-
-        Zero if none depends on it.
-        """
-        if not vary_with_load(self.attached.elements):
-            return 0.0
-        pieces = [slice(k, k + _CHUNK) for k in range(0, theta.size, _CHUNK)]
-        law = self.attached.drive
-        return np.concatenate(
-            [law.torque(torsion[p], theta[p], psi[p]) for p in pieces]
         )
 
     def _relaxed(self, torsion: Array) -> float:
