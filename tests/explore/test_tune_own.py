@@ -341,3 +341,18 @@ def test_environments_drive_it_as_trials_do():
     np.testing.assert_array_equal(trace.torque[:, 0], torques)
     assert costs.shape == (1, 1)
     trials.close()
+
+
+def test_signals_that_are_not_finite_cost_the_most(monkeypatch):
+    """Error of all links at their limits and full effort, which is ``worst``."""
+    arguments = {**SHORT, "error_scale_arcmin": 5e3, "effort_weight": 0.5}
+    trials = Trials(NAME, arguments, seeds=(1, 2), candidates=1)
+    assert trials.worst > 1.01 * trials.error_scale * trials._limit**0.5
+    lost = np.full(2, np.nan)
+    monkeypatch.setattr(trials.env.core, "deviation", lambda: (lost, lost))
+    tunable = PLANNED["pd"]
+    values = {
+        one.key: np.array([one.neutral])
+        for one in tunable.parameters(trials.joints, trials.loop)
+    }
+    np.testing.assert_allclose(trials.costs(tunable, values), trials.worst, rtol=1e-12)
