@@ -87,6 +87,9 @@ class ToleranceSamples:
     waves: Index | None = None
     """Numbers of waves in the cycle that the tables contain; None for any number. Shape
     (n,)."""
+    dropped: float = 0.0
+    """Largest rms over the torques of the output error that waves add which the tables
+    do not contain [rad]."""
     onsets: bool = False
     """Whether the torques next to zero are those at the ends of a clearance, see
     :func:`swgjoint.fe.common.clearance.across_clearance`."""

@@ -22,11 +22,15 @@ def load_line(joints: Mapping[str, Any]) -> str:
         for name, joint in joints.items()
     }
     first, *others = sorted(loads, key=lambda name: -loads[name])[:_SHOWN]
-    rest = ", ".join(f"{name} {100.0 * loads[name]:.2g} %" for name in others)
+    shares = {
+        name: f"{100.0 * load:.{'0f' if load >= 1.0 else '2g'}} %"
+        for name, load in loads.items()
+    }
+    rest = ", ".join(f"{name} {shares[name]}" for name in others)
     return (
         f"load: {first} carries the most, up to"
-        f" {joints[first]['ratings']['peak_Nm']:.3g} N·m or {100.0 * loads[first]:.2g}"
-        f" % of its rated torque; then {rest}"
+        f" {joints[first]['ratings']['peak_Nm']:.3g} N·m or {shares[first]} of its"
+        f" rated torque; then {rest}"
     )
 
 

@@ -24,7 +24,8 @@ from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
-from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
+from swgjoint.sim.figures.line_source import drive_order
+from swgjoint.sim.figures.metrics import strongest_left_out
 from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene

@@ -117,7 +117,7 @@ class RingErrors:
             self.progress(stage, k + 1, total)
         turns = pitches.size / self.design.drive.teeth_circular_spline
         passages = 0.5 * self.passage.carried_as * turns
-        table, waves = _main_harmonics(
+        table, waves, dropped = _main_harmonics(
             _over_passage(spectra, passages, pitches.size), pitches.size
         )
         torque = np.concatenate([-levels[::-1], [0.0], levels])
@@ -134,6 +134,7 @@ class RingErrors:
             torque=torque,
             table=table,
             waves=waves,
+            dropped=dropped,
             perfect=np.stack([perfect[t][:3, :1] for t in torque.tolist()], axis=1),
             order=(self.design.periodicity, 0),
             onsets=self.free,
@@ -332,10 +333,11 @@ def _over_passage(spectra: Sequence[Array], passages: float, count: int) -> Arra
     return np.asarray(0.5 * (first + second) + np.fft.rfft(change * wave))
 
 
-def _main_harmonics(spectrum: Array, count: int) -> tuple[Array, Index]:
+def _main_harmonics(spectrum: Array, count: int) -> tuple[Array, Index, float]:
     """Table with its mean and main harmonics only, and their numbers of waves.
 
-    Random errors of single teeth spread over thousands of harmonics.
+    Random errors of single teeth spread over thousands of harmonics. The third result
+    is the largest rms of the output error over the torques that all others add [rad].
 
     Args:
         spectrum: Harmonics of output angle, energy and compliance over the cycle (3,
@@ -347,8 +349,10 @@ def _main_harmonics(spectrum: Array, count: int) -> tuple[Array, Index]:
     size = np.abs(spectrum[0, :, 1:])
     largest = np.maximum(size.max(axis=1, keepdims=True, initial=0.0), 1e-300)
     kept = np.append(True, (size > KEEP * largest).any(axis=0))
+    others = np.sqrt(2.0 * np.sum(size[:, ~kept[1:]] ** 2, axis=1)) / count
     spectrum[..., ~kept] = 0.0
-    return np.fft.irfft(spectrum, count), np.flatnonzero(kept)
+    table = np.fft.irfft(spectrum, count)
+    return table, np.flatnonzero(kept), float(others.max())
 
 
 def _largest_change(errors: tuple[Array, ...]) -> float:

@@ -281,6 +281,9 @@ def combine_modes(
             "kept": int(kept.sum()),
             "dropped": int((~kept).sum()),
             "dropped_kinematic_error_rms": left(size**2),
+            "dropped_error_rms_rad": float(
+                np.hypot(np.sqrt(0.5 * np.sum(size[~kept] ** 2)), tolerances.dropped)
+            ),
             "dropped_input_torque_rms": left(ripple**2),
             "transmission_error": [
                 {"torque_Nm": float(torque), "peak_to_peak_rad": float(np.ptp(row))}

@@ -11,6 +11,7 @@ from swgjoint.joint.prescribed import ratio_variation
 from swgjoint.joint.step_damping import StepMode, step_mode
 from swgjoint.joint.tilt import tilt_names
 from swgjoint.maps.hysteresis import vary_with_load
+from swgjoint.sim.figures.ripple_validity import HARMONIC_LEVELS
 from swgjoint.units import arcmin, hertz
 
 if TYPE_CHECKING:
@@ -313,6 +314,21 @@ def _native(attached: JointDrive) -> dict[str, Any]:
     }
 
 
+def _weak_harmonics(transmission: Transmission) -> list[dict[str, str]]:
+    """Harmonics of tooth errors that the map dropped, with their possible ripple."""
+    drive, attached = transmission.drive, transmission.attached
+    error = (drive.info.get("tolerances") or {}).get("dropped_error_rms_rad", 0.0)
+    share = 100.0 * attached.stiffness * error / drive.ratings.rated_torque
+    if attached.level not in HARMONIC_LEVELS or not round(share, 2) > 0.0:
+        return []
+    part = f"weak harmonics of the tooth errors ({error / arcmin:.2g} arcmin rms)"
+    reason = (
+        f"dropped from the map; up to {share:.2g} % of rated torque of ripple (rms)"
+        " where the link does not follow them"
+    )
+    return [{"part": part, "reason": reason}]
+
+
 def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     """Parts of the drive that the model leaves out, each with the reason."""
     attached = transmission.attached
@@ -338,6 +354,7 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     if count := transmission.drive.info.get("hysteresis_left_out"):
         part = f"hysteresis ({count} elements)"
         items.append({"part": part, "reason": "joints.*.hysteresis = false"})
+    items += _weak_harmonics(transmission)
     if why := _no_error(transmission):
         items.append({"part": "kinematic error of the drive", "reason": why})
     if (pruned := transmission.drive.info.get("pruned")) and pruned["dropped"]:

@@ -19,6 +19,7 @@ import numpy as np
 
 from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
+from swgjoint.sim.figures.line_source import drive_order, sharing_joints
 from swgjoint.sim.figures.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.figures.output_bearing import bearing_figures
 from swgjoint.sim.figures.rating_use import use_of_ratings
@@ -101,6 +102,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
                 "amplitude_Nm": line.amplitude,
                 "amplitude_percent": 100.0 * line.amplitude / rated,
                 "drive_order": drive_order(run, j, line.order),
+                "shared_with": sharing_joints(run, j, line.order),
                 "step_error": line_error(run, j, line.order),
             }
             for line in lines
@@ -276,28 +278,6 @@ def phase_step(run: Run, j: int) -> float:
     order = max(attached.kept_orders, default=0.0)
     speed = float(np.abs(run.motor_velocity[run.steady, j]).max())
     return run.assembly.step * order * speed
-
-
-def drive_order(run: Run, j: int, order: float) -> float | None:
-    """Order of the joint's own drive to which a spectral line belongs.
-
-    Other lines are vibrations of the arm, products of two orders, and orders of other
-    joints that reach this one through the arm.
-
-    Args:
-        run: The run.
-        j: Index of the joint.
-        order: Order of the line per input turn.
-
-    Returns:
-        Order per input turn; None for lines that are not of the drive.
-    """
-    attached = run.assembly.transmissions[j].attached
-    if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
-        return None
-    near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
-    turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)
-    return near if abs(near - order) <= 0.5 / turns else None
 
 
 def line_error(run: Run, j: int, order: float) -> float | None:
