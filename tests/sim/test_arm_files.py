@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from pathlib import Path
 
@@ -186,6 +187,23 @@ def test_inertias_that_no_body_has_are_repaired_when_asked(moments, tmp_path, ca
     np.testing.assert_allclose(inertia, inertia.mean())
     expected = {"0.5": 0.56, "0.06": 0.12}[moments.split('"')[5]]
     assert inertia.sum() == pytest.approx(expected)
+
+
+@pytest.mark.filterwarnings("ignore:.*two.urdf")
+def test_the_line_on_a_file_that_lacks_something_says_what(tmp_path):
+    """A link without inertia, and an MJCF file without one of its meshes."""
+    path = Path(urdf(tmp_path))
+    bare = re.sub(r"<(visual|collision)>.*?</\1>", "", path.read_text(), flags=re.S)
+    path.write_text(re.sub("<inertial>.*?</inertial>", "", bare, count=1, flags=re.S))
+    with pytest.raises(InputError, match=naming("mjMINVAL", "accepted", "<inertial>")):
+        RigidArm(str(path))
+    own(
+        tmp_path,
+        asset='<asset><mesh name="link" file="gone.stl"/></asset>',
+        more='<geom type="mesh" mesh="link"/>',
+    )
+    with pytest.raises(InputError, match=naming("gone.stl", "accepted", "meshes")):
+        RigidArm(str(tmp_path / "own.xml"))
 
 
 def test_a_joint_that_mimics_another_is_refused(tmp_path):

@@ -6,6 +6,24 @@ import mujoco
 
 from swgjoint.errors import InputError
 
+_BALANCE = (
+    "; accepted: moments of inertia that a rigid body can have, or the option"
+    " --balance-inertia (scene key balance_inertia), which sets all three to their mean"
+)
+_REMEDIES = {
+    "balanceinertia": _BALANCE,
+    "positive eigenvalues": _BALANCE,
+    "larger than mjMINVAL": (
+        "; accepted: a mass and moments of inertia for every body that moves"
+        " (<inertial> in its link or body)"
+    ),
+    "Error opening file": (
+        "; accepted: the meshes of an MJCF file in their places, or a copy of the file"
+        " without these shapes whose bodies have an <inertial>"
+    ),
+}
+"""What to change, by a part of the engine's message."""
+
 
 def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
     """Compile a model, with an error message of one line.
@@ -21,13 +39,7 @@ def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
         return spec.compile()
     except ValueError as exc:
         line = " ".join(str(exc).split())
-        remedy = ""
-        if "balanceinertia" in line or "positive eigenvalues" in line:
-            remedy = (
-                "; accepted: moments of inertia that a rigid body can have, or the"
-                " option --balance-inertia (scene key balance_inertia), which sets all"
-                " three to their mean"
-            )
+        remedy = next((text for sign, text in _REMEDIES.items() if sign in line), "")
         raise InputError(f"{where}: MuJoCo cannot compile it: {line}{remedy}") from None
 
 
