@@ -13,9 +13,11 @@ GOAL = (0.05, 0.02)
 """Largest and rms difference, in the peak to peak at the torque."""
 SEEN = 0.7
 """Smallest part of the largest difference at these equilibria that a record states."""
-PATHS = 0.004
-"""Scatter of one equilibrium over the path to it, in the peak to peak: dca-80-to-1 at
-16.6 N·m has 0.0033 of its 2.3 mN·m of input torque over five paths."""
+PATHS = {"output_error": 0.0, "input_torque": 7.6e-6}
+"""Scatter of one equilibrium over the path to it [rad], [N·m]: dca-80-to-1 at 16.6 N·m
+has 0.0033 of its 2.3 mN·m of input torque over five paths."""
+LEAST = 0.004
+"""Scatter that is always accepted, in the peak to peak."""
 
 
 def check(design: Design) -> None:
@@ -37,8 +39,11 @@ def check(design: Design) -> None:
         state = compared.follow.to_torque(compared.rest, torque)
         wrong = compared.at(state, theta)[column][0]
         (row,) = (r for r in record["rows"] if r["torque_Nm"] == torque)
-        own = abs(wrong) / row[f"{key}_pp_{unit}"]
-        assert own == pytest.approx(stated["largest"], rel=0.1, abs=PATHS)
+        high = row[f"{key}_pp_{unit}"]
+        scatter = max(LEAST, PATHS[key] / high)
+        assert abs(wrong) / high == pytest.approx(
+            stated["largest"], rel=0.1, abs=scatter
+        )
     assert record["solves"] > 100
     assert record["secant_stiffness"]["largest"] < GOAL[0]
 
