@@ -312,7 +312,7 @@ def notes(joints: dict[str, Any]) -> list[str]:
     """Explain the marks in the table of joints, and list warnings on the validity."""
     from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
     from swgjoint.view.ratings_text import joint_rule_lines
-    from swgjoint.view.validity import warnings_of
+    from swgjoint.view.validity import shared_orders, warnings_of
 
     lines = [*warnings_of(joints), *joint_rule_lines(joints)]
     whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
@@ -332,32 +332,8 @@ def notes(joints: dict[str, Any]) -> list[str]:
             "* not an order of this joint's drive: vibration, modulation or another"
             " joint",
         )
-    lines += shared_lines(joints)
+    lines += shared_orders(joints)
     return lines
-
-
-def shared_lines(joints: dict[str, Any]) -> list[str]:
-    """Say which orders a joint cannot tell from those of other joints.
-
-    Args:
-        joints: Figures by joint.
-    """
-    shared: dict[str, list[str]] = {}
-    for name, joint in joints.items():
-        others = {
-            other
-            for line in joint["orders"]
-            if line["drive_order"]
-            for other in line["shared_with"]
-        }
-        if others and joint["ripple_missing"] is None:
-            shared.setdefault(", ".join(sorted({name} | others)), []).append(name)
-    return [
-        f"{names}: their drives have orders at the same frequencies, and what comes"
-        " through the arm is part of a joint's ripple; for its own alone, --set"
-        " joints.NAME.kinematic_error_arcmin=0 for the others"
-        for names in shared
-    ]
 
 
 def _orders(unresolved: list[dict[str, Any]]) -> str:

@@ -188,19 +188,44 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def omissions_of(run: Run) -> list[str]:
-    """Effects that the model leaves out, with the reason and the affected joints.
+def shared_orders(joints: Mapping[str, Any]) -> list[str]:
+    """Joints that cannot tell their orders from those of others, one line per group.
+
+    Args:
+        joints: As in :func:`warnings_of`.
+    """
+    groups = set()
+    for name, joint in joints.items():
+        lines = [line for line in joint["orders"] if line["drive_order"]]
+        others = {other for line in lines for other in line["shared_with"]}
+        if others and joint["ripple_missing"] is None:
+            groups.add(", ".join(sorted({name} | others)))
+    return [
+        f"{names}: their drives have orders at the same frequencies, and what comes"
+        " through the arm is part of a joint's ripple; for its own alone, --set"
+        " joints.NAME.kinematic_error_arcmin=0 for the others"
+        for names in sorted(groups)
+    ]
+
+
+def limits_of(run: Run, joints: Mapping[str, Any]) -> list[str]:
+    """Joints that cannot be told apart, and effects that the model leaves out.
 
     There is one line per effect and reason; it names no joints if all are affected.
+
+    Args:
+        run: The run.
+        joints: As in :func:`warnings_of`.
     """
-    joints: dict[tuple[str, str], list[str]] = {}
+    shared = shared_orders(joints)
+    affected: dict[tuple[str, str], list[str]] = {}
     for item in run.contains["left_out"]:
-        joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
-    return [
+        affected.setdefault((item["part"], item["reason"]), []).append(item["joint"])
+    return shared + [
         "left out"
         + ("" if len(names) == len(run.joints) else f" in {', '.join(names)}")
         + f": {part}: {reason}"
-        for (part, reason), names in joints.items()
+        for (part, reason), names in affected.items()
     ]
 
 

@@ -63,6 +63,15 @@ def test_the_work_of_the_torque_is_the_energy(short):
     assert (np.diff(short.pairs) >= 0).all() and np.ptp(short.pairs) > 10
 
 
+def test_race_and_balls_give_way(short, bearing):
+    """On the bearing the teeth hold less at the same angle than on a rigid surface."""
+    assert short.on_bearing is bearing
+    other = ratcheting_path(drive(25), bearing=not bearing, step=0.02, upto=0.1)
+    at = CubicSpline(short.turned, short.torque)(other.turned[-1])
+    low, high = (at, other.torque[-1]) if bearing else (other.torque[-1], at)
+    assert 0.0 < low < 0.95 * high
+
+
 @pytest.fixture(scope="module")
 def floating(bearing):
     """Steps with a wave generator that is free to move sideways."""

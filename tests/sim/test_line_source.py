@@ -9,6 +9,7 @@ import pytest
 
 from swgjoint.sim.figures.contains import _weak_harmonics
 from swgjoint.sim.figures.line_source import drive_order, sharing_joints
+from swgjoint.view.validity import shared_orders
 
 
 def run_of(turns, orders, levels):
@@ -59,3 +60,23 @@ def test_dropped_harmonics_are_named_with_their_ripple(level):
     assert "0.8 % of rated torque" in items[0]["reason"]
     transmission.drive.info = {}
     assert _weak_harmonics(transmission) == []
+
+
+def test_each_group_of_joints_is_named_once():
+    """Only orders of the own drive count, and only where a ripple is told."""
+
+    def joint(shared, missing=None):
+        lines = [
+            {"drive_order": 2.0, "shared_with": shared},
+            {"drive_order": None, "shared_with": ["far"]},
+        ]
+        return {"orders": lines, "ripple_missing": missing}
+
+    joints = {
+        "hip": joint(["knee"]),
+        "knee": joint(["hip"]),
+        "foot": joint([]),
+        "toe": joint(["foot"], "below the noise"),
+    }
+    (line,) = shared_orders(joints)
+    assert line.startswith("hip, knee: ")

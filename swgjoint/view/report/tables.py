@@ -27,7 +27,7 @@ from swgjoint.maps.sheet.validity_marks import (
 from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.view.plots.spec import spec_picture
 from swgjoint.view.ratings_text import sheet_words
-from swgjoint.view.validity import left_out_share, map_error, omissions_of, warnings_of
+from swgjoint.view.validity import left_out_share, limits_of, map_error, warnings_of
 from swgjoint.view.words import above_noise, format_figure, short
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
     )
     if step is not None and "reason" in step:
         lines.append(Cell(f"change at half the step: {step['reason']}"))
-    lines += [Cell(text) for text in omissions_of(run)]
+    lines += [Cell(text) for text in limits_of(run, metrics["joints"])]
     changes = (step or {}).get("joints", {})
     rows = []
     for j, joint in enumerate(run.joints):
