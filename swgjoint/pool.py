@@ -82,8 +82,9 @@ class LocalPool:
                 yield number, task
 
         while True:
-            results = _parallel(self.workers, function, drawn())
             try:
+                # starts the first tasks, of which one may end its process at once
+                results = _parallel(self.workers, function, drawn())
                 for number, found in results:
                     yield waiting.pop(number), found
                 return

@@ -78,6 +78,21 @@ def test_a_task_that_kills_its_process_is_lost_alone(tmp_path):
     assert len(found) == 10
 
 
+def test_a_process_may_die_before_all_tasks_have_started(tmp_path):
+    """The next task then finds the pool broken; no result is missing."""
+
+    def drawn():
+        yield from ((number, str(tmp_path)) for number in (7, 1))
+        while not (tmp_path / "7").exists():
+            time.sleep(0.05)
+        time.sleep(1.0)  # until the death of its process is known
+        yield from ((number, str(tmp_path)) for number in (2, 3))
+
+    found = {task[0]: result for task, result in LocalPool(2).run(deadly, drawn())}
+    assert isinstance(found.pop(7), Lost)
+    assert found == {1: 1, 2: 2, 3: 3}
+
+
 def slow_root(number):
     time.sleep(0.01)
     return math.sqrt(number)
