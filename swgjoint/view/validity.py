@@ -201,9 +201,9 @@ def shared_orders(joints: Mapping[str, Any]) -> list[str]:
         if others and joint["ripple_missing"] is None:
             groups.add(", ".join(sorted({name} | others)))
     return [
-        f"{names}: their drives have orders at the same frequencies, and what comes"
-        " through the arm is part of a joint's ripple; for its own alone, --set"
-        " joints.NAME.kinematic_error_arcmin=0 for the others"
+        f"{names}: these drives have orders at the same frequencies, so the ripple of"
+        " each joint includes what the others send through the arm; to see one joint"
+        " alone, add --set joints.NAME.kinematic_error_arcmin=0 for each of the others"
         for names in sorted(groups)
     ]
 

@@ -323,8 +323,8 @@ def _weak_harmonics(transmission: Transmission) -> list[dict[str, str]]:
         return []
     part = f"weak harmonics of the tooth errors ({error / arcmin:.2g} arcmin rms)"
     reason = (
-        f"dropped from the map; up to {share:.2g} % of rated torque of ripple (rms)"
-        " where the link does not follow them"
+        f"the map does not contain them; they could add up to {share:.2g} % of rated"
+        " torque to the ripple (rms)"
     )
     return [{"part": part, "reason": reason}]
 
