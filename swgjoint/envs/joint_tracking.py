@@ -267,7 +267,7 @@ class JointTrackingEnv(SingleEnv):
     8      last action                            1        -1 to 1
     9      measured link angle                    rad      -3.1 to 3.1
     10     measured output torque                 N·m      -410 to 410
-    11     output torque that strain gauges read  N·m      -510 to 510
+    11     output torque that strain gauges read  N·m      -470 to 470
     =====  =====================================  =======  ===========
 
     The measured speed is the change of the angle reading over the last control period

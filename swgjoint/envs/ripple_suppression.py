@@ -42,7 +42,7 @@ class RippleSuppressionEnv(SingleEnv):
     8      last action                                  1      -1 to 1
     9      measured link angle                          rad    -7.1 to 7.1
     10     measured output torque                       N·m    -410 to 410
-    11     output torque that strain gauges read        N·m    -510 to 510
+    11     output torque that strain gauges read        N·m    -470 to 470
     =====  ===========================================  =====  ===========
 
     Measured speeds, errors and their ranges are defined as in

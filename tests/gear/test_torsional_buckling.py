@@ -14,6 +14,8 @@ from swgjoint.gear.torsional_buckling import (
     torsional_buckling_stress,
     wall_for_buckling_torque,
 )
+from swgjoint.units import mm
+from swgjoint.validation.catalogue.printed import catalogue_buckling_torque
 
 STEEL = Design.preset("size-25-100").material_of("flexspline")
 RIGIDITY = STEEL.youngs_modulus / (12.0 * (1.0 - STEEL.poisson_ratio**2))
@@ -92,3 +94,23 @@ def test_wall_bears_the_torque_and_no_more():
         assert torque == pytest.approx(1700.0, rel=1e-8)
         walls.append(wall)
     assert walls[0] < walls[1]
+
+
+def test_family_bears_the_buckling_torques_of_the_catalogue():
+    """One wall for all sizes, no thicker than the size that needs most."""
+    reserves = []
+    for size in (14, 17, 20, 25, 32):
+        for ratio in (50, 80, 100):
+            design = Design.preset(f"size-{size}-{ratio}")
+            cup, rim = design.cup, design.flexspline.rim_mm * mm
+            needed = wall_for_buckling_torque(
+                catalogue_buckling_torque(size),
+                inner_radius=design.flexspline_inner_radius,
+                length=cup.length_mm * mm,
+                material=design.material_of("flexspline"),
+                knock_down=0.67,
+            )
+            reserves.append(cup.thickness_coefficient * rim / needed)
+            assert rim / design.pitch_diameter == pytest.approx((75 + ratio / 2) * 1e-4)
+    assert 1.0 <= min(reserves) < 1.02
+    assert max(reserves) < 1.1

@@ -2,7 +2,8 @@
 
 ``size-NN-RRR`` is a drive with a pitch diameter of NN/10 inch and ratio RRR, with the
 circular spline fixed. For every size, all lengths are the same multiples of the pitch
-diameter d or of the module, so members of one ratio are geometrically similar.
+diameter d or of the module, so members of one ratio are geometrically similar. The rim
+and the wall of the cup follow from what a maker sizes by strength.
 """
 
 from __future__ import annotations
@@ -20,12 +21,18 @@ RATIOS = (30, 200)
 the ratio."""
 
 # Lengths as multiples of the pitch diameter d; lengths of the thesis are divided by its
-# pitch diameter of 120 mm. FACE to GROOVE are proportions from a study of catalogue
-# component sets with a "hard" cup. The study assumed these proportions because it had
-# no drawings of cups and flexible bearings.
+# pitch diameter of 120 mm. FACE to GROOVE, but for rim and wall, are proportions from a
+# study of catalogue component sets with a "hard" cup. The study assumed them because it
+# had no drawings of cups and flexible bearings.
 FACE = 0.20
-RIM = 0.0125
-WALL_OVER_RIM = 0.0095 / 0.0125
+# Rim under the teeth, per tooth and without teeth: a rim sized by fatigue is thinner at
+# low ratios, whose deflection is larger. Textbook rule (75 + z/4) 1e-4 d, cited from
+# memory and not confirmed by a source.
+RIM = 0.0075
+RIM_PER_TOOTH = 0.25e-4
+# Thinnest wall that bears the buckling torques of the catalogue's sizes 14 to 32, which
+# need 0.0067 to 0.0072 d (swgjoint/gear/torsional_buckling.py, knock-down factor 0.67)
+WALL = 0.0072
 SMOOTH_CUP = 0.60 - FACE  # cylinder behind the teeth; the whole cup is 0.60 d long
 BORE_RADIUS = 0.58 * 0.5
 BALL = 0.083
@@ -106,6 +113,7 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
     d = 2.54 * size  # mm
     teeth = 2 * ratio
     module = d / teeth
+    rim = RIM + RIM_PER_TOOTH * teeth
     profile = {
         "kind": "qca",
         **{k: _figure(v * module) for k, v in PROFILE.items()},
@@ -125,9 +133,9 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
         "drive": {
             "name": f"size-{size}-{ratio}",
             "source": "family by rule, swgjoint.gear.design.family: pitch diameter"
-            " size/10 inch, proportions of a study of component sets (hard cup), tooth"
-            " profile of thesis Table 6.7, micro-geometry of thesis 7.13 scaled by the"
-            " coning",
+            " size/10 inch, rim by fatigue, wall by torsional buckling, other proportions"
+            " of a study of component sets (hard cup), tooth profile of thesis Table"
+            " 6.7, micro-geometry of thesis 7.13 scaled by the coning",
             "layout": "circular_spline_fixed",
             "teeth_flexspline": teeth,
             "teeth_circular_spline": teeth + 2,
@@ -135,7 +143,7 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
             "face_width_mm": _figure(FACE * d),
         },
         "material": {"youngs_modulus_GPa": 210.0, "poisson_ratio": 0.29},
-        "flexspline": {"rim_mm": _figure(RIM * d), **member},
+        "flexspline": {"rim_mm": _figure(rim * d), **member},
         "circular_spline": {"rim_mm": _figure(RING_RIM * d), **member},
         "wave_generator": {
             "kind": "elliptical",
@@ -152,7 +160,7 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
         "cup": {
             "kind": "cup",
             "length_mm": _figure(SMOOTH_CUP * d),
-            "thickness_coefficient": _figure(WALL_OVER_RIM),
+            "thickness_coefficient": _figure(WALL / rim),
             "fillet_mm": _figure(FILLET * d),
             "bore_radius_mm": _figure(BORE_RADIUS * d),
         },

@@ -18,7 +18,9 @@ from swgjoint.gear.design.tolerances import with_perfect_teeth
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
 
-PERFECT = Design.preset("size-25-50")
+# a rim of 0.0125 pitch diameters; with 0.0100, an error of 0.4 N·m at the end of the
+# clearance is 8 % of the peak to peak at one of the positions below
+PERFECT = Design.preset("size-25-50").with_changes({"flexspline.rim_mm": 0.79375})
 FLAWED = PERFECT.with_changes(
     {
         "tolerances.flexspline_cumulative_pitch_um": 8.0,
