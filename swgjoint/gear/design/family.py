@@ -133,9 +133,9 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
         "drive": {
             "name": f"size-{size}-{ratio}",
             "source": "family by rule, swgjoint.gear.design.family: pitch diameter"
-            " size/10 inch, rim by fatigue, wall by torsional buckling, other proportions"
-            " of a study of component sets (hard cup), tooth profile of thesis Table"
-            " 6.7, micro-geometry of thesis 7.13 scaled by the coning",
+            " size/10 inch, rim by fatigue, wall by torsional buckling, other"
+            " proportions of a study of component sets (hard cup), tooth profile of"
+            " thesis Table 6.7, micro-geometry of thesis 7.13 scaled by the coning",
             "layout": "circular_spline_fixed",
             "teeth_flexspline": teeth,
             "teeth_circular_spline": teeth + 2,
