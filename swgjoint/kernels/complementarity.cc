@@ -35,7 +35,9 @@ StripSolver::StripSolver(const Problem& problem, const StripLaw& law)
       seat_(problem.size, -1), seen_(new double[problem.size * problem.size]),
       seen_strips_(new double[problem.size * law.strips]), row_(problem.size, -1),
       extra_of_(problem.size, -1), place_(law.strips, -1), work_(problem.size),
-      rows_(problem.size), force_(law.strips) {
+      rows_(problem.size), force_(law.strips), excess_(law.strips), slope_(law.strips),
+      at_rest_(law.strips) {
+  for (std::size_t j = 0; j < law_.strips; ++j) law_.excess(j, 0.0, &at_rest_[j]);
   for (std::size_t k = 0; k < p_.size; ++k) {
     if (p_.strip[k] < 0) continue;
     members_[p_.strip[k]].push_back(k);
@@ -54,6 +56,9 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
   // first guess of the forces: the closed contacts alone
   std::fill(force_.begin(), force_.end(), 0.0);
   for (const std::size_t k : forces_) force_[p_.strip[k]] += p_.force_unit[k] * offset[k];
+  for (std::size_t j = 0; j < law_.strips; ++j) {
+    excess_[j] = law_.excess(j, force_[j], &slope_[j]);
+  }
   for (std::size_t k = 0; k < n; ++k) {
     if (active[k]) watch(k);
   }
@@ -75,14 +80,22 @@ bool StripSolver::solve(const double* offset, double tolerance, bool* active,
     }
 
     // forces of the strips, and the error of their approaches
-    double error = 0.0, derivative;
+    double error = 0.0;
     for (std::size_t j = 0; j < law_.strips; ++j) {
       force_[j] = 0.0;
+      bool loaded = false;
       for (const std::size_t k : members_[j]) {
-        if (active[k] != p_.closed[k]) force_[j] += p_.force_unit[k] * result[k];
+        if (active[k] == p_.closed[k]) continue;
+        force_[j] += p_.force_unit[k] * result[k];
+        loaded = true;
       }
-      const double excess = law_.excess(j, force_[j], &derivative);
-      error = std::max(error, std::abs(excess - approach[j]));
+      if (loaded) {
+        excess_[j] = law_.excess(j, force_[j], &slope_[j]);
+      } else {
+        excess_[j] = -law_.offset[j];
+        slope_[j] = at_rest_[j];
+      }
+      error = std::max(error, std::abs(excess_[j] - approach[j]));
     }
 
     std::size_t wrong = 0, last = 0;
@@ -322,8 +335,8 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
       }
       double d = 0.0;
       if (loaded) {
-        const double excess = law_.excess(k, force_[k], &d);
-        row[count] = by_load ? 0.0 : excess - d * std::max(force_[k], 0.0);
+        d = slope_[k];
+        row[count] = by_load ? 0.0 : excess_[k] - d * std::max(force_[k], 0.0);
       } else {
         row[count] = by_load ? 0.0 : -law_.offset[k];
       }

@@ -119,6 +119,8 @@ class StripSolver {
   std::vector<const double*> columns_;
   std::vector<double> parts_;
   std::vector<double> force_;
+  // excess of the strips under these forces, its derivative, and that without force
+  std::vector<double> excess_, slope_, at_rest_;
 };
 
 }  // namespace swgjoint

@@ -28,6 +28,7 @@ SWGJOINT_INLINE double product(const double* x, const double* y, std::size_t n) 
 
 constexpr std::size_t kPanel = 8;  // columns that are eliminated at once
 constexpr std::size_t kRows = 6;   // rows of a tile that stays in registers
+constexpr std::size_t kSmall = 4000;  // numbers of a matrix that is not divided in panels
 
 // Eight numbers, which compilers with vector types keep in one or more registers.
 #if defined(__GNUC__)
@@ -133,12 +134,45 @@ SWGJOINT_WIDE bool eliminate_panel(double* matrix, std::size_t rows, std::size_t
   return true;
 }
 
+// Factors of all columns, one after another: the same bits as by panels, and faster for
+// a matrix that fits in the first cache.
+SWGJOINT_WIDE bool eliminate_columns(double* matrix, std::size_t rows, std::size_t width,
+                                     std::size_t stride, std::size_t* pivots) {
+  for (std::size_t c = 0; c < rows; ++c) {
+    double* own = matrix + c * stride;
+    std::size_t best = c;
+    double largest = std::abs(own[c]);
+    for (std::size_t i = c + 1; i < rows; ++i) {
+      const double size = std::abs(matrix[i * stride + c]);
+      if (size > largest) {
+        largest = size;
+        best = i;
+      }
+    }
+    if (!(largest > 0.0)) return false;
+    pivots[c] = best;
+    if (best != c) std::swap_ranges(own, own + width, matrix + best * stride);
+    const double pivot = own[c];
+    for (std::size_t i = c + 1; i < rows; ++i) {
+      double* row = matrix + i * stride;
+      const double lower = row[c] /= pivot;
+      for (std::size_t k = c + 1; k < width; k += kLanes) {
+        Lanes sum = *reinterpret_cast<const Lanes*>(row + k);
+        sum -= lower * *reinterpret_cast<const Lanes*>(own + k);
+        *reinterpret_cast<Lanes*>(row + k) = sum;
+      }
+    }
+  }
+  return true;
+}
+
 // Solutions of the columns after the first rows ones, given the factors of these.
 SWGJOINT_WIDE void substitute_back(double* matrix, std::size_t rows, std::size_t width,
                                    std::size_t stride) {
   for (std::size_t j = rows; j-- > 0;) {
     double* own = matrix + j * stride;
-    for (std::size_t k = rows; k < width; ++k) own[k] /= own[j];
+    const double pivot = own[j];
+    for (std::size_t k = rows; k < width; ++k) own[k] /= pivot;
     for (std::size_t k = rows; k < width; k += kLanes) {
       const Lanes upper = *reinterpret_cast<const Lanes*>(own + k);
       for (std::size_t i = 0; i < j; ++i) {
@@ -173,6 +207,11 @@ SWGJOINT_WIDE void products(const std::vector<double>* rows, std::size_t count,
 
 bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t stride,
                std::size_t* pivots) {
+  if (rows * stride <= kSmall) {
+    if (!eliminate_columns(matrix, rows, width, stride, pivots)) return false;
+    substitute_back(matrix, rows, width, stride);
+    return true;
+  }
   std::vector<double> panel(kPanel * rows);
   for (std::size_t first = 0; first < rows; first += kPanel) {
     const std::size_t end = std::min(first + kPanel, rows);
