@@ -52,6 +52,11 @@ class Response:
     active: Mask
     """Contacts whose state differs from that in the perfect drive (n_sets, m); an
     initial guess for other torques."""
+    margin: Array | None = None
+    """How far each contact is from a change of its state, see
+    :class:`swgjoint.fe.common.strip_problems.StripSolution` (n_sets, m)."""
+    approach: Array | None = None
+    """Approach of the strips beyond their linear law (n_sets, n_strips) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,6 +195,8 @@ class Influence:
             potential=np.where(ok, potential, np.nan),
             compliance=np.where(ok, -slope, np.nan),
             active=solution.active,
+            margin=solution.margin,
+            approach=solution.approach,
         )
 
     @cached_property

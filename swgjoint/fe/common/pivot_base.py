@@ -102,7 +102,37 @@ def similar_parts(offset: Array, size: int) -> list[Index]:
         Row numbers of each part.
     """
     rng = np.random.default_rng(0)
-    seen = offset @ rng.standard_normal((offset.shape[1], DIRECTIONS))
+    return _halved(offset @ rng.standard_normal((offset.shape[1], DIRECTIONS)), size)
+
+
+def similar_sets(active: Mask, size: int) -> list[Index]:
+    """Parts of problems with similar active sets, consecutive ones near each other.
+
+    Args:
+        active: Active sets (n_problems, m).
+        size: Largest number of problems of a part.
+
+    Returns:
+        Row numbers of each part.
+    """
+    if len(active) <= size:
+        return [np.arange(len(active))]
+    share = active.mean(axis=0)
+    varied = (share > 0.0) & (share < 1.0)
+    if not varied.any():
+        return _halved(np.zeros((len(active), 1)), size)
+    from_mean = active[:, varied] - share[varied]
+    widest = np.linalg.eigh(from_mean.T @ from_mean)[1][:, -DIRECTIONS:]
+    return _halved(from_mean @ widest, size)
+
+
+def _halved(seen: Array, size: int) -> list[Index]:
+    """Parts of at most the given size, halved where they are widest.
+
+    Args:
+        seen: A few coordinates of each problem (n_problems, k).
+        size: Largest number of problems of a part.
+    """
 
     def halved(rows: Index) -> list[Index]:
         if rows.size <= size:
@@ -113,7 +143,7 @@ def similar_parts(offset: Array, size: int) -> list[Index]:
         half = rows.size // 2
         return [*halved(order[:half]), *halved(order[half:])]
 
-    return halved(np.arange(len(offset)))
+    return halved(np.arange(len(seen)))
 
 
 def next_to(offset: Array) -> tuple[Index, Index]:

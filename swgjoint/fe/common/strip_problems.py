@@ -16,14 +16,14 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from swgjoint.fe.common.indentation import Strips
-from swgjoint.fe.common.pivot_base import Base, next_to, similar_parts
+from swgjoint.fe.common.pivot_base import Base, next_to, similar_parts, similar_sets
 from swgjoint.fe.common.pivoting import (
     SINGLES,
     TOLERANCE,
@@ -70,6 +70,9 @@ class StripSolution:
     """Derivative of a^T v + b^T c with respect to the load (n_problems,)."""
     solved: Mask
     """Whether each problem was solved (n_problems,)."""
+    margin: Array
+    """How far each contact is from a change of its state: scaled unknowns where active,
+    minus the scaled slacks elsewhere (n_problems, m)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,8 +108,8 @@ class StripProblems:
         if failed.size:
             # Lemke's method, which only the numpy version has, may still find them
             again = self._solve_in_rounds(offset[failed], None)
-            for key in ("value", "active", "approach", "force", "slope", "solved"):
-                getattr(solution, key)[failed] = getattr(again, key)
+            for item in fields(solution):
+                getattr(solution, item.name)[failed] = getattr(again, item.name)
         return solution
 
     # -- strips ------------------------------------------------------------------------
@@ -169,6 +172,7 @@ class StripProblems:
             force=force,
             slope=np.where(solved, self._slopes(solution.active, force), np.nan),
             solved=solved,
+            margin=solution.value * self._scale - solution.slack / self._scale,
         )
 
     def _slopes(self, active: Mask, force: Array) -> Array:
@@ -340,7 +344,7 @@ class StripProblems:
             similar_at = common[0].offset_of(q)
             parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
         else:
-            parts, solve_parts = similar_parts(q, PART), solve_guessed
+            parts, solve_parts = similar_sets(start, PART), solve_guessed
         groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
         if len(groups) == 1:
             solve_parts(groups[0])
@@ -353,8 +357,8 @@ class StripProblems:
         unit = np.where(self.closed, scale, 1.0 / scale)[:n]
         carries = active[:, :n] != self.closed[:n]
         forces = np.where(carries, result[:, :n] * unit, 0.0)
-        result[~active] = 0.0
-        result /= scale
+        margin = np.where(active, result, -result)
+        result = np.maximum(margin, 0.0) / scale
         return StripSolution(
             value=result,
             active=active,
@@ -362,4 +366,5 @@ class StripProblems:
             force=forces @ self._sums,
             slope=slope,
             solved=solved,
+            margin=margin,
         )

@@ -22,6 +22,7 @@ from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
+from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
 from swgjoint.fe.tolerances.unseen import (
     spread_positions,
     unseen_positions,
@@ -224,6 +225,7 @@ def respond_over_torque(
         (3, n_torques, n_sets), and the number of sets whose unloaded output is free.
     """
     latest: dict[int, Array] = {}
+    features: dict[bool, Array | None] = {}
 
     def changes(at: Influence) -> Array:
         """Gap changes, kept for the latest linearisation only: they fill 50 MB."""
@@ -236,21 +238,21 @@ def respond_over_torque(
         torque: float, chosen: Any, start: Any, tick: Callable[..., None]
     ) -> tuple[Array, Any]:
         state, at = rest.near(torque)
-        change = changes(at)[chosen]
-        tables, active = [], []
-        for k in range(0, len(change), CHUNK):
-            part = slice(k, k + CHUNK)
-            begin = None if start is None else start[part]
-            response = at.respond(change[part], torque, begin)
-            # the potential of a response is relative to the linearised equilibrium
-            potential = response.potential + state.energy + at.torque * at.angle
-            energy = potential - torque * response.output_angle
-            tables.append(
-                np.stack([response.output_angle, energy, response.compliance])
-            )
-            active.append(response.active)
-            tick()
-        return np.concatenate(tables, axis=1), np.concatenate(active)
+        change, sign = changes(at)[chosen], torque < 0.0
+        options: dict[str, Any] = {"chunk": CHUNK, "tick": tick}
+        if start is None and len(change) > CHUNK:
+            before = features.get(sign)
+            if before is not None and len(before) != len(change):
+                before = None
+            found = superpose_many(at, change, torque, before, **options)
+        else:
+            found = superpose_plainly(at, change, torque, start, **options)
+        features[sign] = found.features
+        # the potential of a response is relative to the linearised equilibrium
+        potential = found.potential + state.energy + at.torque * at.angle
+        energy = potential - torque * found.output_angle
+        table = np.stack([found.output_angle, energy, found.compliance])
+        return table, found.active
 
     count = len(changes(rest.near(0.0)[1]))
     unloaded, at_rest = np.zeros((3, count)), None

@@ -1,0 +1,110 @@
+"""Superposition of errors in those contacts that may change their state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from swgjoint.fe.common.influence import Influence, Response
+from swgjoint.fe.common.pivoting import TOLERANCE
+from swgjoint.typing import Array, Index, Mask
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NearContacts:
+    """A linearised drive, reduced to some of its contacts.
+
+    Most contacts never change their state: supports stay pressed on the wave generator,
+    and flanks stay apart. The errors are superposed in the other contacts alone. The
+    slacks of the left-out contacts show afterwards whether this was right.
+    """
+
+    at: Influence
+    """The drive with all m contacts, n of them at teeth."""
+    contacts: Index
+    """Contacts that may change their state, increasing (k,)."""
+    near: Influence
+    """The drive with these contacts."""
+    teeth: Index
+    """Those of them at teeth (k_teeth,)."""
+    others: Index
+    """Left-out contacts, those at teeth first (m - k,)."""
+    by_inputs: Array
+    """Slacks of the left-out contacts, scaled, by the gap changes of the teeth, the
+    scaled unknowns and the approaches of the strips (k_teeth + k + n_strips, m - k)."""
+
+    @classmethod
+    def choose(cls, at: Influence, changing: Mask) -> NearContacts:
+        """Drive with the contacts that change, and with all closed ones at teeth.
+
+        Args:
+            at: The linearised drive.
+            changing: Contacts that change their state under some errors (m,).
+        """
+        n = len(at.sector)
+        chosen = changing.copy()
+        chosen[:n] |= at.closed[:n]
+        contacts, others = np.flatnonzero(chosen), np.flatnonzero(~chosen)
+        teeth, apart = contacts[contacts < n], others[others < n]
+        # the gap of an open contact has no effect beyond its own slack
+        assert not at.by_gap[np.ix_(contacts, apart)].any()
+        assert not at.angle_by_gap[apart].any()
+        strips, pushed = at.strips, np.zeros((n, 0))
+        if strips is not None:
+            pushed = np.eye(strips.force.size)[strips.strip]
+            strips = replace(strips, strip=strips.strip[teeth])
+        near = replace(
+            at,
+            sector=at.sector[teeth],
+            tooth=at.tooth[teeth],
+            direction=at.direction[:, teeth],
+            by_tilt=at.by_tilt[teeth],
+            closed=at.closed[contacts],
+            matrix=at.matrix[np.ix_(contacts, contacts)],
+            slack=at.slack[contacts],
+            by_gap=at.by_gap[np.ix_(contacts, teeth)],
+            by_torque=at.by_torque[contacts],
+            angle_by_value=at.angle_by_value[contacts],
+            angle_by_gap=at.angle_by_gap[teeth],
+            strips=strips,
+            supports=None,
+        )
+        scale = np.sqrt(np.diag(at.matrix))
+        inputs = [
+            at.by_gap[np.ix_(others, teeth)],
+            at.matrix[np.ix_(others, contacts)] / scale[contacts],
+            at.by_gap[others] @ pushed,
+        ]
+        return cls(
+            at=at,
+            contacts=contacts,
+            near=near,
+            teeth=teeth,
+            others=others,
+            by_inputs=np.concatenate(inputs, axis=1).T / scale[others],
+        )
+
+    def respond(
+        self, gap_change: Array, torque: float, start: Mask | None
+    ) -> tuple[Response, Mask]:
+        """Equilibria with errors, and which of them are right (n_sets,).
+
+        Args:
+            gap_change: Gap changes of all contacts at teeth (n_sets, n) [m].
+            torque: Torque T [N·m].
+            start: Guess of the active sets of the near contacts (n_sets, k); None for
+                none.
+        """
+        at, change = self.at, gap_change[:, self.teeth]
+        found = self.near.respond(change, torque, start)
+        assert found.margin is not None and found.approach is not None
+        inputs = [change, np.maximum(found.margin, 0.0), found.approach]
+        slack = np.concatenate(inputs, axis=1) @ self.by_inputs
+        scale = np.sqrt(np.diag(at.matrix))
+        begin = (at.slack + (torque - at.torque) * at.by_torque) / scale
+        slack += begin[self.others]
+        apart = self.others[self.others < len(at.sector)]
+        slack[:, : apart.size] += gap_change[:, apart] / scale[apart]
+        tolerance = TOLERANCE * np.abs(begin).max()
+        return found, np.asarray(slack.min(axis=1, initial=0.0) >= -tolerance)

@@ -1,0 +1,153 @@
+"""Many sets of errors at once: guesses and left-out contacts change no result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.common.indentation import Indentation, Strips
+from swgjoint.fe.common.influence import Influence
+from swgjoint.fe.common.pivot_base import similar_sets
+from swgjoint.fe.common.pivoting import exchange
+from swgjoint.fe.tolerances import superposition
+from swgjoint.fe.tolerances.near_contacts import NearContacts
+from swgjoint.fe.tolerances.state_guess import StateGuess
+from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
+
+LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)
+TEETH, SUPPORTS = 16, 24
+SETS, CHUNK = 600, 100
+
+
+def influence(seed: int = 1, torque: float = 0.0) -> Influence:
+    """A drive whose teeth have one strip each; some contacts carry force.
+
+    Half of the supports are pressed so much that no error lifts them off, and half of
+    the open teeth are too far apart.
+    """
+    rng = np.random.default_rng(seed)
+    contacts = TEETH + SUPPORTS
+    mixed = rng.normal(size=(contacts, contacts))
+    compliance = 1e-9 * (np.eye(contacts) + 0.05 * mixed @ mixed.T)
+    loaded = np.where(np.arange(TEETH) % 3 == 0, rng.uniform(20.0, 90.0, TEETH), 0.0)
+    strips = Strips(law=LAW, strip=np.arange(TEETH), force=loaded)
+    force = np.concatenate([loaded, rng.uniform(10.0, 60.0, SUPPORTS)])
+    force[TEETH::2] = 1e4
+    force[TEETH + 1 :: 4] = 0.0
+    closed = force > 0.0
+    system = compliance.copy()
+    system[:TEETH, :TEETH] += strips.linearise()[0]
+    gap = np.where(closed, 0.0, rng.uniform(1e-8, 5e-7, contacts))
+    gap[:TEETH][(loaded == 0.0) & (np.arange(TEETH) % 2 == 0)] = 1e-4
+    matrix, forward = exchange(system, np.flatnonzero(closed))
+    by_value = rng.normal(size=contacts)
+    return Influence(
+        sector=np.arange(TEETH),
+        tooth=np.arange(TEETH),
+        direction=np.zeros((2, TEETH, 2)),
+        by_tilt=np.zeros((TEETH, 2)),
+        closed=closed,
+        torque=torque,
+        matrix=matrix,
+        slack=forward @ gap + np.where(closed, force, 0.0),
+        by_gap=forward[:, :TEETH],
+        by_torque=forward @ compliance @ rng.normal(size=contacts),
+        angle=0.0,
+        angle_by_value=by_value,
+        angle_by_gap=np.where(closed[:TEETH], by_value[:TEETH], 0.0),
+        angle_by_torque=-1e-4,
+        strips=strips,
+    )
+
+
+def errors(count: int = SETS) -> np.ndarray:
+    """Changes of the tooth gaps [m] that depend on five numbers, and some scatter."""
+    rng = np.random.default_rng(2)
+    few = rng.normal(size=(count, 5)) @ rng.normal(size=(5, TEETH))
+    return 1e-7 * few + 1e-8 * rng.normal(size=(count, TEETH))
+
+
+@pytest.fixture(params=[4, 64])
+def few_first(request, monkeypatch) -> Iterator[int]:
+    """Few sets from which to learn: with four, most changing contacts are missed."""
+    monkeypatch.setattr(superposition, "FIRST", request.param)
+    yield request.param
+
+
+@pytest.mark.parametrize("how", ["", "numpy"])
+def test_guesses_change_no_result(monkeypatch, few_first, how):
+    """Angle, potential and compliance at two torques are those chunk by chunk."""
+    monkeypatch.setenv("SWGJOINT_KERNELS", how)
+    change, ticks, before = errors(), [], None
+    options = {"chunk": CHUNK, "tick": lambda: ticks.append(1)}
+    for torque in (5.0, 8.0):
+        at = influence(torque=torque)
+        wanted = superpose_plainly(at, change, torque + 1.0, None, **options)
+        assert 2.0 < wanted.active.sum(axis=1).mean() < 20.0
+        ticks.clear()
+        found = superpose_many(at, change, torque + 1.0, before, **options)
+        assert len(ticks) == SETS // CHUNK
+        before = found.features
+        assert np.array_equal(found.active, wanted.active)
+        for key in ("output_angle", "potential", "compliance"):
+            ours, theirs = getattr(found, key), getattr(wanted, key)
+            assert np.abs(ours - theirs).max() < 1e-7 * np.ptp(theirs)
+
+
+def test_a_contact_that_is_missing_is_noticed():
+    """Sets in which a left-out contact closes or opens are marked, and no others."""
+    at, change = influence(), errors()
+    whole = at.respond(change, 3.0)
+    changing = whole.active.any(axis=0)
+    assert NearContacts.choose(at, changing).respond(change, 3.0, None)[1].all()
+    rare = np.flatnonzero(changing & (np.arange(len(changing)) >= TEETH))
+    rare = rare[whole.active[:, rare].sum(axis=0).argmin()]
+    changing[rare] = False
+    near = NearContacts.choose(at, changing)
+    assert rare in near.others
+    found, right = near.respond(change, 3.0, None)
+    assert 0 < (~right).sum() < SETS // 2
+    assert np.array_equal(~right, whole.active[:, rare])
+    apart = np.abs(found.output_angle - whole.output_angle)
+    good = apart < 1e-7 * np.ptp(whole.output_angle)
+    assert good[right].all() and not good[~right].all()
+
+
+def test_the_solution_before_makes_better_guesses():
+    """Learned from a fifth of the sets; an equal share of active contacts is no guess.
+
+    The drive before has other contacts.
+    """
+    change = errors()
+    before = influence(seed=1, torque=0.0)
+    earlier = before.respond(change, 1.0).margin
+    at = replace(before, slack=before.slack * 1.1)
+    margin = at.respond(change, 2.0).margin
+    learn, other = slice(0, SETS // 5), slice(SETS // 5, None)
+    features = StateGuess.fit(change[learn], None, earlier[learn]).features(earlier)
+    wrong = []
+    for known in (None, features):
+        first = None if known is None else known[learn]
+        guess = StateGuess.fit(change[learn], first, margin[learn])
+        rest = None if known is None else known[other]
+        active = guess.active(change[other], rest)
+        wrong.append((active != (margin[other] > 0.0)).sum(axis=1).mean())
+    usual = (margin[learn] > 0.0).mean(axis=0) > 0.5
+    plain = (usual != (margin[other] > 0.0)).sum(axis=1).mean()
+    assert wrong[1] < 0.7 * wrong[0] < 0.7 * plain
+
+
+def test_similar_sets_are_parts_of_all_rows():
+    """Every row once, and sets in a part differ less than all sets do."""
+    rng = np.random.default_rng(5)
+    active = rng.normal(size=(300, 3)) @ rng.normal(size=(3, 40)) > 0.5
+    parts = similar_sets(active, 20)
+    assert sorted(np.concatenate(parts)) == list(range(300))
+    assert max(map(len, parts)) <= 20
+    inside = np.mean([active[part].var(axis=0).sum() for part in parts])
+    assert inside < 0.5 * active.var(axis=0).sum()
+    same = similar_sets(np.ones((50, 4), dtype=bool), 20)
+    assert sorted(np.concatenate(same)) == list(range(50))
