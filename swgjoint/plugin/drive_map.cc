@@ -82,11 +82,18 @@ SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
 }
 
 // Computes sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic.
-void DriveMap::HalfStep(double dtheta, double dpsi) {
-  for (int k = 0; k < n_ - 1; ++k) {
-    const double x = 0.5 * (n_theta_[k] * dtheta + n_psi_[k] * dpsi);
-    sinc_[k] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : std::sin(x) / x;
-    ch_[k] = std::cos(x);
+SWGJOINT_INLINE void DriveMap::HalfStep(double dtheta, double dpsi) {
+  for (int b = 0, k = 0; b < blocks_; ++b, k += kLanes) {
+    Lanes n, m, cos, sin;
+    Load(&n_theta_[k], &n);
+    Load(&n_psi_[k], &m);
+    const Lanes eta = n * (0.5 * dtheta) + m * (0.5 * dpsi);
+    CosSin(eta, &cos, &sin);
+    Store(&ch_[k], cos);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const double x = eta[lane];
+      sinc_[k + lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : sin[lane] / x;
+    }
   }
 }
 
@@ -233,8 +240,8 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
   if (top <= 1) {
     moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
-  } else if (top <= 2) {
-    moves_psi_ ? Sweep<true, 1>(dtheta, dpsi, out) : Sweep<false, 1>(dtheta, dpsi, out);
+  } else if (top <= 4) {
+    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
   } else {
     HalfStep(dtheta, dpsi);
     moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)
