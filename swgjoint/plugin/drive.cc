@@ -183,6 +183,9 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
                   "damping coulomb static stribeck_speed viscous load', or no tendon "
                   "with these b and stiffness 'a 0 1e-19' carries it");
   }
+  int before = 0;
+  for (int n = 0; n < instance; ++n) before += m->plugin[n] == m->plugin[instance];
+  drive->leads_ = before % kGroup == 0;
   drive->region_ = Region::Find(m);
   return drive;
 }
@@ -229,7 +232,6 @@ void Drive::Vary(const mjModel* m) {
 }
 
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
-  Vary(m);
   step_.scheme = step_.gradient = false;
   // if springs are disabled, the engine also omits the tendon from its metric
   if (m->opt.disableflags & mjDSBL_SPRING) return;
@@ -304,6 +306,7 @@ Pair Drive::Responses(const mjModel* m, const mjData* d) {
 void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   const Pair q = {d->qpos[q_rotor_], d->qpos[q_link_]};
   const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
+  Vary(m);
   DriveValue value;
   mjtNum rubs;
   Evaluate(q, v, d->plugin_state + m->plugin_stateadr[instance], &value, &rubs);
@@ -328,20 +331,50 @@ mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
   return touches ? std::max(own, contact_damping_) : own;
 }
 
+// Predicts the steps of this drive and of the following ones of its group. The drives
+// pass each part of the prediction one after the other: none waits for another, so that
+// the processor works on several of them at the same time.
+SWGJOINT_CLONES void Drive::PredictGroup(const mjModel* m, mjData* d, int instance) {
+  Drive* group[kGroup];
+  int size = 0, passes = 0;
+  for (int n = instance; n < m->nplugin && size < kGroup; ++n) {
+    if (m->plugin[n] != m->plugin[instance]) continue;
+    Drive* drive = group[size++] = Get(d, n);
+    drive->Begin(m, d, n);
+    passes = std::max(passes, drive->passes_);
+  }
+  for (int pass = 0; pass < passes; ++pass) {
+    for (int k = 0; k < size; ++k) {
+      if (pass < group[k]->passes_) group[k]->Secant(&group[k]->step_);
+    }
+    for (int k = 0; k < size; ++k) {
+      if (pass < group[k]->passes_) group[k]->Solve(pass, &group[k]->step_);
+    }
+  }
+}
+
+// Begins the prediction of a step.
+void Drive::Begin(const mjModel* m, mjData* d, int instance) {
+  const mjtNum h = m->opt.timestep;
+  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
+  Vary(m);
+  // the scheme is a midpoint rule for the positions of half a step earlier
+  const Pair x = Pair{d->qpos[q_rotor_], d->qpos[q_link_]} - v * (0.5 * h);
+  Start(h, x, v, Responses(m, d), Damping(m, d),
+        d->plugin_state + m->plugin_stateadr[instance], &step_);
+  predicted_ = true;
+}
+
 // Predicts the step of rotor and link and evaluates the discrete gradient over it. The
 // engine adds the part that is linear in the velocity change through its metric
 // M + h^2 p g g'. It builds this metric after this stage, from ten_J (the direction g)
 // and from the tangent stiffness of the tendon's cubic spring at ten_length (p).
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
+  // the engine computes the instances in their order, so the first one of a group makes
+  // the predictions anew
+  if (leads_ || !predicted_) PredictGroup(m, d, instance);
+  predicted_ = false;
   const mjtNum h = m->opt.timestep;
-  const Pair v = {d->qvel[v_rotor_], d->qvel[v_link_]};
-  const Pair weight = Responses(m, d);
-  mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  const mjtNum damping = Damping(m, d);
-
-  // the scheme is a midpoint rule for the positions of half a step earlier
-  const Pair x = Pair{d->qpos[q_rotor_], d->qpos[q_link_]} - v * (0.5 * h);
-  Predict(h, x, v, weight, damping, state, &step_);
   const DriveValue& g = step_.value;
   const FrictionStep& rub = step_.friction;
   const mjtNum force = step_.force;

@@ -28,19 +28,25 @@ class Drive : private Law {
   void Advance(const mjModel* m, mjData* d, int instance);
 
   // Discards the data of a step that has begun.
-  void Forget() { step_ = Step(); }
+  void Forget() {
+    step_ = Step();
+    predicted_ = false;
+  }
 
   // Copies the data that Advance needs to complete a step that the drive of another
   // mjData has begun. That drive may belong to another model; its map, addresses and
   // parameters are therefore not copied.
   void Continue(const Drive& other) {
     step_ = other.step_;
+    predicted_ = false;
     hysteresis_.Continue(other.hysteresis_);
   }
 
   static void RegisterPlugin();
 
  private:
+  static constexpr int kGroup = 8;  // number of drives that are predicted together
+
   // Bounds of the region in which the integration was tested, if the model states them;
   // 0 means no bound.
   struct Region {
@@ -51,6 +57,8 @@ class Drive : private Law {
 
   void Watch(const mjModel* m, const mjData* d, int instance, int scheme);
   void AddGradient(const mjModel* m, mjData* d, int instance);
+  void PredictGroup(const mjModel* m, mjData* d, int instance);
+  void Begin(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
   mjtNum Damping(const mjModel* m, const mjData* d) const;
   Pair Response(const mjModel* m, const mjData* d, int dof, int other);
@@ -65,6 +73,8 @@ class Drive : private Law {
   bool siblings_ = false;       // whether rotor and link have the same ancestors
   std::vector<mjtNum> column_;  // workspace of Response: two columns of L^-T
   int friction_tendon_ = -1;  // tendon of the friction term of the metric
+  bool leads_ = false;      // whether it is the first one of a group
+  bool predicted_ = false;  // whether the step of this call has been predicted
   Region region_;
   Step step_;
 };

@@ -57,42 +57,48 @@ SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
   theta += shift_theta_;
   psi += shift_psi_;
   Lanes sum = {};
-  for (int b = 0, k = 0; b < blocks_; ++b, k += kLanes) {
+  double* all = harmonics_.data();
+  double* own = all;
+  for (int b = 0; b < blocks_; ++b, own += kHarmonics) {
     Lanes c, s, error_c, error_s;
-    const Recipe& from = recipe_[b];
-    if (from.block < 0) {
+    const Recipe& recipe = recipe_[b];
+    if (recipe.from < 0) {
       Lanes n, m;
-      Load(&n_theta_[k], &n);
-      Load(&n_psi_[k], &m);
+      Load(own, &n);
+      Load(own + kLanes, &m);
       CosSin(n * theta + m * psi, &c, &s);
     } else {
+      const double shift_c = all[recipe.shift], shift_s = all[recipe.shift + kLanes];
       Lanes c0, s0;
-      Load(&c_[from.block * kLanes], &c0);
-      Load(&s_[from.block * kLanes], &s0);
-      c = c0 * c_[from.shift] - s0 * s_[from.shift];
-      s = s0 * c_[from.shift] + c0 * s_[from.shift];
+      Load(all + recipe.from, &c0);
+      Load(all + recipe.from + kLanes, &s0);
+      c = c0 * shift_c - s0 * shift_s;
+      s = s0 * shift_c + c0 * shift_s;
     }
-    Load(&error_c_[k], &error_c);
-    Load(&error_s_[k], &error_s);
+    Load(own + 2 * kLanes, &error_c);
+    Load(own + 3 * kLanes, &error_s);
     sum += error_c * c + error_s * s;
-    Store(&c_[k], c);
-    Store(&s_[k], s);
+    Store(own + 4 * kLanes, c);
+    Store(own + 5 * kLanes, s);
   }
   return error_mean_ + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
 }
 
-// Computes sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic.
+// Stores sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic at
+// the place of the first two weights of its block.
 SWGJOINT_INLINE void DriveMap::HalfStep(double dtheta, double dpsi) {
-  for (int b = 0, k = 0; b < blocks_; ++b, k += kLanes) {
+  const double* own = harmonics_.data();
+  double* out = weight_.data();
+  for (int b = 0; b < blocks_; ++b, own += kHarmonics, out += kWeights) {
     Lanes n, m, cos, sin;
-    Load(&n_theta_[k], &n);
-    Load(&n_psi_[k], &m);
+    Load(own, &n);
+    Load(own + kLanes, &m);
     const Lanes eta = n * (0.5 * dtheta) + m * (0.5 * dpsi);
     CosSin(eta, &cos, &sin);
-    Store(&ch_[k], cos);
+    Store(out + kLanes, cos);
     for (int lane = 0; lane < kLanes; ++lane) {
       const double x = eta[lane];
-      sinc_[k + lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : sin[lane] / x;
+      out[lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : sin[lane] / x;
     }
   }
 }
@@ -123,38 +129,34 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
 // Computes, in one pass over the table, the weights of all A and B, the weighted sums
 // in the segment of the start state, and g. kPsi means that a harmonic depends on psi.
 // No phase changes by more than 2^kHalvings rad; at kHalvings < 0, HalfStep has
-// computed sinc_ and ch_ for any change.
+// computed sin(eta)/eta and cos(eta) for any change.
 template <bool kPsi, int kHalvings>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
-  const double* __restrict row =
+  const double* row =
       table_.data() + static_cast<size_t>(j0_) * blocks_ * kBlock;
-  const double* __restrict in_sinc = sinc_.data();
-  const double* __restrict in_ch = ch_.data();
-  const double* __restrict in_c = c_.data();
-  const double* __restrict in_s = s_.data();
-  const double* __restrict in_theta = n_theta_.data();
-  const double* __restrict in_psi = n_psi_.data();
-  const double* __restrict in_error_c = error_c_.data();
-  const double* __restrict in_error_s = error_s_.data();
-  double* __restrict out_weight = weight_.data();
+  const double* own = harmonics_.data();
+  double* weight = weight_.data();
   Lanes w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
+  // the mean harmonic begins the sums in one of their lanes
+  const double* mean = &mean_[static_cast<size_t>(j0_) * kMean];
+  for (int p = 1; p < 5; ++p) Load(mean + p * kLanes, &w[p]);
   const int blocks = blocks_;
-  for (int b = 0, k = 0; b < blocks; ++b, k += kLanes) {
+  for (int b = 0; b < blocks; ++b, own += kHarmonics, weight += kWeights) {
     Lanes n, m = {}, sinc, ch, c0, s0, error_c, error_s;
-    Load(in_theta + k, &n);
-    if (kPsi) Load(in_psi + k, &m);
+    Load(own, &n);
+    if (kPsi) Load(own + kLanes, &m);
     Lanes eta = n * (0.5 * dtheta);
     if (kPsi) eta += m * (0.5 * dpsi);
     if constexpr (kHalvings >= 0) {
       SincCos<kHalvings>(eta, &sinc, &ch);
     } else {
-      Load(in_sinc + k, &sinc);
-      Load(in_ch + k, &ch);
+      Load(weight, &sinc);
+      Load(weight + kLanes, &ch);
     }
-    Load(in_c + k, &c0);
-    Load(in_s + k, &s0);
-    Load(in_error_c + k, &error_c);
-    Load(in_error_s + k, &error_s);
+    Load(own + 2 * kLanes, &error_c);
+    Load(own + 3 * kLanes, &error_s);
+    Load(own + 4 * kLanes, &c0);
+    Load(own + 5 * kLanes, &s0);
     const Lanes sh = eta * sinc;
     const Lanes c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
     const Lanes mean_c = c * ch, mean_s = s * ch;
@@ -163,7 +165,6 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
     const Lanes psi_c = s * (by_psi * -1), psi_s = c * by_psi;
     g_theta += error_c * theta_c + error_s * theta_s;
     if (kPsi) g_psi += error_c * psi_c + error_s * psi_s;
-    double* weight = out_weight + b * kWeights;
     Store(weight, mean_c);
     Store(weight + kLanes, mean_s);
     Store(weight + 2 * kLanes, theta_c);
@@ -173,8 +174,8 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
       Store(weight + 5 * kLanes, psi_s);
     }
   }
-  for (int b = 0; b < blocks; ++b, row += kBlock) {
-    const double* weight = out_weight + b * kWeights;
+  weight = weight_.data();
+  for (int b = 0; b < blocks; ++b, row += kBlock, weight += kWeights) {
     Lanes mean_c, mean_s, theta_c, theta_s, psi_c, psi_s, even, odd;
     Load(weight, &mean_c);
     Load(weight + kLanes, &mean_s);
@@ -192,12 +193,10 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
       if (kPsi) v[p] += psi_c * even + psi_s * odd;
     }
   }
-  const double* mean = &mean_[static_cast<size_t>(j0_) * 5];
   double rest[4];
   Sums(w[1], w[2], w[3], w[4], w_ + 1);
   Sums(u[0], u[1], u[2], u[3], u_theta_);
   Sums(u[4], g_theta, g_psi, g_psi, rest);
-  for (int p = 1; p < 5; ++p) w_[p] += mean[p];
   u_theta_[4] = rest[0];
   out->g = Pair{inverse_ratio_, -1.0} + Pair{rest[1], rest[2]} * error_scale_;
   if (kPsi) {
@@ -217,7 +216,8 @@ MeanTorque DriveMap::Work(int j1, double x1) const {
     if (j == j0_) {
       std::copy_n(w_, 5, w);
     } else {
-      std::copy_n(&mean_[static_cast<size_t>(j) * 5], 5, w);
+      const double* mean = &mean_[static_cast<size_t>(j) * kMean];
+      for (int p = 0; p < 5; ++p) w[p] = mean[p * kLanes];
       Combine(j, weight_.data(), w);
     }
     const double to = j == j1 ? x1 : knots_[step > 0 ? j : j - 1];

@@ -49,9 +49,15 @@ inline double Slope(const double w[5], double d) {
 
 class DriveMap {
  public:
-  // coefficients A0, B0, .. A4, B4 of the harmonics that are processed together
+  // Sizes of what belongs to the harmonics that are processed together, a block:
+  // coefficients A0, B0, .. A4, B4 in one segment;
   static constexpr int kBlock = 10 * kLanes;
-  // weights of their A and B in the mean, and in the secants for theta and for psi
+  // A0, .. A4 of the mean in one segment, each with zeros in all lanes but the first;
+  static constexpr int kMean = 5 * kLanes;
+  // orders in theta and psi, amplitudes of cos and sin in e0, and cos and sin of the
+  // phases at the start state;
+  static constexpr int kHarmonics = 6 * kLanes;
+  // weights of A and B in the mean, and in the secants for theta and for psi.
   static constexpr int kWeights = 6 * kLanes;
 
   // On failure returns false and names the invalid attribute in `error`.
@@ -86,11 +92,11 @@ class DriveMap {
   // Rule that computes cos and sin of one block of harmonics from those of an earlier
   // block, if all four orders differ from it by the same amount.
   struct Recipe {
-    int block = -1;  // earlier block; -1: compute cos and sin of the phases
-    int shift = 0;   // earlier harmonic whose orders are the difference
+    int from = -1;  // place of cos of the earlier block; -1: compute from the phases
+    int shift = 0;  // place of cos of the earlier harmonic with the difference as order
   };
 
-  void FindRecipes(int count);
+  void FindRecipes(const std::vector<double>& orders);
   int Segment(double torsion) const;
   // The same, but tests a guess first, because the torsion rarely leaves its segment
   // within a step.
@@ -115,23 +121,18 @@ class DriveMap {
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion origin of each polynomial
   std::vector<double> low_, high_;  // (segments) bounds of the open interval
-  std::vector<double> mean_;        // (segments, 5): A0, .. A4 of the mean
-  std::vector<double> table_;       // (segments, blocks, kBlock)
+  LaneVector mean_;                 // (segments, kMean)
+  LaneVector table_;                // (segments, blocks, kBlock)
+  LaneVector harmonics_;            // (blocks, kHarmonics), padded with zeros
   double error_mean_ = 0;
-  // one value per harmonic without the mean, padded with zeros to whole blocks
-  std::vector<double> n_theta_, n_psi_;
-  std::vector<double> error_c_, error_s_;  // amplitudes of cos and sin in e0
-
   std::vector<Recipe> recipe_;  // one per block
 
   // start state
   double torsion_ = 0, d0_ = 0;
   int j0_ = 0;  // segment; between steps an initial guess that does not affect results
-  std::vector<double> c_, s_;  // cos and sin of the phases
 
   // data of a step, sized in Parse, so that no step allocates memory
-  std::vector<double> sinc_, ch_;  // sin(eta)/eta, cos(eta); eta: half phase change
-  std::vector<double> weight_;     // (blocks, kWeights)
+  LaneVector weight_;  // (blocks, kWeights)
   double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0_
 };
 

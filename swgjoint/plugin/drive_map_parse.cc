@@ -10,6 +10,20 @@
 #include "lanes.h"
 
 namespace swgjoint {
+
+#define SWGJOINT_FILL(x) {x, x, x, x}
+alignas(64) static const double kTable[kSincTerms + kCosTerms][kLanes] = {
+    // sin(x)/x
+    SWGJOINT_FILL(1), SWGJOINT_FILL(-1. / 6), SWGJOINT_FILL(1. / 120),
+    SWGJOINT_FILL(-1. / 5040), SWGJOINT_FILL(1. / 362880),
+    SWGJOINT_FILL(-1. / 39916800), SWGJOINT_FILL(1. / 6227020800),
+    // cos(x)
+    SWGJOINT_FILL(1), SWGJOINT_FILL(-1. / 2), SWGJOINT_FILL(1. / 24),
+    SWGJOINT_FILL(-1. / 720), SWGJOINT_FILL(1. / 40320),
+    SWGJOINT_FILL(-1. / 3628800), SWGJOINT_FILL(1. / 479001600),
+    SWGJOINT_FILL(-1. / 87178291200)};
+const double* const kSeries = kTable[0];
+
 namespace {
 
 // Sets an error message about an attribute, and returns false.
@@ -90,28 +104,24 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     return false;
   }
   blocks_ = (n_ - 1 + kLanes - 1) / kLanes;
-  const size_t padded = static_cast<size_t>(blocks_) * kLanes;
-  std::vector<double> n_theta(padded, 0.0), n_psi(padded, 0.0);
-  for (auto* v : {&error_c_, &error_s_, &c_, &s_, &sinc_, &ch_}) {
-    v->assign(padded, 0.0);
-  }
   weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
+  harmonics_.assign(static_cast<size_t>(blocks_) * kHarmonics, 0.0);
   for (int k = 1; k < n_; ++k) {
-    n_theta[k - 1] = orders[2 * k];
-    n_psi[k - 1] = orders[2 * k + 1];
-    error_c_[k - 1] = list[2 * k];
-    error_s_[k - 1] = list[2 * k + 1];
+    double* to = &harmonics_[static_cast<size_t>((k - 1) / kLanes) * kHarmonics];
+    to += (k - 1) % kLanes;
+    to[0] = orders[2 * k];
+    to[kLanes] = orders[2 * k + 1];
+    to[2 * kLanes] = list[2 * k];
+    to[3 * kLanes] = list[2 * k + 1];
   }
   error_mean_ = list[0];
-  n_theta_ = n_theta;
-  n_psi_ = n_psi;
 
   // one table for the intervals and for the parabolas beyond the first and last knot
   segments_ = m + 2;
   base_.resize(segments_);
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
   high_.assign(segments_, std::numeric_limits<double>::infinity());
-  mean_.assign(static_cast<size_t>(segments_) * 5, 0.0);
+  mean_.assign(static_cast<size_t>(segments_) * kMean, 0.0);
   table_.assign(static_cast<size_t>(segments_) * blocks_ * kBlock, 0.0);
   for (int seg = 0; seg < segments_; ++seg) {
     base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
@@ -131,7 +141,8 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
           to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
         }
         if (k == 0) {
-          if (ab == 0) std::copy(to, to + 5, &mean_[static_cast<size_t>(seg) * 5]);
+          double* mean = &mean_[static_cast<size_t>(seg) * kMean];
+          for (int p = 0; ab == 0 && p < 5; ++p) mean[p * kLanes] = to[p];
           continue;
         }
         const int block = (k - 1) / kLanes, lane = (k - 1) % kLanes;
@@ -141,28 +152,34 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     }
   }
 
-  FindRecipes(n_ - 1);
+  FindRecipes(orders);
   return true;
 }
 
 // Finds blocks whose orders are those of an earlier block plus those of an earlier
 // harmonic. A map of finite elements has all multiples of one order, so that only its
 // first blocks need a series. Zeros that pad the last block do not count.
-void DriveMap::FindRecipes(int count) {
+void DriveMap::FindRecipes(const std::vector<double>& orders) {
+  const int count = n_ - 1;
+  const double* n = orders.data() + 2;  // without the mean
+  const auto place = [](int k) {
+    return k / kLanes * kHarmonics + 4 * kLanes + k % kLanes;
+  };
   recipe_.assign(blocks_, Recipe());
   for (int k = kLanes; k < count; k += kLanes) {
+    Recipe& recipe = recipe_[k / kLanes];
     const auto shifted = [&](int a, int shift) {
       for (int b = 0; b < std::min(kLanes, count - k); ++b) {
-        if (n_theta_[k + b] != n_theta_[a + b] + n_theta_[shift] ||
-            n_psi_[k + b] != n_psi_[a + b] + n_psi_[shift]) {
+        if (n[2 * (k + b)] != n[2 * (a + b)] + n[2 * shift] ||
+            n[2 * (k + b) + 1] != n[2 * (a + b) + 1] + n[2 * shift + 1]) {
           return false;
         }
       }
       return true;
     };
-    for (int a = 0; a < k && recipe_[k / kLanes].block < 0; a += kLanes) {
+    for (int a = 0; a < k && recipe.from < 0; a += kLanes) {
       for (int shift = 0; shift < k; ++shift) {
-        if (shifted(a, shift)) recipe_[k / kLanes] = {a / kLanes, shift};
+        if (shifted(a, shift)) recipe = {place(a), place(shift)};
       }
     }
   }

@@ -3,7 +3,10 @@
 #ifndef SWGJOINT_PLUGIN_LANES_H_
 #define SWGJOINT_PLUGIN_LANES_H_
 
+#include <cstddef>
 #include <cstring>
+#include <new>
+#include <vector>
 
 // A function marked with SWGJOINT_CLONES is compiled twice, with and without AVX2; the
 // processor determines which version runs. The result is bit for bit the same.
@@ -59,6 +62,23 @@ typedef Vector<2> Pair;
 #define SWGJOINT_INLINE inline
 #endif
 
+// Numbers that are read in vectors: none of these crosses two lines of the cache.
+template <class T>
+struct LaneAllocator {
+  typedef T value_type;
+  static constexpr std::align_val_t kAlign{64};
+  LaneAllocator() = default;
+  template <class U>
+  LaneAllocator(const LaneAllocator<U>&) {}
+  T* allocate(size_t n) {
+    return static_cast<T*>(::operator new(n * sizeof(T), kAlign));
+  }
+  void deallocate(T* p, size_t) { ::operator delete(p, kAlign); }
+  bool operator==(const LaneAllocator&) const { return true; }
+  bool operator!=(const LaneAllocator&) const { return false; }
+};
+typedef std::vector<double, LaneAllocator<double>> LaneVector;
+
 template <class V>
 SWGJOINT_INLINE void Load(const double* from, V* x) {
   std::memcpy(x, from, sizeof(V));
@@ -92,6 +112,13 @@ SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
 #endif
 }
 
+// Coefficients of the series of sin(x)/x and cos(x) in powers of x^2, one vector each,
+// first those of sin(x)/x. They are defined elsewhere, so that the compiler reads them
+// where it needs them. It would fill more vectors with constants than the processor has,
+// and store them, in every call.
+constexpr int kSincTerms = 7, kCosTerms = 8;
+extern const double* const kSeries;
+
 // Computes sin(x)/x and cos(x) for |x| <= 2^(kHalvings - 1).
 template <int kHalvings>
 SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
@@ -99,11 +126,25 @@ SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
   // of terms, because one term after the other would take twice as long.
   Lanes y = x * (1.0 / (1 << kHalvings));
   const Lanes z = y * y, z2 = z * z, z4 = z2 * z2;
-  *sinc = ((1 + z * (-1. / 6)) + z2 * (1. / 120 + z * (-1. / 5040))) +
-          z4 * ((1. / 362880 + z * (-1. / 39916800)) + z2 * (1. / 6227020800));
-  *cos = ((1 + z * (-1. / 2)) + z2 * (1. / 24 + z * (-1. / 720))) +
-         z4 * ((1. / 40320 + z * (-1. / 3628800)) +
-               z2 * (1. / 479001600 + z * (-1. / 87178291200)));
+  const double* at = kSeries;
+  Lanes a, b, c, d, e, f, g, h;
+  Load(at, &a);
+  Load(at + kLanes, &b);
+  Load(at + 2 * kLanes, &c);
+  Load(at + 3 * kLanes, &d);
+  Load(at + 4 * kLanes, &e);
+  Load(at + 5 * kLanes, &f);
+  Load(at + 6 * kLanes, &g);
+  *sinc = ((a + z * b) + z2 * (c + z * d)) + z4 * ((e + z * f) + z2 * g);
+  at += kSincTerms * kLanes;
+  Load(at + kLanes, &b);
+  Load(at + 2 * kLanes, &c);
+  Load(at + 3 * kLanes, &d);
+  Load(at + 4 * kLanes, &e);
+  Load(at + 5 * kLanes, &f);
+  Load(at + 6 * kLanes, &g);
+  Load(at + 7 * kLanes, &h);
+  *cos = ((a + z * b) + z2 * (c + z * d)) + z4 * ((e + z * f) + z2 * (g + z * h));
   // sin(2y) = 2 sin(y) cos(y), cos(2y) = 1 - 2 sin(y)^2
   for (int k = 0; k < kHalvings; ++k) {
     const Lanes twice = y * 2;

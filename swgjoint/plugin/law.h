@@ -118,57 +118,76 @@ class Law {
   // Predicts a step of rotor and link from the positions x and the speeds v, and
   // evaluates the discrete gradient over it. `weight` are the accelerations due to unit
   // torques. The force is linear in the velocity change, M + h^2 p g g' (+ friction).
-  SWGJOINT_INLINE void Predict(double h, const Pair& x, const Pair& v,
-                               const Pair& weight, double damping, double* state,
-                               Step* step) {
-    const Pair other = {state[0], state[1]};
+  void Predict(double h, const Pair& x, const Pair& v, const Pair& weight,
+               double damping, double* state, Step* step) {
+    Start(h, x, v, weight, damping, state, step);
+    for (int pass = 0; pass < passes_; ++pass) {
+      Secant(step);
+      Solve(pass, step);
+    }
+  }
+
+  // The parts of Predict: its start, and in each pass the discrete gradient over the
+  // predicted change of the positions and the velocity change that follows from it.
+  SWGJOINT_INLINE void Start(double h, const Pair& x, const Pair& v,
+                             const Pair& weight, double damping, double* state,
+                             Step* step) {
     map_.Begin(x[0], x[1]);
     hysteresis_.Place(map_.torsion(), state + kAccelerations, Limit(state));
-    DriveValue& g = step->value;
-    FrictionStep& rub = step->friction;
-    Pair dv = {0, 0};
-    double force = 0, p = 0, speed = 0, turned = 0;
+    trial_.h = h;
+    trial_.damping = damping;
+    trial_.other = Pair{state[0], state[1]};
+    trial_.dv = Pair{0, 0};
+    trial_.dx = v * h;
     if (friction_) {
       const double* rest = Bristle(state);
-      speed = Rotation(v);
+      trial_.speed = Rotation(v);
       step->rotation = Rotation(x);
-      turned = rest[1] != 0 ? step->rotation - rest[0] : 0;
-    }
-    for (int pass = 0; pass < passes_; ++pass) {
-      const Pair dx = v * h + dv * (0.5 * h);
-      map_.Secant(dx[0], dx[1], &g);
-      if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, dx), losses_, &g);
-      const double k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
-      const double w = Dot(g.g * g.g, weight);
-      const double ka = h * h * w * k;
-      const double nu = numerical_damping_ * ka * ka / (16 + ka * ka);
-      const double rate = Dot(g.g, v);
-      // the last factor of every product is the one that takes longest to compute
-      force = (g.torque + damping * rate - 0.5 * h * Dot(g.g, dv) * g.slope) +
-              h * rate * k * nu;
-      p = (0.5 * damping / h + 0.5 * g.slope) + 0.75 * k * nu;
-      if (pass + 1 == passes_ && !friction_) break;
-      const Pair free = other - weight * g.e;
-      const double change =
-          (h * Dot(g.g, free) - h * w * force) / (1 + h * h * w * p);
-      const Pair before = dv;
-      dv = free * h - weight * g.g * h * (force + h * p * change);
-      if (friction_) {
-        rub.reach = friction_->Reach(speed + 0.5 * Rotation(before), g.torque);
-        rub.stretch = std::clamp(turned, -rub.reach, rub.reach);
-        // response of rotor and link to friction, (M + h^2 p g g')^-1 b
-        const Pair b = friction_->b();
-        const double along = h * h * p * Dot(weight * b, g.g) / (1 + h * h * w * p);
-        const Pair answer = weight * (b - g.g * along) * h;
-        dv -= answer *
-              friction_->Solve(h, speed, Rotation(dv), Rotation(answer), &rub);
-      }
+      trial_.turned = rest[1] != 0 ? step->rotation - rest[0] : 0;
     }
     step->v = v;
     step->weight = weight;
+    step->torsion = map_.torsion();
+  }
+
+  SWGJOINT_INLINE void Secant(Step* step) {
+    map_.Secant(trial_.dx[0], trial_.dx[1], &step->value);
+  }
+
+  SWGJOINT_INLINE void Solve(int pass, Step* step) {
+    DriveValue& g = step->value;
+    const double h = trial_.h, damping = trial_.damping;
+    const Pair v = step->v, weight = step->weight, dv = trial_.dv;
+    if (hysteresis_.size()) hysteresis_.Slip(Dot(g.g, trial_.dx), losses_, &g);
+    const double k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
+    const double w = Dot(g.g * g.g, weight);
+    const double ka = h * h * w * k;
+    const double nu = numerical_damping_ * ka * ka / (16 + ka * ka);
+    const double rate = Dot(g.g, v);
+    // the last factor of every product is the one that takes longest to compute
+    const double force =
+        (g.torque + damping * rate - 0.5 * h * Dot(g.g, dv) * g.slope) +
+        h * rate * k * nu;
+    const double p = (0.5 * damping / h + 0.5 * g.slope) + 0.75 * k * nu;
     step->force = force;
     step->metric = p;
-    step->torsion = map_.torsion();
+    if (pass + 1 == passes_ && !friction_) return;
+    const Pair free = trial_.other - weight * g.e;
+    const double change = (h * Dot(g.g, free) - h * w * force) / (1 + h * h * w * p);
+    Pair after = free * h - weight * g.g * h * (force + h * p * change);
+    if (friction_) {
+      FrictionStep& rub = step->friction;
+      rub.reach = friction_->Reach(trial_.speed + 0.5 * Rotation(dv), g.torque);
+      rub.stretch = std::clamp(trial_.turned, -rub.reach, rub.reach);
+      // response of rotor and link to friction, (M + h^2 p g g')^-1 b
+      const Pair b = friction_->b();
+      const double along = h * h * p * Dot(weight * b, g.g) / (1 + h * h * w * p);
+      const Pair answer = weight * (b - g.g * along) * h;
+      after -= answer * friction_->Solve(h, trial_.speed, Rotation(after),
+                                         Rotation(answer), &rub);
+    }
+    trial_.dv = after;
+    trial_.dx = v * h + after * (0.5 * h);
   }
 
   // After a step to q and v: stores the acceleration due to all other forces, and where
@@ -222,7 +241,17 @@ class Law {
     Store(state, dv * (1 / h) + step->weight * torque);
   }
 
+  // Data of a prediction: time step, damping, accelerations by all other forces,
+  // predicted changes of velocities and positions, and along the friction the speed and
+  // the stretch of the bristle before it slips.
+  struct Trial {
+    double h = 0, damping = 0;
+    Pair other = {}, dv = {}, dx = {};
+    double speed = 0, turned = 0;
+  };
+
   DriveMap map_;
+  Trial trial_;
   double damping_ = 0, contact_damping_ = 0, numerical_damping_ = 0;
   int passes_ = 0;  // evaluations of the map per step
   Hysteresis hysteresis_;
