@@ -68,10 +68,12 @@ SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
       Load(own + kLanes, &m);
       CosSin(n * theta + m * psi, &c, &s);
     } else {
-      const double shift_c = all[recipe.shift], shift_s = all[recipe.shift + kLanes];
+      const double* from = all + recipe.from + kPhases;
+      const double* shift = all + recipe.shift + kPhases;
+      const double shift_c = shift[0], shift_s = shift[kLanes];
       Lanes c0, s0;
-      Load(all + recipe.from, &c0);
-      Load(all + recipe.from + kLanes, &s0);
+      Load(from, &c0);
+      Load(from + kLanes, &s0);
       c = c0 * shift_c - s0 * shift_s;
       s = s0 * shift_c + c0 * shift_s;
     }
@@ -84,21 +86,45 @@ SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
   return error_mean_ + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
 }
 
-// Stores sin(eta)/eta and cos(eta) for half the phase change eta of every harmonic at
-// the place of the first two weights of its block.
+// Stores, at the place of the first weights of every block, cos and sin of half the phase
+// change eta of its harmonics, and n sin(eta)/eta for their orders n. kPsi means that a
+// harmonic depends on psi. No phase changes by more than 2^kHalvings rad; at
+// kHalvings < 0 phases may change by any angle.
+template <bool kPsi, int kHalvings>
 SWGJOINT_INLINE void DriveMap::HalfStep(double dtheta, double dpsi) {
   const double* own = harmonics_.data();
-  double* out = weight_.data();
-  for (int b = 0; b < blocks_; ++b, own += kHarmonics, out += kWeights) {
-    Lanes n, m, cos, sin;
+  double* all = weight_.data();
+  double* out = all;
+  const Recipe* recipe = recipe_.data();
+  for (int b = 0; b < blocks_; ++b, ++recipe, own += kHarmonics, out += kWeights) {
+    Lanes n, m = {}, c, s, sinc;
     Load(own, &n);
-    Load(own + kLanes, &m);
-    const Lanes eta = n * (0.5 * dtheta) + m * (0.5 * dpsi);
-    CosSin(eta, &cos, &sin);
-    Store(out + kLanes, cos);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const double x = eta[lane];
-      out[lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : sin[lane] / x;
+    if (kPsi) Load(own + kLanes, &m);
+    Lanes eta = n * (0.5 * dtheta);
+    if (kPsi) eta += m * (0.5 * dpsi);
+    if (!kPsi && recipe->from >= 0) {
+      const double shift_c = all[recipe->shift], shift_s = all[recipe->shift + kLanes];
+      Lanes c0, s0;
+      Load(all + recipe->from, &c0);
+      Load(all + recipe->from + kLanes, &s0);
+      c = c0 * shift_c - s0 * shift_s;
+      s = s0 * shift_c + c0 * shift_s;
+    } else if constexpr (kHalvings >= 0) {
+      SincCos<kHalvings>(eta, &sinc, &c);
+      s = eta * sinc;
+    } else {
+      CosSin(eta, &c, &s);
+      for (int lane = 0; kPsi && lane < kLanes; ++lane) {
+        const double x = eta[lane];
+        out[lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : s[lane] / x;
+      }
+      if (kPsi) Load(out, &sinc);
+    }
+    Store(out, c);
+    Store(out + kLanes, s);
+    if (kPsi) {
+      Store(out + 2 * kLanes, n * sinc);
+      Store(out + 3 * kLanes, m * sinc);
     }
   }
 }
@@ -127,49 +153,45 @@ void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
 }
 
 // Computes, in one pass over the table, the weights of all A and B, the weighted sums
-// in the segment of the start state, and g. kPsi means that a harmonic depends on psi.
-// No phase changes by more than 2^kHalvings rad; at kHalvings < 0, HalfStep has
-// computed sin(eta)/eta and cos(eta) for any change.
-template <bool kPsi, int kHalvings>
-SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
+// in the segment of the start state, and g. HalfStep must have been called.
+template <bool kPsi>
+SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
   const double* row =
       table_.data() + static_cast<size_t>(j0_) * blocks_ * kBlock;
   const double* own = harmonics_.data();
   double* weight = weight_.data();
   Lanes w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
-  // the mean harmonic begins the sums in one of their lanes
-  const double* mean = &mean_[static_cast<size_t>(j0_) * kMean];
-  for (int p = 1; p < 5; ++p) Load(mean + p * kLanes, &w[p]);
   const int blocks = blocks_;
+  // n sin(eta)/eta is sin(eta) times this number, or n if eta^2/6 is less than 2^-53
+  const bool still = std::fabs(dtheta) * top_theta_ < 1e-8;
+  const double per_step = still ? 0 : 2 / dtheta;
   for (int b = 0; b < blocks; ++b, own += kHarmonics, weight += kWeights) {
-    Lanes n, m = {}, sinc, ch, c0, s0, error_c, error_s;
-    Load(own, &n);
-    if (kPsi) Load(own + kLanes, &m);
-    Lanes eta = n * (0.5 * dtheta);
-    if (kPsi) eta += m * (0.5 * dpsi);
-    if constexpr (kHalvings >= 0) {
-      SincCos<kHalvings>(eta, &sinc, &ch);
+    Lanes c0, s0, ch, sh, by_theta, by_psi, error_c, error_s;
+    Load(weight, &ch);
+    Load(weight + kLanes, &sh);
+    if (kPsi) {
+      Load(weight + 2 * kLanes, &by_theta);
+      Load(weight + 3 * kLanes, &by_psi);
+    } else if (still) {
+      Load(own, &by_theta);
     } else {
-      Load(weight, &sinc);
-      Load(weight + kLanes, &ch);
+      by_theta = sh * per_step;
     }
     Load(own + 2 * kLanes, &error_c);
     Load(own + 3 * kLanes, &error_s);
     Load(own + 4 * kLanes, &c0);
     Load(own + 5 * kLanes, &s0);
-    const Lanes sh = eta * sinc;
     const Lanes c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
     const Lanes mean_c = c * ch, mean_s = s * ch;
-    const Lanes by_theta = sinc * n, by_psi = sinc * m;
     const Lanes theta_c = s * (by_theta * -1), theta_s = c * by_theta;
-    const Lanes psi_c = s * (by_psi * -1), psi_s = c * by_psi;
     g_theta += error_c * theta_c + error_s * theta_s;
-    if (kPsi) g_psi += error_c * psi_c + error_s * psi_s;
     Store(weight, mean_c);
     Store(weight + kLanes, mean_s);
     Store(weight + 2 * kLanes, theta_c);
     Store(weight + 3 * kLanes, theta_s);
     if (kPsi) {
+      const Lanes psi_c = s * (by_psi * -1), psi_s = c * by_psi;
+      g_psi += error_c * psi_c + error_s * psi_s;
       Store(weight + 4 * kLanes, psi_c);
       Store(weight + 5 * kLanes, psi_s);
     }
@@ -192,6 +214,13 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
       u[p] += theta_c * even + theta_s * odd;
       if (kPsi) v[p] += psi_c * even + psi_s * odd;
     }
+  }
+  // the mean harmonic joins the others in one of their lanes
+  const double* mean = &mean_[static_cast<size_t>(j0_) * kMean];
+  for (int p = 1; p < 5; ++p) {
+    Lanes a;
+    Load(mean + p * kLanes, &a);
+    w[p] += a;
   }
   double rest[4];
   Sums(w[1], w[2], w[3], w[4], w_ + 1);
@@ -238,14 +267,24 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   // The secants of every harmonic for theta and psi therefore have a closed form, and
   // the mean of its two end values is cos(eta) times its value at the midpoint.
   const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
-  if (top <= 1) {
-    moves_psi_ ? Sweep<true, 0>(dtheta, dpsi, out) : Sweep<false, 0>(dtheta, dpsi, out);
-  } else if (top <= 4) {
-    moves_psi_ ? Sweep<true, 2>(dtheta, dpsi, out) : Sweep<false, 2>(dtheta, dpsi, out);
+  if (moves_psi_) {
+    if (top <= 1) {
+      HalfStep<true, 0>(dtheta, dpsi);
+    } else if (top <= 4) {
+      HalfStep<true, 2>(dtheta, dpsi);
+    } else {
+      HalfStep<true, -1>(dtheta, dpsi);
+    }
+    Sweep<true>(dtheta, out);
   } else {
-    HalfStep(dtheta, dpsi);
-    moves_psi_ ? Sweep<true, -1>(dtheta, dpsi, out)
-               : Sweep<false, -1>(dtheta, dpsi, out);
+    if (top <= 1) {
+      HalfStep<false, 0>(dtheta, dpsi);
+    } else if (top <= 4) {
+      HalfStep<false, 2>(dtheta, dpsi);
+    } else {
+      HalfStep<false, -1>(dtheta, dpsi);
+    }
+    Sweep<false>(dtheta, out);
   }
   const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
   const int j1 = SegmentNear(j0_, x1);

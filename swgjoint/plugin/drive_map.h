@@ -89,11 +89,14 @@ class DriveMap {
   void Secant(double dtheta, double dpsi, DriveValue* out);
 
  private:
+  static_assert(kHarmonics == kWeights, "places are the same in harmonics and weights");
+  static constexpr int kPhases = 4 * kLanes;  // of cos of the phases in a block
+
   // Rule that computes cos and sin of one block of harmonics from those of an earlier
   // block, if all four orders differ from it by the same amount.
   struct Recipe {
-    int from = -1;  // place of cos of the earlier block; -1: compute from the phases
-    int shift = 0;  // place of cos of the earlier harmonic with the difference as order
+    int from = -1;  // place of the earlier block; -1: compute from the phases
+    int shift = 0;  // place of the earlier harmonic with the difference as order
   };
 
   void FindRecipes(const std::vector<double>& orders);
@@ -103,9 +106,10 @@ class DriveMap {
   int SegmentNear(int guess, double torsion) const {
     return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
   }
-  void HalfStep(double dtheta, double dpsi);
   template <bool kPsi, int kHalvings>
-  void Sweep(double dtheta, double dpsi, DriveValue* out);
+  void HalfStep(double dtheta, double dpsi);
+  template <bool kPsi>
+  void Sweep(double dtheta, DriveValue* out);
   MeanTorque Work(int j1, double x1) const;
   double Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;

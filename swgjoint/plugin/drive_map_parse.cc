@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "drive_map.h"
 #include "lanes.h"
@@ -162,25 +164,32 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
 void DriveMap::FindRecipes(const std::vector<double>& orders) {
   const int count = n_ - 1;
   const double* n = orders.data() + 2;  // without the mean
-  const auto place = [](int k) {
-    return k / kLanes * kHarmonics + 4 * kLanes + k % kLanes;
-  };
+  const auto place = [](int k) { return k / kLanes * kHarmonics + k % kLanes; };
+  std::map<std::pair<double, double>, int> earlier;  // first harmonic of every order
   recipe_.assign(blocks_, Recipe());
+  std::vector<int> depth(blocks_, 0);  // number of rotations one after the other
+  int few = 0;                         // as many as multiples of one order need
   for (int k = kLanes; k < count; k += kLanes) {
-    Recipe& recipe = recipe_[k / kLanes];
-    const auto shifted = [&](int a, int shift) {
-      for (int b = 0; b < std::min(kLanes, count - k); ++b) {
-        if (n[2 * (k + b)] != n[2 * (a + b)] + n[2 * shift] ||
-            n[2 * (k + b) + 1] != n[2 * (a + b) + 1] + n[2 * shift + 1]) {
-          return false;
-        }
+    const int block = k / kLanes;
+    for (int b = k - kLanes; b < k; ++b) {
+      earlier.emplace(std::pair(n[2 * b], n[2 * b + 1]), b);
+    }
+    if (block >> few) ++few;
+    for (int a = 0; a < k && !(recipe_[block].from >= 0 && depth[block] <= few);
+         a += kLanes) {
+      const double theta = n[2 * k] - n[2 * a], psi = n[2 * k + 1] - n[2 * a + 1];
+      const auto found = earlier.find({theta, psi});
+      if (found == earlier.end()) continue;
+      const int shift = found->second;
+      const int need = 1 + std::max(depth[a / kLanes], depth[shift / kLanes]);
+      bool shifted = recipe_[block].from < 0 || need < depth[block];
+      for (int b = 1; b < std::min(kLanes, count - k); ++b) {
+        shifted = shifted && n[2 * (k + b)] - n[2 * (a + b)] == theta &&
+                  n[2 * (k + b) + 1] - n[2 * (a + b) + 1] == psi;
       }
-      return true;
-    };
-    for (int a = 0; a < k && recipe.from < 0; a += kLanes) {
-      for (int shift = 0; shift < k; ++shift) {
-        if (shifted(a, shift)) recipe = {place(a), place(shift)};
-      }
+      if (!shifted) continue;
+      recipe_[block] = {place(a), place(shift)};
+      depth[block] = need;
     }
   }
 }

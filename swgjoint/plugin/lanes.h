@@ -79,6 +79,24 @@ struct LaneAllocator {
 };
 typedef std::vector<double, LaneAllocator<double>> LaneVector;
 
+#if defined(__GNUC__)
+// Vectors among other numbers; the compiler would copy bytes in two halves.
+typedef double LanesInMemory
+    __attribute__((vector_size(8 * kLanes), aligned(8), may_alias));
+typedef double PairInMemory __attribute__((vector_size(16), aligned(8), may_alias));
+SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
+  *x = *reinterpret_cast<const LanesInMemory*>(from);
+}
+SWGJOINT_INLINE void Load(const double* from, Pair* x) {
+  *x = *reinterpret_cast<const PairInMemory*>(from);
+}
+SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
+  *reinterpret_cast<LanesInMemory*>(to) = x;
+}
+SWGJOINT_INLINE void Store(double* to, const Pair& x) {
+  *reinterpret_cast<PairInMemory*>(to) = x;
+}
+#else
 template <class V>
 SWGJOINT_INLINE void Load(const double* from, V* x) {
   std::memcpy(x, from, sizeof(V));
@@ -87,6 +105,7 @@ template <class V>
 SWGJOINT_INLINE void Store(double* to, const V& x) {
   std::memcpy(to, &x, sizeof(V));
 }
+#endif
 SWGJOINT_INLINE double Dot(const Pair& a, const Pair& b) {
   const Pair product = a * b;
   return product[0] + product[1];
