@@ -165,8 +165,9 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
   // n sin(eta)/eta is sin(eta) times this number, or n if eta^2/6 is less than 2^-53
   const bool still = std::fabs(dtheta) * top_theta_ < 1e-8;
   const double per_step = still ? 0 : 2 / dtheta;
-  for (int b = 0; b < blocks; ++b, own += kHarmonics, weight += kWeights) {
-    Lanes c0, s0, ch, sh, by_theta, by_psi, error_c, error_s;
+  for (int b = 0; b < blocks;
+       ++b, row += kBlock, own += kHarmonics, weight += kWeights) {
+    Lanes c0, s0, ch, sh, by_theta, by_psi, error_c, error_s, psi_c, psi_s, even, odd;
     Load(weight, &ch);
     Load(weight + kLanes, &sh);
     if (kPsi) {
@@ -190,22 +191,11 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
     Store(weight + 2 * kLanes, theta_c);
     Store(weight + 3 * kLanes, theta_s);
     if (kPsi) {
-      const Lanes psi_c = s * (by_psi * -1), psi_s = c * by_psi;
+      psi_c = s * (by_psi * -1);
+      psi_s = c * by_psi;
       g_psi += error_c * psi_c + error_s * psi_s;
       Store(weight + 4 * kLanes, psi_c);
       Store(weight + 5 * kLanes, psi_s);
-    }
-  }
-  weight = weight_.data();
-  for (int b = 0; b < blocks; ++b, row += kBlock, weight += kWeights) {
-    Lanes mean_c, mean_s, theta_c, theta_s, psi_c, psi_s, even, odd;
-    Load(weight, &mean_c);
-    Load(weight + kLanes, &mean_s);
-    Load(weight + 2 * kLanes, &theta_c);
-    Load(weight + 3 * kLanes, &theta_s);
-    if (kPsi) {
-      Load(weight + 4 * kLanes, &psi_c);
-      Load(weight + 5 * kLanes, &psi_s);
     }
     for (int p = 0; p < 5; ++p) {
       Load(row + 2 * p * kLanes, &even);

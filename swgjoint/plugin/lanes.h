@@ -8,11 +8,17 @@
 #include <new>
 #include <vector>
 
-// A function marked with SWGJOINT_CLONES is compiled twice, with and without AVX2; the
-// processor determines which version runs. The result is bit for bit the same.
+// A function marked with SWGJOINT_CLONES is compiled several times: for processors with
+// AVX-512, which have more registers, with AVX2, and for all others. The processor
+// determines which version runs. The result is bit for bit the same.
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && \
     defined(__GLIBC__)
+#if __GNUC__ >= 12
+#define SWGJOINT_CLONES \
+  __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#else
 #define SWGJOINT_CLONES __attribute__((target_clones("avx2", "default")))
+#endif
 #else
 #define SWGJOINT_CLONES
 #endif
