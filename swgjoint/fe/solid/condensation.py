@@ -10,7 +10,7 @@ from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.linearise import SolidLinearised
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.tangent import SolidTangent
+from swgjoint.fe.solid.tangent import SolidTangent, TangentResponse
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Array
 
@@ -33,12 +33,22 @@ class Condensed:
     coupling: Array
     """Derivative of the gaps to the wave generator in the sector of each tooth contact
     by its force (n, p) [m/N]."""
-    base: Array
-    """Increment of the coordinates of the sectors if all unknowns are zero (N, size)
-    [m]."""
-    response: Array
-    """Derivative of this increment by the tooth forces and the rotation of the bore of
-    the diaphragm (N, size, n + 1) in SI units."""
+    response: TangentResponse
+    """Response of the ring to its own imbalance, a unit rotation of the bore of the
+    diaphragm, and the tooth forces."""
+    value: Array
+    """Motion of the masters on the bore of the diaphragm if all unknowns are zero, and
+    by a unit rotation (N, size, 2)."""
+
+    def increment(self, unknown: Array) -> Array:
+        """Increment of the coordinates of the sectors (N, size) [m].
+
+        Args:
+            unknown: The unknowns (n + 2,).
+        """
+        force, turn = unknown[:-2], unknown[-2]
+        moved = self.response.combine(np.concatenate([[1.0, turn], force]))
+        return np.asarray(moved + self.value @ np.array([1.0, turn]))
 
 
 def condense(
@@ -103,31 +113,32 @@ def condense(
         gap = found.contacts.gap - old
         gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
 
-    # solve the ring for its own imbalance, the tooth forces and a unit rotation
-    out_of = linear.gradient + linear.pushed
-    columns = np.zeros((n_sectors, size, n + 2))
-    columns[:, :, 0] = -out_of
-    columns[:, :, [0, n + 1]] -= tangent.by_held @ value[:, held]
-    if found is not None and n:
-        columns[found.contacts.sector, :, 1 + np.arange(n)] = rows
-    solved = tangent.solve(columns, bore)
-    base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
-    response[:, :, n] += value[:, :, 1]
+    # response of the ring to its own imbalance, a unit rotation and the tooth forces
+    out_of, reaction = linear.gradient + linear.pushed, tangent.by_held @ value[:, held]
+    loads = -reaction
+    loads[:, :, 0] -= out_of
+    at = np.zeros(0, dtype=np.int64) if found is None else found.contacts.sector
+    response = tangent.respond(loads, at, rows, bore)
+    products = response.products
 
     # gaps, and the moments of the bore of the diaphragm and of the circular spline
     system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
-    lever = value[:, held, 1]
-    into = np.einsum("sh,sih->si", lever, tangent.by_held)
-    system[n, : n + 1] = np.einsum("si,sik->k", into, response)
-    offset[n] = np.sum(lever * out_of[:, held]) + np.sum(into * base)
+    moved = np.einsum("sip,siq->pq", reaction, value)
+    system[n, :n] = products[1, 2:]
+    system[n, n] = products[1, 1] - moved[1, 1]
+    offset[n] = products[1, 0] - moved[1, 0]
+    offset[n] -= np.sum(value[:, held, 1] * out_of[:, held])
     if found is not None and n:
-        seen = np.einsum("ki,kil->kl", rows, response[found.contacts.sector])
-        system[:n, : n + 1] = seen
-        system[:n, :n] += local
+        prescribed = np.einsum("ki,kip->kp", rows, value[at])
+        system[:n, :n] = products[2:, 2:] + local
+        system[:n, n] = products[2:, 1] + prescribed[:, 1]
+        offset[:n] = gap + products[2:, 0] + prescribed[:, 0]
         # a rotation of the circular spline changes the gaps by their lever arms
         system[:n, n + 1] = system[n + 1, :n] = -found.circular_spline_arm
-        offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
-    system[n], offset[n] = -system[n], -offset[n]
     return Condensed(
-        system=system, offset=offset, coupling=coupling, base=base, response=response
+        system=system,
+        offset=offset,
+        coupling=coupling,
+        response=response,
+        value=value,
     )

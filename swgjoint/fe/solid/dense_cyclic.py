@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from swgjoint.fe.common.cyclic import Insides, SingularCyclicError
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Index
 
 
 class DenseCyclicFactor:
@@ -77,6 +79,39 @@ class DenseCyclicFactor:
                 pull += self._ahead[k] @ faces[k + 1]
             faces[k] -= lu_solve(lu[k], pull, check_finite=False)
         return self._insides.with_faces(faces, rhs)
+
+    def respond(self, loads: Array, sector: Index, rows: Array) -> DenseResponse:
+        """Response to d loads on all sectors and k loads on a single sector each.
+
+        Args:
+            loads: Loads on all sectors (N, n, d), as in :meth:`solve`.
+            sector: Sectors of the other loads (k,).
+            rows: Loads on these sectors (k, n).
+        """
+        d, k = loads.shape[2], len(rows)
+        columns = np.concatenate([loads, np.zeros((*loads.shape[:2], k))], axis=2)
+        columns[sector, :, d + np.arange(k)] = rows
+        solved = self.solve(columns)
+        products = np.einsum("snk,snl->kl", columns, solved, optimize=True)
+        return DenseResponse(products=products, solved=solved)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DenseResponse:
+    """Response of a factorised ring to d + k loads."""
+
+    products: Array
+    """Products of the loads with the inverse matrix, symmetric (d + k, d + k)."""
+    solved: Array
+    """Solution for each of them (N, n, d + k)."""
+
+    def combine(self, factors: Array) -> Array:
+        """Solution for a linear combination of the loads (N, n).
+
+        Args:
+            factors: Factor of each load (d + k,).
+        """
+        return np.asarray(self.solved @ factors)
 
 
 def _factor(matrix: Array) -> tuple[Array, Array]:

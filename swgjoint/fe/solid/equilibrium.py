@@ -251,7 +251,7 @@ def _solve_linear(
             compliance = float(answer[-1])
     # increments of the ring, and contact forces and gaps of the bore after the step
     force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
-    increment = condensed.base + condensed.response @ unknown[: n + 1]
+    increment = condensed.increment(unknown)
     bore = linear.bore
     moved = increment[:, model.contact_dofs]
     change = np.einsum("spm,sm->sp", bore.rows, moved)

@@ -13,9 +13,12 @@ factorised tangent. The result of Newton's method does not depend on the tangent
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from swgjoint.fe.solid.cholesky_cyclic import factorise_ring
+from swgjoint.fe.solid.cholesky_cyclic import CholeskyResponse, factorise_ring
+from swgjoint.fe.solid.dense_cyclic import DenseResponse
 from swgjoint.fe.solid.linearise import BoreContact, SolidLinearised
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.typing import Array, Index
@@ -65,39 +68,42 @@ class SolidTangent:
         self._bore = linear.bore
         self._active = linear.bore.active
 
-    def solve(self, columns: Array, bore: BoreContact) -> Array:
-        """Solve the ring for k right-hand sides.
+    def respond(
+        self, loads: Array, sector: Index, rows: Array, bore: BoreContact
+    ) -> TangentResponse:
+        """Response of the ring to d loads on all sectors and k loads on a single one.
 
         Args:
-            columns: Right-hand sides by sector, overwritten (N, n, k) [N].
+            loads: Loads on all sectors (N, n, d) [N].
+            sector: Sectors of the other loads (k,).
+            rows: Loads on these sectors (k, n) [N].
             bore: Contact points on the bore; where other points touch than in the
                 factorised tangent, the tangent follows.
-
-        Returns:
-            Solution at the degrees of freedom of each sector (N, n, k) [m].
         """
-        k = columns.shape[2]
-        sector, shape, stiffness = self._changes(bore)
-        if len(sector):
-            added = np.zeros((*columns.shape[:2], len(sector)))
-            into = self._model.contact_dofs
-            added[sector[:, None], into, np.arange(len(sector))[:, None]] = shape
-            columns = np.concatenate([columns, added], axis=2)
-        columns[:, self._held] = 0.0
+        at, shape, stiffness = self._changes(bore)
+        added = np.zeros((len(at), loads.shape[1]))
+        added[:, self._model.contact_dofs] = shape
+        sector, rows = np.concatenate([sector, at]), np.concatenate([rows, added])
+        # no loads at prescribed degrees of freedom
+        loads = loads.copy()
+        loads[:, self._held] = rows[:, self._held] = 0.0
         if self._fixed is not None:
-            columns[self._fixed] = 0.0
-        size = len(self._sign)
-        columns[-1, -size:] *= self._sign[:, None]
-        solved = self._factor.solve(columns)
-        solved[-1, -size:] *= self._sign[:, None]
-        if not len(sector):
-            return solved
-        seen = np.einsum("rm,rmk->rk", shape, solved[sector][:, into])
-        system = np.diag(1.0 / stiffness) + seen[:, k:]
-        answer = solved[..., :k] - solved[..., k:] @ np.linalg.solve(
-            system, seen[:, :k]
+            loads[self._fixed] = 0.0
+            rows[self._fixed[sector]] = 0.0
+        last = slice(-len(self._sign), None)
+        loads[-1, last] *= self._sign[:, None]
+        rows[sector == len(loads) - 1, last] *= self._sign
+        ring = self._factor.respond(loads, sector, rows)
+        products = ring.products
+        k = len(products) - len(at)
+        system = np.diag(1.0 / stiffness) + products[k:, k:]
+        correction = np.asarray(np.linalg.solve(system, products[k:, :k]))
+        return TangentResponse(
+            products=products[:k, :k] - products[:k, k:] @ correction,
+            ring=ring,
+            correction=correction,
+            sign=self._sign,
         )
-        return np.asarray(answer)
 
     def _changes(self, bore: BoreContact) -> tuple[Index, Array, Array]:
         """Change of the tangent since it was factorised.
@@ -122,6 +128,30 @@ class SolidTangent:
             factors.append(values[large])
             sectors.append(np.full(int(large.sum()), s))
         if not sectors:
-            none = np.zeros(0)
-            return none.astype(np.int64), none, none
+            shape = np.zeros((0, old.rows.shape[2]))
+            return np.zeros(0, dtype=np.int64), shape, np.zeros(0)
         return np.concatenate(sectors), np.concatenate(shapes), np.concatenate(factors)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TangentResponse:
+    """Response of the ring to k loads."""
+
+    products: Array
+    """Products of the loads with the inverse tangent (k, k)."""
+    ring: CholeskyResponse | DenseResponse
+    """Response of the factorised ring to the loads and to the r columns of U."""
+    correction: Array
+    """Negative factors of the columns of U per load (r, k)."""
+    sign: Array
+    """Factors on the degrees of freedom of the face that closes the ring."""
+
+    def combine(self, factors: Array) -> Array:
+        """Motion of each sector under a combination of the loads (N, n).
+
+        Args:
+            factors: Factor of each load (k,).
+        """
+        moved = self.ring.combine(np.concatenate([factors, -self.correction @ factors]))
+        moved[-1, -len(self.sign) :] *= self.sign
+        return moved

@@ -54,6 +54,27 @@ def test_cholesky_factor_solves_the_same_ring(sectors, inside):
     assert (matrix == before).all()
 
 
+@pytest.mark.parametrize("kind", [CholeskyCyclicFactor, DenseCyclicFactor])
+@pytest.mark.parametrize(("sectors", "inside"), [(3, 2), (4, 0), (7, 2)])
+def test_products_and_combinations_of_loads(kind, sectors, inside):
+    """Loads on all sectors and on single ones, against the solutions for them."""
+    matrix = blocks(sectors, 3, inside) + 30.0 * np.eye(6 + inside)
+    rng = np.random.default_rng(3)
+    sector = np.array([2, 0, 2, sectors - 1])
+    loads = rng.normal(size=(sectors, 6 + inside, 2))
+    rows = rng.normal(size=(4, 6 + inside))
+    columns = np.concatenate([loads, np.zeros((sectors, 6 + inside, 4))], axis=2)
+    columns[sector, :, 2 + np.arange(4)] = rows
+    factor = kind(matrix, 3)
+    solved = factor.solve(columns)
+    response = factor.respond(loads, sector, rows)
+    expected = np.einsum("snk,snl->kl", columns, solved)
+    assert response.products == pytest.approx(expected, rel=1e-11, abs=1e-13)
+    factors = rng.normal(size=6)
+    combined = response.combine(factors)
+    assert combined == pytest.approx(solved @ factors, rel=1e-11, abs=1e-13)
+
+
 def test_indefinite_ring_is_factorised_with_pivoting():
     """Cholesky's factor does not exist; the solution does."""
     matrix = blocks(5, 3, 2)

@@ -34,13 +34,19 @@ def test_changed_contact_is_added_to_the_tangent(small_ring, loaded, monkeypatch
     rng = np.random.default_rng(4)
     loads = rng.normal(size=(*other.gradient.shape, 3))
     kept, anew = SolidTangent(small_ring, first), SolidTangent(small_ring, other)
-    expected = anew.solve(loads.copy(), other.bore)
-    scale = np.abs(expected).max()
-    found = kept.solve(loads.copy(), other.bore)
-    assert np.abs(found - expected).max() < 1e-8 * scale
+    sector, rows = np.array([2, 0]), rng.normal(size=(2, loads.shape[1]))
+    factors = rng.normal(size=5)
+    expected = anew.respond(loads, sector, rows, other.bore)
+    found = kept.respond(loads, sector, rows, other.bore)
     # without the change the tangents differ
-    ignored = kept.solve(loads.copy(), first.bore)
-    assert np.abs(ignored - expected).max() > 1e-4 * scale
+    ignored = kept.respond(loads, sector, rows, first.bore)
+    for got, wanted, unchanged in (
+        (found.products, expected.products, ignored.products),
+        *[[r.combine(factors) for r in (found, expected, ignored)]],
+    ):
+        scale = np.abs(wanted).max()
+        assert np.abs(got - wanted).max() < 1e-8 * scale
+        assert np.abs(unchanged - wanted).max() > 1e-4 * scale
 
 
 def test_kept_tangent_reaches_the_same_state(small_drive, loaded):
