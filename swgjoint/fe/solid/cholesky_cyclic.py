@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
@@ -26,6 +27,16 @@ from swgjoint.typing import Array, Index
 
 class IndefiniteCyclicError(ArithmeticError):
     """The matrix of the ring of sectors is not positive definite."""
+
+
+class SectorBlocks(Protocol):
+    """Symmetric matrices of the sectors of a ring, an array (N, n, n) for example."""
+
+    def __len__(self) -> int:
+        """Number of sectors N."""
+
+    def __getitem__(self, sector: int, /) -> Array:
+        """Matrix of a sector (n, n)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +63,7 @@ class CholeskyCyclicFactor:
     operations. All blocks are stored transposed, which is the order of LAPACK.
     """
 
-    def __init__(self, blocks: Array, face: int) -> None:
+    def __init__(self, blocks: SectorBlocks, face: int) -> None:
         """Factorise the matrices of a ring.
 
         Args:
@@ -85,7 +96,9 @@ class CholeskyCyclicFactor:
         face = self._face
         return outer[:face, :face], outer[:face, face:], outer[face:, face:]
 
-    def _eliminate(self, blocks: Array, first: int, end: int) -> tuple[int, Array]:
+    def _eliminate(
+        self, blocks: SectorBlocks, first: int, end: int
+    ) -> tuple[int, Array]:
         """Eliminate all unknowns of some neighbouring sectors but their outer faces.
 
         Args:
@@ -101,7 +114,8 @@ class CholeskyCyclicFactor:
         left, coupling, right = self._split(outer)
         merged: tuple[int, ...] = ()
         if end - first == 1:
-            block, n = blocks[first], blocks.shape[1]
+            block = blocks[first]
+            n = len(block)
             start, inner, stop = slice(face), slice(face, n - face), slice(n - face, n)
             left[:], coupling[:] = block[start, start], block[start, stop]
             right[:] = block[stop, stop]
@@ -263,7 +277,7 @@ class CholeskyResponse:
 
 
 def factorise_ring(
-    blocks: Array, face: int
+    blocks: SectorBlocks, face: int
 ) -> CholeskyCyclicFactor | DenseCyclicFactor:
     """Factorise a ring, with pivoting only if it is not positive definite.
 
@@ -277,7 +291,8 @@ def factorise_ring(
     try:
         return CholeskyCyclicFactor(blocks, face)
     except IndefiniteCyclicError:
-        return DenseCyclicFactor(blocks, face)
+        every = np.stack([blocks[k] for k in range(len(blocks))])
+        return DenseCyclicFactor(every, face)
 
 
 def _factorised(matrix: Array) -> Array:

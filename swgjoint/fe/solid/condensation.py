@@ -95,13 +95,14 @@ def condense(
         at_bore = through[:, flank:].reshape(n, -1, 3)
         coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
         coupling = bore.with_vertices(coupling, sector)
-        eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
+        at_points = np.take_along_axis(coupling, bore.points[sector], axis=1)
+        eased = (at_points[:, None] @ bore.inverse[sector])[:, 0]
         into = model.contact_dofs
-        rows[:, into] = -np.einsum("kp,kpm->km", eased, bore.rows[sector])
+        rows[:, into] = -(eased[:, None] @ bore.rows[sector])[:, 0]
         rows[:, teeth_dofs] += found.rows
         same = sector[:, None] == sector[None, :]
         local = model.teeth.compliance(found)
-        local -= np.where(same, np.einsum("kp,lp->kl", eased, coupling), 0.0)
+        local -= np.where(same, eased @ at_points.T, 0.0)
         old = np.einsum("kb,kb->k", through, loads[sector])
         if model.teeth.elastic_circular_spline is not None:
             moved = model.teeth.elastic_circular_spline.displacement(
@@ -111,7 +112,8 @@ def condense(
                 "kb,kb->k", found.circular_spline_weight, moved[found.contacts.tooth]
             )
         gap = found.contacts.gap - old
-        gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
+        free = bore.among_points(bore.free_gap)
+        gap -= np.einsum("kp,kp->k", eased, free[sector])
 
     # response of the ring to its own imbalance, a unit rotation and the tooth forces
     out_of, reaction = linear.gradient + linear.pushed, tangent.by_held @ value[:, held]

@@ -113,7 +113,7 @@ def energies(segment: StripSegment, frames: SolidFrames) -> Array:
         frames: Its frames, see :func:`segment_frames`.
     """
     d = frames.deformation
-    return np.asarray(0.5 * np.einsum("si,ij,sj->s", d, segment.stiffness, d))
+    return np.asarray(0.5 * np.einsum("si,si->s", d @ segment.stiffness, d))
 
 
 def project_to_frames(frames: SolidFrames, force: Array) -> Array:

@@ -253,16 +253,15 @@ def _solve_linear(
     force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
     increment = condensed.increment(unknown)
     bore = linear.bore
-    moved = increment[:, model.contact_dofs]
-    change = np.einsum("spm,sm->sp", bore.rows, moved)
+    change = bore.change(increment[:, model.contact_dofs])
     by_teeth = np.zeros_like(change)
     if candidates is not None:
         np.add.at(
             by_teeth, candidates.contacts.sector, force[:, None] * condensed.coupling
         )
     free = bore.free_gap + change + by_teeth
-    pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
-    after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
+    push = -(bore.inverse @ bore.among_points(free)[:, :, None])[:, :, 0]
+    after = free + (push[:, None] @ bore.compliance)[:, 0]
     rotation = state.rotation if load.rotation is None else load.rotation
     holding = -model.copies * float(condensed.offset[n] + system[n] @ unknown)
     return _Step(
@@ -272,7 +271,7 @@ def _solve_linear(
         increment=increment,
         turn=rotation + float(turn) - state.rotation,
         circular_spline_turn=float(circular_spline_turn),
-        pressure=pressure,
+        pressure=bore.at_all(push),
         after=after,
         torque=-holding if output == n or load.torque is None else load.torque,
         holding_torque=holding,
@@ -296,8 +295,8 @@ def _advance(
     """
     # touching points under tension open, and open points that overlap close
     bore, masters = linear.bore, model.strip.masters
-    local = np.einsum("spp->sp", bore.compliance)
-    wrong = np.where(bore.active, -step.pressure * local, -step.after)
+    own = bore.own_compliance
+    wrong = np.where(bore.active, -step.pressure * own, -step.after)
     bad = bore.present & (wrong > 1e-15)
     if bad.any() and one_at_a_time:
         bad &= wrong == wrong[bad].max()
@@ -318,10 +317,13 @@ def _advance(
     circular_spline_force = np.zeros_like(state.circular_spline_force)
     kept = None
     if step.found is not None:
-        contacts, f = step.found.contacts, step.force[:, None]
-        np.add.at(flank_force, contacts.sector, f * step.found.weight)
+        loaded = np.flatnonzero(step.force)
+        contacts, f = step.found.contacts, step.force[loaded, None]
+        np.add.at(flank_force, contacts.sector[loaded], f * step.found.weight[loaded])
         np.add.at(
-            circular_spline_force, contacts.tooth, f * step.found.circular_spline_weight
+            circular_spline_force,
+            contacts.tooth[loaded],
+            f * step.found.circular_spline_weight[loaded],
         )
         kept = step.found.chosen(step.active)
     new = replace(

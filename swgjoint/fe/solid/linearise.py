@@ -32,6 +32,7 @@ from swgjoint.fe.solid.corotation import (
     spin,
 )
 from swgjoint.fe.solid.corotation import tangent as stiffness
+from swgjoint.fe.solid.sector_matrices import SectorMatrices
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.typing import Array, Index, Mask
@@ -60,16 +61,64 @@ class BoreContact:
     """Mask of the points that can open and close (N, p)."""
     active: Mask
     """Mask of the points that touch (N, p)."""
+    points: Index
+    """Points that touch, then others that fill the rows (N, a)."""
     rows: Array
-    """Derivative B of the gaps by the masters of the toothed segment in the global
-    frame, and by the 16 coordinates of a race if there is one (N, p, 3 m) or
-    (N, p, 3 m + 16) [-]."""
+    """Derivative B of the gaps at these points by the masters of the toothed segment in
+    the global frame, and by the 16 coordinates of a race if there is one (N, a, 3 m) or
+    (N, a, 3 m + 16) [-]."""
     free_gap: Array
     """Gaps g without the previous contact forces (N, p) [m]."""
     compliance: Array
-    """Compliance W of all points (N, p, p) [m/N]."""
+    """Compliance W between the points that touch and all points (N, a, p) [m/N]."""
     inverse: Array
-    """Inverse W^-1 over the active points, zero elsewhere (N, p, p) [N/m]."""
+    """Inverse W^-1 over the points that touch, zero at others (N, a, a) [N/m]."""
+    frame: SolidFrames
+    """Frames of the toothed segments."""
+    carry: Array
+    """Displacements of the bore nodes by the masters in the frames (3 b, 3 m) [-]."""
+    arm: Array
+    """Derivative of the gaps at the nodes by a rotation of the bore in the frames
+    (N, b, 3) [m]."""
+    by_race: Array
+    """Derivative of the gaps at the nodes by the coordinates of a race (N, b, 16) [-];
+    no columns without a race."""
+
+    def among_points(self, values: Array) -> Array:
+        """Values at ``points`` (N, a) of values at all contact points (N, p)."""
+        return np.take_along_axis(values, self.points, axis=1)
+
+    def at_all(self, values: Array) -> Array:
+        """Values at all contact points (N, p) of values at ``points`` (N, a).
+
+        They are zero at points that do not touch.
+        """
+        spread = np.zeros(self.gap.shape)
+        np.put_along_axis(spread, self.points, values, axis=1)
+        return np.where(self.active, spread, 0.0)
+
+    @property
+    def own_compliance(self) -> Array:
+        """Diagonal of W; zero at points that do not touch (N, p) [m/N]."""
+        own = np.take_along_axis(self.compliance, self.points[:, :, None], axis=2)
+        return self.at_all(own[:, :, 0])
+
+    def change(self, moved: Array) -> Array:
+        """Change of all gaps to first order, at the same contact forces (N, p) [m].
+
+        Args:
+            moved: Motion of the coordinates to which ``rows`` refer (N, 3 m) or
+                (N, 3 m + 16) [m].
+        """
+        n, m = self.frame.position.shape[:2]
+        local = moved[:, : 3 * m].reshape(n, m, 3) @ self.frame.turn
+        turn = (self.frame.gradient @ local.reshape(n, 3 * m, 1))[:, :, 0]
+        local -= np.cross(turn[:, None], self.frame.position)
+        deformed = (local.reshape(n, -1) @ self.carry.T).reshape(n, -1, 3)
+        nodal = np.einsum("sbi,sbi->sb", self.normal, deformed)
+        nodal += (self.arm @ turn[:, :, None])[:, :, 0]
+        nodal += (self.by_race @ moved[:, 3 * m :, None])[:, :, 0]
+        return self.with_vertices(nodal, np.arange(n))
 
     def with_vertices(self, nodal: Array, sector: Index) -> Array:
         """Extend values at the bore nodes to all contact points (n, p).
@@ -103,9 +152,9 @@ class SolidLinearised:
     """Frames of the segments, in the order of the strip."""
     gradient: Array
     """Derivative of the strain energy by the coordinates (N, n) [N]."""
-    hessian: Array | None
-    """Tangent, including the condensed contact of the wave generator (N, n, n) [N/m];
-    None if it was not asked for."""
+    hessian: SectorMatrices | None
+    """Tangent of the sectors, including the condensed contact of the wave generator
+    [N/m]; None if it was not asked for."""
     pushed: Array
     """Contribution B^T W^-1 g of this contact to the gradient if the coordinates do not
     move: the negative forces of the wave generator on the coordinates (N, n) [N]."""
@@ -134,7 +183,7 @@ def linearise(
     frames = model.frames(state)
     n = model.size
     gradient, pushed = np.zeros((2, model.sectors, n))
-    hessian = np.zeros((model.sectors, n, n)) if tangent else None
+    terms = list[tuple[Index, Array]]()
     bore = bore_contact(model, state, frames[0], kept=kept)
     loads = model.loads(state)
     for number, (segment, frame) in enumerate(
@@ -146,13 +195,14 @@ def linearise(
         if number == 0:
             total = elastic - loads @ segment.loaded_from_masters
         gradient[:, dofs] += rotate_to_global(frame, project_to_frames(frame, elastic))
-        if hessian is not None:
-            local = matrices_in_global(frame, stiffness(segment, frame, total))
-            _add(hessian, dofs, local)
+        if tangent:
+            local = stiffness(segment, frame, total)
+            terms.append((dofs, matrices_in_global(frame, local)))
     into, held = model.contact_dofs, bore.inverse @ bore.rows
-    pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
-    if hessian is not None:
-        _add(hessian, into, bore.rows.transpose(0, 2, 1) @ held)
+    free = bore.among_points(bore.free_gap)
+    pushed[:, into] += (free[:, None] @ held)[:, 0]
+    if tangent:
+        terms.append((into, bore.rows.transpose(0, 2, 1) @ held))
     race = None
     if model.race is not None and state.race is not None:
         race, dofs = (
@@ -160,32 +210,16 @@ def linearise(
             model.race_dofs,
         )
         gradient[:, dofs] += race.gradient
-        if hessian is not None:
-            _add(hessian, dofs, race.hessian)
+        if tangent:
+            terms.append((dofs, race.hessian))
     return SolidLinearised(
         frames=frames,
         gradient=gradient,
-        hessian=hessian,
+        hessian=SectorMatrices(size=n, terms=tuple(terms)) if tangent else None,
         pushed=pushed,
         bore=bore,
         race=race,
     )
-
-
-def _add(matrix: Array, dofs: Index, blocks: Array) -> None:
-    """Add blocks (N, k, k) to the rows and columns of degrees of freedom (k,).
-
-    The degrees of freedom form a few runs: slices are faster than indices.
-    """
-    breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
-    begin, end = np.concatenate([[0], breaks]), np.append(breaks, len(dofs))
-    runs = [
-        (slice(dofs[i], dofs[j - 1] + 1), slice(i, j))
-        for i, j in zip(begin, end, strict=True)
-    ]
-    for row, i in runs:
-        for column, j in runs:
-            matrix[:, row, column] += blocks[:, i, j]
 
 
 def bore_contact(
@@ -206,8 +240,7 @@ def bore_contact(
     """
     # gaps of the bore nodes, their gradients, and vertices over the face width
     teeth, first = model.strip.teeth, model.strip.flank_dofs
-    n, p = state.touching.shape
-    b = len(model.strip.bore)
+    n, b = len(state.touching), len(model.strip.bore)
     local = model.bore_positions(frame, state)
     points = np.einsum("sij,spj->spi", frame.turn, local)
     if model.race is not None and state.race is not None:
@@ -217,31 +250,10 @@ def bore_contact(
             points.reshape(-1, 3), state.wave_generator_angle
         )
         gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
-    normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
+    normal = normal.reshape(n, b, 3) @ frame.turn
     vertex, found, bend, covered = _vertices(model, gap, state, kept)
-    # derivative by the masters in the frame: deformation and rotation of the frame
-    carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
-    by_point = normal.transpose(1, 0, 2)
-    carried = np.ascontiguousarray((by_point @ carry).transpose(1, 0, 2))
-    m = frame.position.shape[1]
-    middle = local - frame.centre[:, None] - teeth.position.mean(axis=0)
-    turning = np.cross(middle, normal)
-    s = -spin(frame.position).reshape(n, 3 * m, 3)
-    turning -= carried @ s
-    rows = carried + turning @ frame.gradient
-    rows = rows.reshape(n, b * m, 3) @ frame.turn.transpose(0, 2, 1)
-    rows = np.concatenate([rows.reshape(n, b, 3 * m), by_race], axis=2)
-    # compliance W of nodes, vertices and slopes
-    compliance = teeth.compliance[first:, first:].reshape(b, 3, 3 * b)
-    seen = (by_point @ compliance).reshape(b, n, b, 3)
-    nodal = np.einsum("isjb,sjb->sij", seen, normal)
-    p = b + vertex.shape[1]
-    w = np.zeros((n, p, p))
-    w[:, :b, :b], w[:, b:, :b] = nodal, vertex @ nodal
-    w[:, :b, b:] = w[:, b:, :b].transpose(0, 2, 1)
-    w[:, b:, b:] = w[:, b:, :b] @ vertex.transpose(0, 2, 1)
     # points that can touch, and points that do; slopes follow their vertices
-    lines = found.shape[1]
+    p, lines = b + vertex.shape[1], found.shape[1]
     at, rolls = np.arange(b, b + lines), np.arange(b + lines, p)
     present = np.ones((n, p), dtype=bool)
     present[:, at], present[:, rolls] = found, False
@@ -250,31 +262,64 @@ def bore_contact(
         present[:, :b] &= model.race.covers(model.strip.bore[:, 2])
     active = state.touching & present
     active[:, rolls] = active[:, at] & (state.pressure[:, at] > 0.0)
+    touching = int(active.sum(axis=1).max(initial=0))
+    points = np.argsort(~active, axis=1, kind="stable")[:, :touching]
+    real = np.take_along_axis(active, points, axis=1)
+    # weights of the nodes in the gaps that touch
+    s, k = np.nonzero(real)
+    point, weight = points[s, k], np.zeros((n, touching, b))
+    nodal, across = point < b, point >= b
+    weight[s[nodal], k[nodal], point[nodal]] = 1.0
+    weight[s[across], k[across]] = vertex[s[across], point[across] - b]
+    push = (weight[..., None] * normal[:, None]).reshape(n * touching, 3 * b)
+    # their derivatives by the masters: deformation and rotation of the frame
+    carry, m = teeth.loaded_from_masters[first:], frame.position.shape[1]
+    carried = (push @ carry).reshape(n, touching, 3 * m)
+    middle = local - frame.centre[:, None] - teeth.position.mean(axis=0)
+    arm = np.cross(middle, normal)
+    spun = spin(frame.position).reshape(n, 3 * m, 3)
+    rows = carried + (weight @ arm + carried @ spun) @ frame.gradient
+    rows = rows.reshape(n, touching * m, 3) @ frame.turn.transpose(0, 2, 1)
+    rows = np.concatenate([rows.reshape(n, touching, 3 * m), weight @ by_race], axis=2)
+    # compliance W between the points that touch and nodes, vertices and slopes
+    compliance = teeth.compliance[first:, first:]
+    moved = (push @ compliance).reshape(n, touching, b, 3)
+    w = np.einsum("skbi,sbi->skb", moved, normal)
+    w = np.concatenate([w, w @ vertex.transpose(0, 2, 1)], axis=2)
     # spring of a slope whose vertex carries the force lambda: compliance g''/lambda
+    spring = np.zeros((n, p))
     loaded = np.where(active[:, rolls], state.pressure[:, at], 1.0)
-    w[:, rolls, rolls] += bend / loaded
-    # gaps without the previous forces, and the inverse over the active points
-    moved = model.loads(state) @ teeth.compliance[:, first:]
-    free = gap - np.einsum("spi,spi->sp", normal, moved.reshape(n, b, 3))
-    inverse = np.zeros_like(w)
-    for k in np.flatnonzero(active.any(axis=1)):
-        on = np.ix_(active[k], active[k])
-        inverse[k][on] = np.linalg.inv(w[k][on])
+    spring[:, rolls] = bend / loaded
+    w[s, k, point] += spring[s, point]
+    # its inverse over the points that touch
+    both = real[:, :, None] & real[:, None, :]
+    square = np.take_along_axis(w, points[:, None], axis=2)
+    inverse = np.linalg.inv(np.where(both, square, np.eye(touching))) * both
+    # gaps without the previous forces
+    eased = (model.loads(state) @ teeth.compliance[:, first:]).reshape(n, b, 3)
+    free = gap - np.einsum("sbi,sbi->sb", normal, eased)
 
     def with_vertices(of_nodes: Array) -> Array:
-        return np.concatenate([of_nodes, vertex @ of_nodes], axis=1)
+        return np.concatenate(
+            [of_nodes, (vertex @ of_nodes[..., None])[..., 0]], axis=1
+        )
 
     return BoreContact(
-        gap=with_vertices(gap[..., None])[..., 0],
+        gap=with_vertices(gap),
         normal=normal,
         vertex=vertex,
         found=found,
         present=present,
         active=active,
-        rows=with_vertices(rows),
-        free_gap=with_vertices(free[..., None])[..., 0],
+        points=points,
+        rows=rows,
+        free_gap=with_vertices(free),
         compliance=w,
         inverse=inverse,
+        frame=frame,
+        carry=carry,
+        arm=arm,
+        by_race=by_race,
     )
 
 

@@ -20,8 +20,9 @@ import numpy as np
 from swgjoint.fe.solid.cholesky_cyclic import CholeskyResponse, factorise_ring
 from swgjoint.fe.solid.dense_cyclic import DenseResponse
 from swgjoint.fe.solid.linearise import BoreContact, SolidLinearised
+from swgjoint.fe.solid.sector_matrices import SectorMatrices
 from swgjoint.fe.solid.sector_model import SolidSectorModel
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array, Index, Mask
 
 NEGLIGIBLE = 1e-3
 """Eigenvalues of a change that are neglected, relative to the largest of a sector [-].
@@ -36,35 +37,32 @@ class SolidTangent:
 
         Args:
             model: The 3D model.
-            linear: The linearised ring. Its tangent is overwritten.
+            linear: The linearised ring.
 
         Raises:
             SingularCyclicError: If the tangent is singular.
         """
         if linear.hessian is None:
             raise ValueError("linear: linearised without a tangent")
-        matrix, self._model = linear.hessian, model
+        self._model = model
         self._held = held = model.dofs(model.strip.masters.held)
-        self.by_held = matrix[:, :, held]
+        self.by_held = linear.hessian.columns(held)
         """Columns of the tangent of the degrees of freedom that are held (N, n, h)
         [N/m]."""
-        n_sectors, size = matrix.shape[:2]
-        scale = float(np.mean(np.einsum("sii->si", matrix)))
-        matrix[:, held] = 0.0
-        matrix[:, :, held] = 0.0
-        matrix[:, held, held] = scale
         self._fixed = None
         if linear.race is not None:
-            self._fixed = fixed = np.zeros((n_sectors, size), dtype=bool)
-            fixed[:, model.race_dofs] = linear.race.fixed
-            matrix[fixed] = 0.0
-            matrix.transpose(0, 2, 1)[fixed] = 0.0
-            matrix.reshape(n_sectors, -1)[:, :: size + 1][fixed] = scale
+            self._fixed = np.zeros((model.sectors, model.size), dtype=bool)
+            self._fixed[:, model.race_dofs] = linear.race.fixed
         # a half model is closed by the factors of its last face
         self._sign = sign = model.face_closure
-        matrix[-1, -len(sign) :] *= sign[:, None]
-        matrix[-1, :, -len(sign) :] *= sign
-        self._factor = factorise_ring(matrix, len(sign))
+        supported = _Supported(
+            matrices=linear.hessian,
+            held=held,
+            fixed=self._fixed,
+            sign=sign,
+            scale=linear.hessian.mean_diagonal,
+        )
+        self._factor = factorise_ring(supported, len(sign))
         self._bore = linear.bore
         self._active = linear.bore.active
 
@@ -115,12 +113,11 @@ class SolidTangent:
         old = self._bore
         sectors, shapes, factors = [], [], []
         for s in np.flatnonzero((bore.active != self._active).any(axis=1)):
-            now, was = bore.active[s], self._active[s]
-            both = np.concatenate([bore.rows[s][now], old.rows[s][was]])
-            n = int(now.sum())
+            now, was = int(bore.active[s].sum()), int(self._active[s].sum())
+            both = np.concatenate([bore.rows[s, :now], old.rows[s, :was]])
             middle = np.zeros((len(both), len(both)))
-            middle[:n, :n] = bore.inverse[s][np.ix_(now, now)]
-            middle[n:, n:] = -old.inverse[s][np.ix_(was, was)]
+            middle[:now, :now] = bore.inverse[s, :now, :now]
+            middle[now:, now:] = -old.inverse[s, :was, :was]
             basis, parts = np.linalg.qr(both.T)
             values, vectors = np.linalg.eigh(parts @ middle @ parts.T)
             large = np.abs(values) > NEGLIGIBLE * np.abs(values).max(initial=0.0)
@@ -155,3 +152,35 @@ class TangentResponse:
         moved = self.ring.combine(np.concatenate([factors, -self.correction @ factors]))
         moved[-1, -len(self.sign) :] *= self.sign
         return moved
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Supported:
+    """Matrices of the sectors with some degrees of freedom prescribed."""
+
+    matrices: SectorMatrices
+    held: Index
+    """Prescribed degrees of freedom of every sector (h,)."""
+    fixed: Mask | None
+    """Further ones of each sector (N, n); None without any."""
+    sign: Array
+    """Factors on the degrees of freedom of the face that closes the ring."""
+    scale: float
+    """Diagonal of the prescribed degrees of freedom [N/m]."""
+
+    def __len__(self) -> int:
+        return len(self.matrices)
+
+    def __getitem__(self, sector: int) -> Array:
+        """Matrix of a sector (n, n), a new array."""
+        matrix, still = self.matrices[sector], self.held
+        if self.fixed is not None:
+            still = np.union1d(still, np.flatnonzero(self.fixed[sector]))
+        matrix[still] = 0.0
+        matrix[:, still] = 0.0
+        matrix[still, still] = self.scale
+        if sector == len(self) - 1:
+            size = len(self.sign)
+            matrix[-size:] *= self.sign[:, None]
+            matrix[:, -size:] *= self.sign
+        return matrix

@@ -12,6 +12,7 @@ from swgjoint.fe.solid.cholesky_cyclic import (
     factorise_ring,
 )
 from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
+from swgjoint.fe.solid.sector_matrices import SectorMatrices
 
 
 def blocks(sectors, face, inside, seed=1):
@@ -90,3 +91,20 @@ def test_singular_ring_is_reported_by_either():
     """A ring without any stiffness."""
     with pytest.raises(SingularCyclicError):
         factorise_ring(np.zeros((4, 5, 5)), 2)
+
+
+def test_sector_matrices_are_sums_of_their_terms():
+    """Terms over several runs of degrees of freedom, against full matrices."""
+    rng = np.random.default_rng(5)
+    full, terms = np.zeros((4, 9, 9)), []
+    for dofs in (np.array([0, 1, 2, 5, 6]), np.array([1, 4, 5, 8])):
+        term = rng.normal(size=(4, len(dofs), len(dofs)))
+        term += term.transpose(0, 2, 1)
+        full[:, dofs[:, None], dofs] += term
+        terms.append((dofs, term))
+    matrices = SectorMatrices(size=9, terms=tuple(terms))
+    assert len(matrices) == 4
+    assert np.stack(list(matrices)) == pytest.approx(full, rel=1e-15)
+    columns = np.array([8, 0, 5, 3])
+    assert matrices.columns(columns) == pytest.approx(full[:, :, columns], rel=1e-15)
+    assert matrices.mean_diagonal == pytest.approx(np.einsum("sii->", full) / 36)
