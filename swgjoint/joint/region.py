@@ -9,6 +9,8 @@ the metric does not include, and w the torsion frequency of rotor against link:
 - h n |theta rate| <= 0.5: beyond this bound the step does not resolve the harmonic;
 - h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond these bounds the rotor
   snaps between several equilibrium positions within a step and gains energy;
+  of more than 128 harmonics, C and the next bound contain the largest value of the sum
+  at any phases, see :mod:`swgjoint.maps.phase_bounds`;
 - i sum n e <= 0.56 and K_max <= 30 K: larger values are untested. K_max includes the
   stiffness of hysteresis elements that can stick together;
 - T/(i J), T/J_link <= 1e10 rad/s², here with T at least ``max_torque``: the engine
@@ -79,7 +81,10 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import sticking_stiffness
+from swgjoint.maps.phase_bounds import MANY, largest_sums
+from swgjoint.typing import Array
 
 MAX_SUB_STEPS = 64
 """Largest number of sub-steps; runs that need more are rejected. With this number, an
@@ -245,11 +250,7 @@ def _discrete_bounds(
     m, i, rotor = drive.drive, abs(drive.ratio), drive.rotor_inertia
     sticking = sticking_stiffness(m.hysteresis)
     n = input_orders(m)[1:]
-    e = np.hypot(*m.kinematic_error[1:].T)
-    energy = np.hypot(*np.moveaxis(m.coefficients(m.torsion_knots), -1, 0))[:, 1:]
-    curvature = float(
-        m.ratings.repeated_peak * np.sum(n**2 * e) + np.sum(n**2 * energy.max(axis=0))
-    )
+    slope, curvature = _error_bounds(m, n)
     order = float(n.max(initial=0.0))
     inertia = rotor + drive.link_inertia / i**2
     held = drive.stiffness / i**2
@@ -276,7 +277,7 @@ def _discrete_bounds(
         ),
         RegionBound(
             what="slope of the kinematic error at the rotor, i sum n e",
-            value=i * float(np.sum(n * e)),
+            value=i * slope,
             limit=0.56,
             timestep=None,
         ),
@@ -287,6 +288,27 @@ def _discrete_bounds(
             timestep=None,
         ),
     )
+
+
+def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:
+    """Bounds of the slope of e0 by theta [-] and of the curvature C [N·m/rad].
+
+    Args:
+        drive: Map as simulated.
+        n: Orders of its harmonics per input turn, without the mean [-].
+    """
+    peak, error = drive.ratings.repeated_peak, drive.kinematic_error[1:]
+    energy = drive.coefficients(drive.torsion_knots)[:, 1:]
+    if n.size <= MANY:
+        e, v = (np.hypot(*np.moveaxis(pairs, -1, 0)) for pairs in (error, energy))
+        curvature = peak * np.sum(n**2 * e) + np.sum(n**2 * v.max(axis=0))
+        return float(np.sum(n * e)), float(curvature)
+    orders, n = drive.orders[1:], n[:, None]
+    # the derivative of a cos + b sin is b cos - a sin, times the order
+    by_theta = n * error[:, ::-1] * [1.0, -1.0]
+    slope, of_error = largest_sums(orders, np.stack([by_theta, n**2 * error]))
+    of_energy = largest_sums(orders, n**2 * energy).max()
+    return float(slope), float(peak * of_error + of_energy)
 
 
 def _acceleration_bound(drive: JointDrive, torque: float) -> RegionBound:

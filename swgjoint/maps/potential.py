@@ -33,6 +33,7 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
+from swgjoint.maps.phase_bounds import MANY, largest_sums
 from swgjoint.maps.sums import derivative_sum, error_sums, potential_sums
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
@@ -301,12 +302,13 @@ class Potential:
     def max_stiffness(self) -> float:
         """Largest stiffness over the torsion, bounded over all angles [N·m/rad].
 
-        The bound is evaluated at nine torsions per knot interval and in the linear
-        continuation beyond the knots.
+        The bound is evaluated at nine torsions per knot interval (of many harmonics,
+        three) and in the linear continuation beyond the knots.
         """
+        points = 3 if len(self.orders) - 1 > MANY else 9
         x = np.concatenate(
             [
-                np.linspace(a, b, 9)
+                np.linspace(a, b, points)
                 for a, b in zip(
                     self.torsion_knots, self.torsion_knots[1:], strict=False
                 )
@@ -315,7 +317,7 @@ class Potential:
         inside = self.coefficients(x, 2)
         ends = np.moveaxis(self.end_stiffness, 2, 0)
         values = np.concatenate([inside, ends])
-        swing = np.hypot(values[:, 1:, 0], values[:, 1:, 1]).sum(axis=1)
+        swing = largest_sums(self.orders[1:], values[:, 1:])
         return float(np.max(values[:, 0, 0] + swing))
 
     @property

@@ -17,12 +17,12 @@ of the polynomials, which enclose their values.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import comb
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.maps.phase_bounds import bernstein_coefficients, stiffness_range
 from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
@@ -86,33 +86,5 @@ def torque_amplitudes(drive: Potential) -> Array:
 
     Shape (n_harmonics,).
     """
-    points = _enclosing(drive, 1)
+    points = bernstein_coefficients(drive, 1)
     return np.asarray(np.hypot(points[:, 0], points[:, 1]).max(axis=(1, 2)))
-
-
-def stiffness_range(drive: Potential) -> tuple[float, float]:
-    """Lower and upper bound of the stiffness inside the knots [N·m/rad]."""
-    points = _enclosing(drive, 2)
-    swing = np.hypot(points[1:, 0], points[1:, 1]).max(axis=-1).sum(axis=0)
-    mean = points[0, 0]  # (n_intervals, 3)
-    return float((mean.min(axis=-1) - swing).min()), float(
-        (mean.max(axis=-1) + swing).max()
-    )
-
-
-def _enclosing(drive: Potential, derivative: int) -> Array:
-    """Bernstein coefficients of a derivative of A and B by the torsion.
-
-    Shape (n_harmonics, 2, n_intervals, 5 - derivative).
-    """
-    c = drive.potential
-    for _ in range(derivative):
-        c = c[..., 1:] * np.arange(1, c.shape[-1])
-    degree = c.shape[-1] - 1
-    c = c * np.diff(drive.torsion_knots)[:, None] ** np.arange(degree + 1)
-    # b_i = sum_j C(i, j) / C(n, j) c_j for powers of the fraction of an interval
-    to_points = [
-        [comb(i, j) / comb(degree, j) for j in range(degree + 1)]
-        for i in range(degree + 1)
-    ]
-    return np.asarray(c @ np.array(to_points).T)
