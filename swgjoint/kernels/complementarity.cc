@@ -310,12 +310,32 @@ double StripSolver::coupling(std::size_t k, const Extra& extra) const {
 }
 
 bool StripSolver::solve_extra(const bool* active, bool by_load) {
-  const std::size_t a = inside_.size(), count = extra_.size(), stride = count + 1 + kPadding;
+  const std::size_t a = inside_.size(), count = extra_.size();
   const std::vector<double>&value = value_[by_load], &slack = slack_[by_load];
   const double* q = by_load ? p_.direction : offset_;
-  system_.assign(count * stride, 0.0);
+  // a strip without force is known: as far apart as its law says
+  x_.assign(count, 0.0);
+  unknown_.clear();
   for (std::size_t r = 0; r < count; ++r) {
-    double* row = system_.data() + r * stride;
+    bool known = extra_[r].kind == Kind::kStrip;
+    if (known) {
+      for (const std::size_t j : members_[extra_[r].index]) {
+        known = known && active[j] == p_.closed[j];
+      }
+    }
+    if (!known) {
+      unknown_.push_back(r);
+    } else if (!by_load) {
+      x_[r] = -law_.offset[extra_[r].index];
+    }
+  }
+  const std::size_t size = unknown_.size(), stride = size + 1 + kPadding;
+  system_.assign(size * stride, 0.0);
+  line_.resize(count + 1);
+  for (std::size_t u = 0; u < size; ++u) {
+    const std::size_t r = unknown_[u];
+    std::fill(line_.begin(), line_.end(), 0.0);
+    double* row = line_.data();
     const std::size_t k = extra_[r].index;
     if (extra_[r].kind == Kind::kActive) {
       // its slack is zero
@@ -329,17 +349,8 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
       row[count] = value[row_[k]];
     } else {
       // its approach follows the tangent of the law at the last force
-      bool loaded = false;
-      for (const std::size_t j : members_[k]) {
-        loaded = loaded || active[j] != p_.closed[j];
-      }
-      double d = 0.0;
-      if (loaded) {
-        d = slope_[k];
-        row[count] = by_load ? 0.0 : excess_[k] - d * std::max(force_[k], 0.0);
-      } else {
-        row[count] = by_load ? 0.0 : -law_.offset[k];
-      }
+      const double d = slope_[k];
+      row[count] = by_load ? 0.0 : excess_[k] - d * std::max(force_[k], 0.0);
       for (const std::size_t j : members_[k]) {
         if (active[j] == p_.closed[j]) continue;
         const double unit = d * p_.force_unit[j];
@@ -356,11 +367,14 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
       }
       row[r] += 1.0;
     }
+    for (std::size_t t = 0; t < count; ++t) row[count] -= row[t] * x_[t];
+    double* reduced = system_.data() + u * stride;
+    for (std::size_t v = 0; v < size; ++v) reduced[v] = row[unknown_[v]];
+    reduced[size] = row[count];
   }
-  order_.resize(count);
-  if (!eliminate(system_.data(), count, count + 1, stride, order_.data())) return false;
-  x_.resize(count);
-  for (std::size_t t = 0; t < count; ++t) x_[t] = system_[t * stride + count];
+  order_.resize(size);
+  if (!eliminate(system_.data(), size, size + 1, stride, order_.data())) return false;
+  for (std::size_t u = 0; u < size; ++u) x_[unknown_[u]] = system_[u * stride + size];
   std::copy(value.begin(), value.end(), work_.begin());
   columns_.clear();
   parts_.clear();

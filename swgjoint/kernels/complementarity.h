@@ -115,7 +115,8 @@ class StripSolver {
   std::vector<std::vector<double>> moved_, forced_;  // their effect on values and slacks
   std::vector<std::vector<double>> across_;  // row of the matrix of an active contact
   std::vector<double> system_, x_, work_, rows_;
-  std::vector<std::size_t> order_;
+  std::vector<double> line_;                 // row of the small system
+  std::vector<std::size_t> order_, unknown_;
   std::vector<const double*> columns_;
   std::vector<double> parts_;
   std::vector<double> force_;

@@ -185,6 +185,17 @@ SWGJOINT_WIDE void substitute_back(double* matrix, std::size_t rows, std::size_t
   }
 }
 
+// The same for a single column, by scalar products along the rows.
+SWGJOINT_WIDE void substitute_one(double* matrix, std::size_t rows, std::size_t stride,
+                                  double* column) {
+  for (std::size_t j = rows; j-- > 0;) {
+    double* own = matrix + j * stride;
+    const double known = product(own + j + 1, column + j + 1, rows - j - 1);
+    column[j] = (own[rows] - known) / own[j];
+    own[rows] = column[j];
+  }
+}
+
 }  // namespace
 
 SWGJOINT_WIDE void add_columns(double* y, const double* const* x, const double* a,
@@ -209,7 +220,12 @@ bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t 
                std::size_t* pivots) {
   if (rows * stride <= kSmall) {
     if (!eliminate_columns(matrix, rows, width, stride, pivots)) return false;
-    substitute_back(matrix, rows, width, stride);
+    if (width == rows + 1) {
+      std::vector<double> column(rows);
+      substitute_one(matrix, rows, stride, column.data());
+    } else {
+      substitute_back(matrix, rows, width, stride);
+    }
     return true;
   }
   std::vector<double> panel(kPanel * rows);
