@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "dense_factors.h"
 #include "wide.h"
 
 namespace swgjoint {
@@ -94,8 +95,11 @@ SWGJOINT_WIDE void contact_compliance(const std::int64_t* block_of, std::size_t 
     }
   }
   // all pairs at one offset together, because a block is larger than the fast memory
-  std::vector<double> moved(size);
-  for (std::int64_t apart = 0; apart < count; ++apart) {
+  std::vector<double> moved, parts;
+  std::vector<const double*> rows_of;
+  for (std::int64_t apart = 0; apart <= count / 2; ++apart) {
+    // points the other way around have the same compliance
+    const bool both_ways = apart > 0 && 2 * apart != count;
     for (const Run& run : runs) {
       const std::int64_t at = ((run.tooth + apart) % count + count) % count;
       for (std::ptrdiff_t r = run_of[static_cast<std::size_t>(at)]; r >= 0;
@@ -103,21 +107,24 @@ SWGJOINT_WIDE void contact_compliance(const std::int64_t* block_of, std::size_t 
         const Run& responds = runs[static_cast<std::size_t>(r)];
         for (std::size_t i = responds.from; i < responds.to; ++i) {
           const double* own = weight + size * i;
-          moved.assign(size, 0.0);
+          rows_of.clear();
+          parts.clear();
           for (std::int64_t k = block_of[apart]; k >= 0; k = after[k]) {
             const double* rows = blocks + size * size * static_cast<std::size_t>(k);
             for (std::size_t a = 0; a < size; ++a) {
               if (own[a] == 0.0) continue;
-              const double* row = rows + size * a;
-              for (std::size_t b = run.begin; b < run.end; ++b)
-                moved[b] += own[a] * row[b];
+              rows_of.push_back(rows + size * a + run.begin);
+              parts.push_back(own[a]);
             }
           }
+          const std::size_t width = std::max(run.end, run.begin) - run.begin;
+          moved.assign(width, 0.0);
+          add_columns(moved.data(), rows_of.data(), parts.data(), parts.size(), width);
           for (std::size_t j = run.from; j < run.to; ++j) {
-            const double* other = weight + size * j;
-            double sum = 0.0;
-            for (std::size_t b = run.begin; b < run.end; ++b) sum += moved[b] * other[b];
+            const double* other = weight + size * j + run.begin;
+            const double sum = sum_of_products(moved.data(), other, width);
             result[n * i + j] = sum;
+            if (both_ways) result[n * j + i] = sum;
           }
         }
       }

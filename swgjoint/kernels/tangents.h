@@ -25,7 +25,8 @@ void respond(const std::int64_t* offsets, const double* blocks, std::size_t coun
 // Twin of contact_compliance in swgjoint/fe/common/block_circulant.py, result (n, n):
 // block_of: first block of a tooth offset (teeth,), after: next one of the same offset
 // (n_blocks,), larger than the one before, -1 for none; blocks (n_blocks, size, size),
-// tooth (n,), weight (n, size).
+// tooth (n,), weight (n, size). The blocks are reciprocal: that of the opposite offset is
+// the transpose.
 void contact_compliance(const std::int64_t* block_of, std::size_t teeth,
                         const std::int64_t* after, const double* blocks, std::size_t size,
                         const std::int64_t* tooth, const double* weight, std::size_t n,

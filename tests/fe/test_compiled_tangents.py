@@ -51,6 +51,7 @@ def test_compliance_between_points_as_in_numpy(monkeypatch, most):
     rng = np.random.default_rng(4)
     offsets, teeth, size = np.arange(-most, most + 1), 11, 8
     blocks = rng.normal(size=(len(offsets), size, size))
+    blocks += blocks[::-1].transpose(0, 2, 1)  # reciprocal
     tooth = rng.integers(0, teeth, 20)
     weight = rng.normal(size=(20, size)) * (rng.random((20, size)) < 0.5)
     for n in (20, 1, 0):

@@ -48,7 +48,7 @@ def contact_compliance(
     Args:
         offsets: Offsets of the teeth as in :func:`respond` (n_offsets,).
         blocks: Displacements of one flank per force on another (n_offsets, n_b, n_b)
-            [m/N].
+            [m/N]; by reciprocity, the block of the opposite offset is the transpose.
         tooth: Tooth of each point (n,).
         weight: Derivative of each gap with respect to the flank displacements (n, n_b)
             [-].
