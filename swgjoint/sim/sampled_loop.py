@@ -278,6 +278,7 @@ def control_period(assembly: Assembly) -> tuple[float, int]:
 def run_sampled(
     assembly: Assembly,
     loop: Loop,
+    model: mujoco.MjModel,
     data: mujoco.MjData,
     inputs: Array,
     *,
@@ -290,6 +291,7 @@ def run_sampled(
     Args:
         assembly: The compiled scene.
         loop: The control law.
+        model: Model of the scene that is stepped.
         data: Engine data in the initial state.
         inputs: Actuator inputs without the torques of the loop. Shape (n_steps,
             n_inputs).
@@ -304,7 +306,7 @@ def run_sampled(
         (n_steps + 1, n_joints). The torque of a state is the torque during the step
         that led to it.
     """
-    model, parts, n = assembly.model, assembly.sub_steps, len(inputs)
+    parts, n = assembly.sub_steps, len(inputs)
     joints = len(assembly.joints)
     states = np.empty((n // parts + 1, mujoco.mj_stateSize(model, _STATE)))
     theta, psi, theta_rate, torque, rates, wanted = np.zeros((6, n + 1, joints))

@@ -23,6 +23,7 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
+from swgjoint.sim.stepping import skip_contact_search
 from swgjoint.sim.thermal import Warming
 from swgjoint.typing import Array
 
@@ -125,7 +126,7 @@ def simulate(
             them.
         ComputationError: If the motion diverges or the start has no equilibrium.
     """
-    model, path = assembly.model, assembly.trajectory
+    model, path = skip_contact_search(assembly.model), assembly.trajectory
     inputs = control_inputs(assembly)
     data = mujoco.MjData(model)
     set_start(assembly, data)
@@ -138,6 +139,7 @@ def simulate(
         states, rates, wanted = run_sampled(
             assembly,
             loop or SampledLoop(assembly),
+            model,
             data,
             inputs,
             warming=warming,
