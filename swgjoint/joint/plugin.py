@@ -96,6 +96,17 @@ def _text(values: np.ndarray) -> str:
     return " ".join(map(repr, np.ravel(values).astype(float).tolist()))
 
 
+def _text_by_harmonic(drive: DriveMap, known: dict[bytes, str]) -> str:
+    """Text of the potential; joints of one drive differ by the harmonics left out."""
+    texts = []
+    for row in drive.potential:
+        key = row.tobytes()
+        if key not in known:
+            known[key] = _text(row)
+        texts.append(known[key])
+    return " ".join(texts)
+
+
 def config(
     drive: DriveMap,
     *,
@@ -103,6 +114,7 @@ def config(
     contact_damping: float = 0.0,
     numerical_damping: float = NUMERICAL_DAMPING,
     passes: int = PASSES,
+    known: dict[bytes, str] | None = None,
 ) -> dict[str, str]:
     """Attributes of a plugin instance as text; they contain the whole map.
 
@@ -113,6 +125,8 @@ def config(
             limit acts [N·m·s/rad].
         numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
         passes: See :data:`PASSES`.
+        known: Texts of the potential of single harmonics, which maps of the same drive
+            share; new ones are added.
 
     Returns:
         Attribute texts by key.
@@ -122,7 +136,7 @@ def config(
             "ratio": repr(drive.ratio),
             "orders": " ".join(str(int(n)) for n in np.ravel(drive.angle_orders)),
             "knots": _text(drive.torsion_knots),
-            "potential": _text(drive.potential),
+            "potential": _text_by_harmonic(drive, {} if known is None else known),
             "end_stiffness": _text(drive.end_stiffness),
             "kinematic_error": _text(drive.kinematic_error),
             "damping": repr(float(damping)),
