@@ -74,6 +74,36 @@ def solve_mixed(
     return z / scale, active
 
 
+def first_to_close(matrix: Array, offset: Array, contacts: int, turn: int) -> Mask:
+    r"""Mask of the open contact that a free body closes first as it turns (m,).
+
+    The rotation of the body is the unknown z_k of :math:`g = q + M z`, with the moment
+    balance :math:`g_k = 0`. Without a contact in the active set it has no solution.
+
+    Args:
+        matrix: Matrix M (n, n).
+        offset: Offset q (n,).
+        contacts: Number m of contacts, whose forces are the first unknowns.
+        turn: Index k of the rotation.
+
+    >>> import numpy as np
+    >>> M, q = np.zeros((4, 4)), np.array([0.3, 0.1, 0.1, -1.0])
+    >>> M[3, :3] = M[:3, 3] = [2.0, 1.0, -2.0]
+    >>> first_to_close(M, q, 3, 3).tolist()
+    [False, True, False]
+    """
+    arm = matrix[turn, :contacts]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        force = -offset[turn] / arm
+        opened = offset[:contacts] + np.diag(matrix)[:contacts] * force
+        way = np.abs(opened / arm)
+    possible = (force > 0.0) & np.isfinite(way)
+    first = np.zeros(contacts, dtype=bool)
+    if possible.any():
+        first[np.where(possible, way, np.inf).argmin()] = True
+    return first
+
+
 def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
     """Solution z (n,) in which unilateral unknowns outside the active set are zero."""
     n, m = len(offset), len(active)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.contact_changes import ContactChanges
@@ -68,6 +68,8 @@ class Follower(ABC, Generic[AnyState]):
 
     ratio: float
     """Signed gear ratio i [-]."""
+    loads_free_output: ClassVar[bool] = False
+    """Whether :meth:`load` turns a free output until its teeth resist."""
 
     @property
     @abstractmethod
@@ -185,7 +187,7 @@ class Follower(ABC, Generic[AnyState]):
 
             return follow(start, step)
 
-        if torque == 0.0 or not is_free(state):
+        if torque == 0.0 or self.loads_free_output or not is_free(state):
             direct = loaded(state)
             if direct.outcome.ok or torque == 0.0:
                 return direct

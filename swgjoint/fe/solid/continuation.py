@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import pi
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class SolidContinuation(Follower[SolidState]):
     layout: Layout = "circular_spline_fixed"
     """Which of the three members is fixed."""
     solver: SolidSolver = field(default_factory=SolidSolver)
+    loads_free_output: ClassVar[bool] = True
 
     @property
     def teeth(self) -> int:

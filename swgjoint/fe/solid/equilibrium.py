@@ -15,7 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
+from swgjoint.fe.common.complementarity import (
+    ActiveSetError,
+    first_to_close,
+    solve_mixed,
+)
 from swgjoint.fe.common.cyclic import SingularCyclicError
 from swgjoint.fe.solid.condensation import condense
 from swgjoint.fe.solid.corotation import energies
@@ -240,6 +244,8 @@ def _solve_linear(
         guess = offset[:n] < 0.0
         if state.held is not None and candidates is not None and len(state.held):
             guess = candidates.contacts.share_flank_with(state.held.contacts)
+        elif load.torque is not None:
+            guess |= first_to_close(system, offset, n, output)
         unknown[used], active = solve_mixed(
             system[np.ix_(used, used)], offset[used], n, 0, guess
         )
@@ -367,12 +373,9 @@ def _finished(
         )
         energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
     # moments of the bore forces and of the tooth forces about the axis
-    points = np.einsum(
-        "sij,spj->spi", frames[0].turn, model.bore_positions(frames[0], state)
-    )
-    force = np.einsum(
-        "sij,spj->spi", frames[0].turn, state.bore_force.reshape(points.shape)
-    )
+    turned = frames[0].turn.transpose(0, 2, 1)
+    points = model.bore_positions(frames[0], state) @ turned
+    force = state.bore_force.reshape(points.shape) @ turned
     moment = points[..., 0] * force[..., 1] - points[..., 1] * force[..., 0]
     teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
     energy, torque = model.copies * energy, model.copies * float(moment.sum())

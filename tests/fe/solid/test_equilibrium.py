@@ -36,6 +36,21 @@ def test_teeth_carry_what_wave_generator_and_load_leave(loaded):
     assert abs(loaded.wave_generator_torque - TORQUE / -20) > 1e-5 * TORQUE
 
 
+@pytest.mark.parametrize("torque", [0.4, -TORQUE])
+def test_free_output_turns_until_its_teeth_resist(small_drive, deflected, torque):
+    """One load step, against turning the output in small steps until teeth touch."""
+    free = small_drive.engage(deflected)
+    assert not len(free.tooth_force)
+    ours = small_drive.load(free, torque, 0.0)
+    touching = small_drive._taken_up(free, torque)
+    expected = small_drive.load(touching, torque, 0.0)
+    assert ours.outcome.ok and expected.outcome.ok
+    assert ours.torque == pytest.approx(torque, rel=1e-12)
+    # the solver's tolerance, 1e-10 m
+    assert np.abs(ours.faces - expected.faces).max() < 1e-10
+    assert ours.tooth_force.sum() == pytest.approx(expected.tooth_force.sum(), rel=1e-5)
+
+
 def energy_slopes(drive, state, parts):
     """Relative errors of T_wg against d(U + T psi)/d theta at smooth positions."""
     h, errors = 2e-3 * PITCH, []
