@@ -298,7 +298,7 @@ class Potential:
         )
         return 2.0 * self.ratings.rated_torque / (high - low)
 
-    @property
+    @cached_property
     def max_stiffness(self) -> float:
         """Largest stiffness over the torsion, bounded over all angles [N·m/rad].
 

@@ -85,11 +85,11 @@ class ToleranceSamples:
     order: tuple[int, int] | None = None
     """(p, q) of the passage of teeth; None if it is the pattern of the samples."""
     waves: Index | None = None
-    """Numbers of waves in the cycle that the tables contain; None for any number. Shape
-    (n,)."""
+    """Numbers of waves in the cycle that the map is to have; None lets the fit choose
+    them. Shape (n,)."""
     dropped: float = 0.0
-    """Largest rms over the torques of the output error that waves add which the tables
-    do not contain [rad]."""
+    """Largest rms over the torques of the output error that all other waves add [rad].
+    """
     onsets: bool = False
     """Whether the torques next to zero are those at the ends of a clearance, see
     :func:`swgjoint.fe.common.clearance.across_clearance`."""

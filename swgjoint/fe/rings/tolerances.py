@@ -26,6 +26,7 @@ from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage
 from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.main_harmonics import main_harmonics
 from swgjoint.fe.tolerances.rest import Rest
 from swgjoint.fe.tolerances.sampling import respond_over_torque
 from swgjoint.gear.catalogue import ratings_of
@@ -45,9 +46,6 @@ CHECKS = 4
 CHECK_TORQUE = 0.26
 """Torque of these solves as a fraction of the repeated peak torque, between the sampled
 ones [-]; zero and the rated torque are solved as well."""
-KEEP = 0.01
-"""A harmonic of the errors is kept if the error of the output reaches this fraction of
-the largest one at any torque [-]. Superposed errors differ from full solves by more."""
 _POSITION, _CHECK = "errors-{:04d}", "error-check-{:04d}"
 
 
@@ -117,10 +115,10 @@ class RingErrors:
             self.progress(stage, k + 1, total)
         turns = pitches.size / self.design.drive.teeth_circular_spline
         passages = 0.5 * self.passage.carried_as * turns
-        table, waves, dropped = _main_harmonics(
-            _over_passage(spectra, passages, pitches.size), pitches.size
-        )
         torque = np.concatenate([-levels[::-1], [0.0], levels])
+        table, waves, dropped = self._main_part(
+            _over_passage(spectra, passages, pitches.size), torque, pitches.size, shares
+        )
         if self.free:
             table, torque = with_mean_clearance(table, levels)
         rows, solved = [], thin_ring(self.design)
@@ -146,6 +144,33 @@ class RingErrors:
                 input_torque=input_torque,
             ),
         )
+
+    def _main_part(
+        self, spectrum: Array, torque: Array, count: int, shares: int
+    ) -> tuple[Array, Index, float]:
+        """Table of the resolved waves, the numbers of the main ones, and the others.
+
+        Args:
+            spectrum: Harmonics of output angle, energy and compliance over the cycle
+                (3, n_torques, count // 2 + 1).
+            torque: Torques (n_torques,) [N·m].
+            count: Number of pitches of the cycle.
+            shares: Number of positions of the balls among which the pitches are shared.
+
+        Returns:
+            Table (3, n_torques, count); waves and rms of :func:`main_harmonics`.
+        """
+        # faster waves come from the passage of balls times others: they are not in the
+        # full solves (regression on them gives 0.1 +- 0.1 instead of 1)
+        resolved = (count + shares) // (2 * shares)
+        orders = np.arange(resolved) * (self.design.periodicity / count)
+        waves, dropped = main_harmonics(
+            spectrum[:2, :, :resolved] * (2.0 / count),
+            torque,
+            np.asarray(orders, dtype=np.float64),
+            free=self.free,
+        )
+        return np.fft.irfft(spectrum[..., :resolved], count), waves, dropped
 
     def _over_cycle(
         self,
@@ -331,28 +356,6 @@ def _over_passage(spectra: Sequence[Array], passages: float, count: int) -> Arra
     change = np.fft.irfft(0.5 * (first - second), count)
     wave = np.cos(2.0 * np.pi * round(passages) * np.arange(count) / count)
     return np.asarray(0.5 * (first + second) + np.fft.rfft(change * wave))
-
-
-def _main_harmonics(spectrum: Array, count: int) -> tuple[Array, Index, float]:
-    """Table with its mean and main harmonics only, and their numbers of waves.
-
-    Random errors of single teeth spread over thousands of harmonics. The third result
-    is the largest rms of the output error over the torques that all others add [rad].
-
-    Args:
-        spectrum: Harmonics of output angle, energy and compliance over the cycle (3,
-            n_torques, count // 2 + 1).
-        count: Number of pitches of the cycle.
-    """
-    spectrum = spectrum.copy()
-    spectrum[..., (count + 1) // 2 :] = 0.0  # half as many waves as pitches
-    size = np.abs(spectrum[0, :, 1:])
-    largest = np.maximum(size.max(axis=1, keepdims=True, initial=0.0), 1e-300)
-    kept = np.append(True, (size > KEEP * largest).any(axis=0))
-    others = np.sqrt(2.0 * np.sum(size[:, ~kept[1:]] ** 2, axis=1)) / count
-    spectrum[..., ~kept] = 0.0
-    table = np.fft.irfft(spectrum, count)
-    return table, np.flatnonzero(kept), float(others.max())
 
 
 def _largest_change(errors: tuple[Array, ...]) -> float:

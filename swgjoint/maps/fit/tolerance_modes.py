@@ -215,7 +215,8 @@ def combine_modes(
         potential: Potential of the perfect pattern, as in :class:`Combined`.
         error: Kinematic error of the perfect pattern, as in :class:`Combined`.
         keep: A harmonic is kept if its e0 exceeds this fraction of the largest one [-].
-            Further ones are kept until :data:`LEFT_OUT` is met; zero keeps all.
+            Further ones are kept until :data:`LEFT_OUT` is met, or those that the
+            samples name; zero keeps all of them.
     """
     tolerances, count = samples.tolerances, len(potential)
     assert tolerances is not None
@@ -260,8 +261,11 @@ def combine_modes(
     kept = size > keep * size.max()
     if keep:
         kept[:count] |= ripple[:count] > KEEP_TORQUE * ripple.max()
-        parts, _ = relative_amplitudes(tolerances, teeth)
-        kept[count:] |= ~weakest(parts[others], kept[count:], LEFT_OUT)
+        if tolerances.waves is None:
+            parts, _ = relative_amplitudes(tolerances, teeth)
+            kept[count:] |= ~weakest(parts[others], kept[count:], LEFT_OUT)
+        else:  # the samples name the harmonics
+            kept[count:] = True
     else:
         kept[:] = True
     kept[0] = True

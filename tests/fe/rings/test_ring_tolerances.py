@@ -251,15 +251,3 @@ def test_unstable_superpositions_are_no_equilibria(monkeypatch):
     kept = np.ones((2, 4), dtype=bool)
     kept[1, 2] = False
     assert np.array_equal(found[:, kept], table[:, kept])
-
-
-def test_the_rms_of_the_dropped_harmonics_is_that_of_what_is_missing():
-    """By Parseval: the table of all harmonics minus that of the kept ones."""
-    rng, count = np.random.default_rng(0), 401
-    table = rng.normal(size=(3, 2, count)) * np.array([1.0, 5.0])[:, None]
-    table += 300.0 * np.cos(2.0 * np.pi * 7 / count * np.arange(count))
-    spectrum = np.fft.rfft(table)
-    kept, waves, dropped = ring_tolerances._main_harmonics(spectrum, count)
-    assert 7 in waves and waves.size < 20
-    missing = (table - kept)[0]
-    assert dropped == pytest.approx(missing.std(axis=-1).max(), rel=1e-12)
