@@ -91,8 +91,8 @@ def condense(
         sector = found.contacts.sector
         loads = model.loads(state)
         flank = strip.flank_dofs
-        through = found.weight @ strip.teeth.compliance[:flank]
-        at_bore = through[:, flank:].reshape(n, -1, 3)
+        at_bore = found.weight @ strip.teeth.compliance[:flank, flank:]
+        at_bore = at_bore.reshape(n, -1, 3)
         coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
         coupling = bore.with_vertices(coupling, sector)
         at_points = np.take_along_axis(coupling, bore.points[sector], axis=1)
@@ -103,7 +103,10 @@ def condense(
         same = sector[:, None] == sector[None, :]
         local = model.teeth.compliance(found)
         local -= np.where(same, eased @ at_points.T, 0.0)
-        old = np.einsum("kb,kb->k", through, loads[sector])
+        # change of the gaps by the previous forces; few sectors have candidates
+        near, place = np.unique(sector, return_inverse=True)
+        pushed = loads[near] @ strip.teeth.compliance[:, :flank]
+        old = np.einsum("kb,kb->k", found.weight, pushed[place])
         if model.teeth.elastic_circular_spline is not None:
             moved = model.teeth.elastic_circular_spline.displacement(
                 state.circular_spline_force
