@@ -22,6 +22,31 @@ void error_sums(In<2> phases, In<2> amplitudes, Orders orders, Out<2> cos, Out<2
                        sin.data(), result.data());
 }
 
+void error_sums_at(In<1> theta, In<1> psi, In<1> of_theta, In<1> of_psi, Orders which,
+                   In<2> amplitudes, Orders orders, Out<2> cos, Out<2> sin,
+                   Out<2> result) {
+  const std::size_t n = theta.shape(0), h = which.shape(0);
+  require(psi.shape(0) == n, "theta, psi: (n,)");
+  require(which.shape(1) == 2 && amplitudes.shape(0) == h && amplitudes.shape(1) == 2 &&
+              orders.shape(0) == h && orders.shape(1) == 2,
+          "which, amplitudes, orders: (h, 2)");
+  require(cos.shape(0) == n && cos.shape(1) == h && sin.shape(0) == n && sin.shape(1) == h,
+          "cos, sin: (n, h)");
+  require(result.shape(0) == 3 && result.shape(1) == n, "result: (3, n)");
+  const std::size_t u = of_theta.shape(0), v = of_psi.shape(0);
+  for (std::size_t k = 0; k < h; ++k) {
+    const std::int64_t i = which.data()[2 * k], j = which.data()[2 * k + 1];
+    require(i >= 0 && i < static_cast<std::int64_t>(u) && j >= 0 &&
+                j < static_cast<std::int64_t>(v),
+            "which: indices of the numbers of waves");
+  }
+  const nb::gil_scoped_release release;
+  swgjoint::error_sums_at(theta.data(), psi.data(), n, h,
+                          {of_theta.data(), of_psi.data(), which.data(), u, v},
+                          amplitudes.data(), orders.data(), cos.data(), sin.data(),
+                          result.data());
+}
+
 void potential_sums(In<1> torsion, In<2> cos, In<2> sin, Orders orders, In<1> knots,
                     Powers powers, In<3> ends, bool torque, bool stiffness, bool by_phase,
                     Out<2> result) {
@@ -69,6 +94,12 @@ void yield_torsions(Index first, In<1> at, In<1> yields, In<1> stiffness, In<1> 
 
 void bind_map(nb::module_& m) {
   m.def("error_sums", &error_sums, nb::arg("phases").noconvert(),
+        nb::arg("amplitudes").noconvert(), nb::arg("orders").noconvert(),
+        nb::arg("cos").noconvert(), nb::arg("sin").noconvert(),
+        nb::arg("result").noconvert());
+  m.def("error_sums_at", &error_sums_at, nb::arg("theta").noconvert(),
+        nb::arg("psi").noconvert(), nb::arg("of_theta").noconvert(),
+        nb::arg("of_psi").noconvert(), nb::arg("which").noconvert(),
         nb::arg("amplitudes").noconvert(), nb::arg("orders").noconvert(),
         nb::arg("cos").noconvert(), nb::arg("sin").noconvert(),
         nb::arg("result").noconvert());

@@ -30,13 +30,29 @@ double add(const double* v, std::size_t n) {
   return sum;
 }
 
+// Kinematic error and its derivatives from cosines and sines, n doubles apart.
+void add_errors(const double* cos, const double* sin, std::size_t h,
+                const double* amplitudes, const std::int64_t* orders, double* terms,
+                double* result, std::size_t n) {
+  double *error = terms, *theta = error + h, *psi = theta + h;
+  for (std::size_t k = 0; k < h; ++k) {
+    const double a = amplitudes[2 * k], b = amplitudes[2 * k + 1];
+    const double slope = b * cos[k] - a * sin[k];
+    error[k] = a * cos[k] + b * sin[k];
+    theta[k] = slope * static_cast<double>(orders[2 * k]);
+    psi[k] = slope * static_cast<double>(orders[2 * k + 1]);
+  }
+  result[0] = add(error, h);
+  result[n] = add(theta, h);
+  result[2 * n] = add(psi, h);
+}
+
 }  // namespace
 
 void error_sums(const double* phases, std::size_t n, std::size_t h,
                 const double* amplitudes, const std::int64_t* orders, double* cos,
                 double* sin, double* result) {
   std::vector<double> terms(3 * h);
-  double *error = terms.data(), *theta = error + h, *psi = theta + h;
   for (std::size_t p = 0; p < n; ++p) {
     const double* phase = phases + p * h;
     double *c = cos + p * h, *s = sin + p * h;
@@ -44,16 +60,34 @@ void error_sums(const double* phases, std::size_t n, std::size_t h,
       c[k] = std::cos(phase[k]);
       s[k] = std::sin(phase[k]);
     }
-    for (std::size_t k = 0; k < h; ++k) {
-      const double a = amplitudes[2 * k], b = amplitudes[2 * k + 1];
-      const double slope = b * c[k] - a * s[k];
-      error[k] = a * c[k] + b * s[k];
-      theta[k] = slope * static_cast<double>(orders[2 * k]);
-      psi[k] = slope * static_cast<double>(orders[2 * k + 1]);
+    add_errors(c, s, h, amplitudes, orders, terms.data(), result + p, n);
+  }
+}
+
+void error_sums_at(const double* theta, const double* psi, std::size_t n, std::size_t h,
+                   const WaveNumbers& numbers, const double* amplitudes,
+                   const std::int64_t* orders, double* cos, double* sin,
+                   double* result) {
+  const std::size_t u = numbers.count_theta, v = numbers.count_psi;
+  std::vector<double> terms(3 * h), waves(2 * (u + v));
+  double *c_theta = waves.data(), *s_theta = c_theta + u;
+  double *c_psi = s_theta + u, *s_psi = c_psi + v;
+  for (std::size_t p = 0; p < n; ++p) {
+    for (std::size_t k = 0; k < u; ++k) {
+      c_theta[k] = std::cos(theta[p] * numbers.theta[k]);
+      s_theta[k] = std::sin(theta[p] * numbers.theta[k]);
     }
-    result[p] = add(error, h);
-    result[n + p] = add(theta, h);
-    result[2 * n + p] = add(psi, h);
+    for (std::size_t k = 0; k < v; ++k) {
+      c_psi[k] = std::cos(psi[p] * numbers.psi[k]);
+      s_psi[k] = std::sin(psi[p] * numbers.psi[k]);
+    }
+    double *c = cos + p * h, *s = sin + p * h;
+    for (std::size_t k = 0; k < h; ++k) {
+      const std::int64_t i = numbers.which[2 * k], j = numbers.which[2 * k + 1];
+      c[k] = c_theta[i] * c_psi[j] - s_theta[i] * s_psi[j];
+      s[k] = s_theta[i] * c_psi[j] + c_theta[i] * s_psi[j];
+    }
+    add_errors(c, s, h, amplitudes, orders, terms.data(), result + p, n);
   }
 }
 

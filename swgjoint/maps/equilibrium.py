@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from swgjoint.errors import ComputationError
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sliders import Sliders
-from swgjoint.maps.sums import error_sums, potential_sums
+from swgjoint.maps.sums import error_sums_at, potential_sums
 from swgjoint.typing import Array
 
 CHUNK = 2**14
@@ -118,7 +118,7 @@ def _torque(
 
     Without ``tangent`` the second array is empty.
     """
-    cos, sin, (e0, _, e_psi) = error_sums(drive, drive.phases(theta, psi))
+    cos, sin, (e0, _, e_psi) = error_sums_at(drive, theta, psi)
     x = theta / drive.ratio + e0 - psi
     wanted = ["torque"]
     if tangent:

@@ -30,12 +30,12 @@ from swgjoint.arrays import frozen_array
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
 from swgjoint.gear.ratings import Ratings
+from swgjoint.maps import sums
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
 from swgjoint.maps.phase_bounds import MANY, largest_sums
-from swgjoint.maps.sums import derivative_sum, error_sums, potential_sums
-from swgjoint.typing import Array
+from swgjoint.typing import Array, Index
 from swgjoint.units import arcmin
 
 
@@ -146,6 +146,12 @@ class Potential:
         orders.setflags(write=False)
         return orders
 
+    @cached_property
+    def wave_numbers(self) -> tuple[Array, Array, Index]:
+        """Different orders of theta and of psi, and their indices (n_harmonics, 2)."""
+        u, v = (np.unique(n, return_inverse=True) for n in self.angle_orders.T)
+        return u[0].astype(float), v[0].astype(float), np.stack([u[1], v[1]], axis=-1)
+
     @property
     def friction_direction(self) -> tuple[int, int]:
         """Derivatives by theta and psi of beta, the rotation that friction opposes."""
@@ -168,7 +174,7 @@ class Potential:
 
         ``phases`` are those of :meth:`phases` [rad]. Shape (..., n_harmonics).
         """
-        return error_sums(self, phases)[2]
+        return sums.error_sums(self, phases)[2]
 
     def torsion(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Torsion theta/i + e0 - psi [rad].
@@ -221,8 +227,8 @@ class Potential:
 
     def _sum(self, torsion: ArrayLike, phases: Array, derivative: int) -> Array:
         """A derivative of V by the torsion at given phases."""
-        cos, sin, _ = error_sums(self, phases)
-        return derivative_sum(self, torsion, cos, sin, derivative)
+        cos, sin, _ = sums.error_sums(self, phases)
+        return sums.derivative_sum(self, torsion, cos, sin, derivative)
 
     def energy(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Potential V at given torsion and angles [J].
@@ -274,11 +280,11 @@ class Potential:
             theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
-        cos, sin, (e0, e_theta, e_psi) = error_sums(self, self.phases(theta, psi))
+        cos, sin, (e0, e_theta, e_psi) = sums.error_sums_at(self, theta, psi)
         x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float) + e0
         g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
-        sums = potential_sums(self, x, cos, sin, "torque", "by_phase")
-        torque, by_theta, by_psi = sums
+        found = sums.potential_sums(self, x, cos, sin, "torque", "by_phase")
+        torque, by_theta, by_psi = found
         return Law(
             torsion=x,
             by_theta=g_theta,

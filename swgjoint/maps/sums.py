@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.kernels import kernels
+from swgjoint.maps.phase_bounds import MANY
 from swgjoint.typing import Array
 
 if TYPE_CHECKING:
@@ -45,18 +46,61 @@ def error_sums(
         e0, by_theta, by_psi = sums.reshape(3, *phases.shape[:-1])
         return cos, sin, (e0, by_theta, by_psi)
     cos, sin = np.cos(phases), np.sin(phases)
+    return cos, sin, _errors(drive, cos, sin)
+
+
+def _errors(drive: Potential, cos: Array, sin: Array) -> tuple[Array, Array, Array]:
+    """Kinematic error [rad] and its derivatives from cosines and sines of phases."""
     a, b = drive.kinematic_error.T
     slope = b * cos - a * sin
     n_theta, n_psi = drive.angle_orders.T
     return (
-        cos,
-        sin,
-        (
-            np.sum(a * cos + b * sin, axis=-1),
-            np.sum(slope * n_theta, axis=-1),
-            np.sum(slope * n_psi, axis=-1),
-        ),
+        np.sum(a * cos + b * sin, axis=-1),
+        np.sum(slope * n_theta, axis=-1),
+        np.sum(slope * n_psi, axis=-1),
     )
+
+
+def error_sums_at(
+    drive: Potential, theta: ArrayLike, psi: ArrayLike
+) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+    """Result of :func:`error_sums` at given angles.
+
+    Cosines and sines of many harmonics, as of tooth errors, are products of those of
+    the few numbers of waves that they share, which takes a fifth of the time. They
+    differ from those of the phases by round-off.
+
+    Args:
+        drive: The map.
+        theta: Input angle [rad].
+        psi: Output angle [rad], of a shape that broadcasts with theta.
+    """
+    if len(drive.orders) <= MANY:
+        return error_sums(drive, drive.phases(theta, psi))
+    of_theta, of_psi, which = drive.wave_numbers
+    theta, psi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(psi, float))
+    if (native := kernels()) is not None:
+        cos, sin = np.empty((2, *theta.shape, len(which)))
+        sums = np.empty((3, theta.size))
+        native.error_sums_at(
+            np.ascontiguousarray(theta).reshape(-1),
+            np.ascontiguousarray(psi).reshape(-1),
+            of_theta,
+            of_psi,
+            which,
+            np.ascontiguousarray(drive.kinematic_error),
+            np.ascontiguousarray(drive.angle_orders),
+            cos.reshape(-1, len(which)),
+            sin.reshape(-1, len(which)),
+            sums,
+        )
+        e0, by_theta, by_psi = sums.reshape(3, *theta.shape)
+        return cos, sin, (e0, by_theta, by_psi)
+    about_theta, about_psi = theta[..., None] * of_theta, psi[..., None] * of_psi
+    c1, s1 = (f(about_theta)[..., which[:, 0]] for f in (np.cos, np.sin))
+    c2, s2 = (f(about_psi)[..., which[:, 1]] for f in (np.cos, np.sin))
+    cos, sin = c1 * c2 - s1 * s2, s1 * c2 + c1 * s2
+    return cos, sin, _errors(drive, cos, sin)
 
 
 def derivative_sum(

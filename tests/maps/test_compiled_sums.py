@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from swgjoint.kernels import kernels
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Jenkin, stretches
+from swgjoint.maps.phase_bounds import MANY
 from swgjoint.maps.sliders import Sliders
+from swgjoint.maps.sums import error_sums, error_sums_at
 
 pytestmark = pytest.mark.skipif(kernels() is None, reason="needs the compiled loops")
 
@@ -48,6 +52,37 @@ def test_sums_over_harmonics(monkeypatch, synthetic_map, shape):
     for got, wanted in zip(*both(monkeypatch, compute), strict=True):
         assert np.shape(got) == shape
         assert np.array_equal(got, wanted)
+
+
+@pytest.mark.parametrize("shape", [(), (50,), (4, 7)])
+def test_sums_over_many_harmonics(monkeypatch, synthetic_map, shape):
+    """Products of waves: the same bits as numpy, and round-off from the phases."""
+    rng = np.random.default_rng(11)
+    orders = [(a, b) for a in range(12) for b in range(-14, 15) if (a, b) > (0, 0)]
+    orders = np.array([(0, 0), *orders])
+    size = len(orders)
+    drive = replace(
+        synthetic_map,
+        orders=orders,
+        kinematic_error=1e-5 * rng.normal(size=(size, 2)),
+        potential=1e-3 * rng.normal(size=(size, *synthetic_map.potential.shape[1:])),
+        end_stiffness=rng.normal(size=(size, 2, 2)),
+    )
+    assert size > MANY
+    theta = rng.uniform(-90.0, 90.0, shape)
+    psi = theta / drive.ratio + rng.uniform(-1e-3, 1e-3, shape)
+
+    def compute():
+        cos, sin, errors = error_sums_at(drive, theta, psi)
+        return cos, sin, *errors
+
+    found, plain = both(monkeypatch, compute)
+    for got, wanted in zip(found, plain, strict=True):
+        assert got.shape == wanted.shape
+        assert np.allclose(got, wanted, rtol=0.0, atol=1e-14)
+    cos, sin, errors = error_sums(drive, drive.phases(theta, psi))
+    for got, wanted in zip(found, (cos, sin, *errors), strict=True):
+        assert np.allclose(got, wanted, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 50, 129, 300])
