@@ -24,7 +24,7 @@ from swgjoint.typing import Array, Index
 SHARE = 0.31
 """Largest rms of the harmonics left out of an octave, as a fraction of its rms [-].
 They lower its rms by 1 - sqrt(1 - 0.31²) = 5 %, as much as other meshes and maps change
-a ripple. The superposition itself deviates from full solves by as much: by 28, 17 and
+a ripple. The superposition itself deviates from full solves by as much: by 27, 16 and
 18 % of the rms input torque of size-25-100-bought-coarse at 6, 31 and 88 N·m (229
 positions)."""
 FAINT = 1e-3
