@@ -131,7 +131,8 @@ SWGJOINT_INLINE void DriveMap::HalfStep(double dtheta, double dpsi) {
 
 // Adds to `out` the polynomial coefficients of a weighted sum over the harmonics in one
 // segment; `weight` points to the weights of A and B in the first block.
-void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
+SWGJOINT_CLONES void DriveMap::Combine(int segment, const double* weight,
+                                       double out[5]) const {
   Lanes sum[5] = {};
   // data() is used because a map without harmonics has an empty table
   const double* row = table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock;
