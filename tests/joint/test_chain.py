@@ -11,6 +11,7 @@ import pytest
 from swgjoint.joint.attach import attach
 from swgjoint.joint.response import responses
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 
 LINKS = ((8.0, 0.42), (6.0, 0.38), (2.0, 0.1), (1.2, 0.1), (1.2, 0.1), (0.3, 0.06))
 
@@ -204,3 +205,48 @@ def test_a_drive_is_predicted_with_all_other_joints_free():
         rotor, link_torque = (rate[dofs] - state) / response[dofs]
         assert abs(link_torque) > 1.0
         assert rotor * joint.ratio == pytest.approx(-link_torque, rel=1e-6)
+
+
+def test_a_drive_gets_the_same_bits_alone_and_among_others(synthetic_map):
+    """The plugin predicts up to eight drives together; here there are twelve.
+
+    Every third one has hysteresis. The drives are on separate bodies, so that none
+    changes the motion of another.
+    """
+    elements = (Jenkin(stiffness=4e3, yield_torque=1.0),)
+    rng = np.random.default_rng(5)
+    turns, speeds = rng.uniform(-1e-3, 1e-3, 12), rng.uniform(-40.0, 40.0, 12)
+
+    def torques(numbers):
+        spec = mujoco.MjSpec()
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        for k in numbers:
+            body = spec.worldbody.add_body(name=f"link{k}")
+            body.add_joint(name=f"j{k}")
+            body.mass, body.inertia, body.explicitinertial = 1.0, [0.1] * 3, True
+        drives = [
+            attach(
+                spec,
+                joint=f"j{k}",
+                drive=replace(synthetic_map, hysteresis=() if k % 3 else elements),
+                rotor_inertia=1e-4,
+                friction=False,
+            )
+            for k in numbers
+        ]
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        for k, drive in zip(numbers, drives, strict=True):
+            data.joint(drive.joint).qpos = turns[k]
+            data.joint(drive.rotor).qvel = speeds[k]
+        mujoco.mj_forward(model, data)
+        return [
+            data.qfrc_passive[model.joint(name).dofadr[0]]
+            for drive in drives
+            for name in (drive.rotor, drive.joint)
+        ]
+
+    together = torques(range(12))
+    alone = [torque for k in range(12) for torque in torques([k])]
+    assert together == alone
+    assert np.ptp(alone) > 1.0
