@@ -50,7 +50,7 @@ def solve_map(
     """
     check_level(design, model)
     if model == "3d":
-        hint = "takes 7 to 15 min; 2d and ring are faster"
+        hint = "takes 2 to 5 min; 2d and ring are faster"
         progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
     if model == "ring":
         samples = thin_ring.sample_thin_rings(
