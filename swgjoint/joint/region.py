@@ -303,8 +303,9 @@ def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:
         e, v = (np.hypot(*np.moveaxis(pairs, -1, 0)) for pairs in (error, energy))
         curvature = peak * np.sum(n**2 * e) + np.sum(n**2 * v.max(axis=0))
         return float(np.sum(n * e)), float(curvature)
-    orders, n = drive.orders[1:], n[:, None]
-    # the derivative of a cos + b sin is b cos - a sin, times the order
+    orders = drive.orders[1:]
+    # the derivative of a cos + b sin is b cos - a sin, times the order with its sign
+    n = (drive.angle_orders[1:] @ [1.0, 1.0 / drive.ratio])[:, None]
     by_theta = n * error[:, ::-1] * [1.0, -1.0]
     slope, of_error = largest_sums(orders, np.stack([by_theta, n**2 * error]))
     of_energy = largest_sums(orders, n**2 * energy).max()

@@ -75,7 +75,7 @@ def error_sums_at(
         theta: Input angle [rad].
         psi: Output angle [rad], of a shape that broadcasts with theta.
     """
-    if len(drive.orders) <= MANY:
+    if len(drive.orders) - 1 <= MANY:
         return error_sums(drive, drive.phases(theta, psi))
     of_theta, of_psi, which = drive.wave_numbers
     theta, psi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(psi, float))

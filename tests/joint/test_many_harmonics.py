@@ -54,6 +54,26 @@ def test_the_region_is_that_of_the_largest_sum(bench):
     )
 
 
+def test_the_sign_of_orders_does_not_matter(bench):
+    """Orders and sine amplitudes of the opposite sign make the same function."""
+    drive = with_many_harmonics(np.random.default_rng(6))
+    sign = np.where(np.arange(len(drive.orders)) % 3 == 1, -1, 1)
+    swapped = np.stack([np.ones(sign.size), sign], axis=1)
+    mirrored = replace(
+        drive,
+        orders=drive.orders * sign[:, None],
+        kinematic_error=drive.kinematic_error * swapped,
+        potential=drive.potential * swapped[:, :, None, None],
+        end_stiffness=drive.end_stiffness * swapped[:, :, None],
+    )
+    found = []
+    for one in (drive, mirrored):
+        b = bench(one, step=1e-3, rotor_inertia=1e-4, link=1.0)
+        bounds = check_region(b.drive, timestep=1e-3).bounds
+        found.append([bound.value for bound in bounds])
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
 @pytest.mark.parametrize("rotor", [1e-6, 1e-5, 1e-4])
 def test_free_joints_gain_no_energy(bench, rotor):
     """Without losses, from the edge of the region inwards, at random speeds."""
