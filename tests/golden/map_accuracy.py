@@ -33,7 +33,7 @@ PARTS = (0.02, 0.045, 0.1, 0.19, 0.31, 0.47, 0.63, 0.87)
 """Torques in parts of the repeated peak torque; no record of a map has any of them."""
 ANGLES = 12
 MANY_PARTS = tuple(float(part) for part in np.linspace(0.02, 0.98, 36))
-MANY_ANGLES = 20
+MANY_ANGLES = 40
 """Of the comparison that shows how much of the largest difference a record states."""
 DESIGNS = (
     "reference-2d",
