@@ -265,6 +265,8 @@ def experiments(results: Sequence[Row]) -> list[list[str]]:
         "play of the coupling": "play of the coupling, 20 arcsec at ratio 50 and 10 at"
         " ratio 100",
         "coupling of 200 N·m/rad": "elastic coupling of 200 N·m/rad at the input",
+        "flank, thinner teeth and coupling together": "flank of 28 deg, 1 % thinner"
+        " teeth and elastic coupling together",
     }
     (result,) = results
     head = ["change (size 25, short cup, 20 deg)", "K1(50)/K1(100)", "K2(50)/K2(100)"]
