@@ -46,9 +46,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--rotor-inertia",
         type=float,
         metavar="KGM2",
-        help="inertia of rotor and wave generator about their axis [kg·m²]; required"
-        " for drives that are not in the catalogue; default: twice the inertia of the"
-        " wave generator",
+        help="inertia of rotor and wave generator about their axis [kg·m²]; default:"
+        " twice the inertia of the wave generator, which follows ratio and rated"
+        " torque",
     )
     parser.add_argument(
         "--step",
@@ -92,13 +92,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``format`` and ``files``; for ``mjcf`` also ``arm``, ``step_s``,
-        ``drives_by_rule``, ``joints`` (by name: ``drive``, ``ratio``,
-        ``rotor_inertia_kgm2`` and the differences from level full: ``up_to_Nm``,
-        ``torsion_arcmin``, ``left_out_error_pp_arcmin``, ``left_out_ripple_pp_Nm``,
-        ``link_angle_arcmin``, ``resonance`` with frequency and damping ratio at
-        ``native`` and ``full``, ``notes``); for ``fmu`` also ``drive``, ``fmi``,
-        ``variables`` (list of objects with ``name``, ``kind``, ``unit``, ``start`` and
-        ``description``).
+        ``drives_by_rule``, ``rotors_assumed``, ``joints`` (by name: ``drive``,
+        ``ratio``, ``rotor_inertia_kgm2`` and the differences from level full:
+        ``up_to_Nm``, ``torsion_arcmin``, ``left_out_error_pp_arcmin``,
+        ``left_out_ripple_pp_Nm``, ``link_angle_arcmin``, ``resonance`` with
+        frequency and damping ratio at ``native`` and ``full``, ``notes``); for ``fmu``
+        also ``drive``, ``fmi``, ``variables`` (list of objects with ``name``, ``kind``,
+        ``unit``, ``start`` and ``description``).
 
     Raises:
         InputError: If an option does not fit the format.
@@ -173,6 +173,7 @@ def _mjcf(args: argparse.Namespace) -> dict[str, Any]:
         "arm": args.source,
         "step_s": result.step,
         "drives_by_rule": by_rule,
+        "rotors_assumed": args.rotor_inertia is None,
         "joints": {
             name: result.errors[name].as_json(drive)
             for name, drive in result.drives.items()
@@ -257,6 +258,10 @@ def _mjcf_text(result: dict[str, Any]) -> str:
         for note in joint["notes"]:
             notes.setdefault(note, []).append(name)
     count = len(result["joints"])
+    inertias = {
+        f"{joint['rotor_inertia_kgm2']:g} kg·m²": None
+        for joint in result["joints"].values()
+    }
     by_rule = (
         "drives selected as by swgjoint run; to select others: --drive [JOINT=]NAME"
     )
@@ -266,6 +271,14 @@ def _mjcf_text(result: dict[str, Any]) -> str:
         " angle and torque, and resonance at the time step of"
         f" {1e3 * result['step_s']:g} ms:",
         table(rows, header=header),
+        *(
+            [
+                f"rotor inertia: {', '.join(inertias)}; assumed for the drive of the"
+                " joint; another: --rotor-inertia VALUE"
+            ]
+            if result["rotors_assumed"]
+            else []
+        ),
         *(
             note + ("" if len(names) == count else f" ({', '.join(names)})")
             for note, names in notes.items()

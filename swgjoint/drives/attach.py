@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack, overload
 import mujoco
 
 from swgjoint.drives.references import drive_of, load_drive
-from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.faults import validate
@@ -113,8 +113,8 @@ def attach(
         drive: Drive of that hinge.
         level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
         rotor_inertia: Inertia of rotor and wave generator about their axis [kg·m²].
-            None is accepted for catalogue drives: twice the inertia of the wave
-            generator.
+            None assumes twice the inertia of the wave generator, which follows ratio
+            and rated torque; not with a drive of a single stiffness.
         damping_ratio: Damping ratio of the torsional vibration between rotor and link
             [-], with the link inertia at qpos0 and the other joints locked; None takes
             the value of the map.
@@ -270,12 +270,10 @@ def _celsius(value: Any) -> float:
 
 
 def _rotor(joint: str, drive: DriveMap, rotor_inertia: float | None) -> float:
-    """Inertia of the rotor [kg·m²]: the caller's value or the catalogue's."""
+    """Inertia of the rotor [kg·m²]: the caller's value or the assumed one."""
     if rotor_inertia is not None:
         return rotor_inertia
-    assumed = (
-        catalogue_rotor_inertia(drive.name) if drive.level == "catalogue" else None
-    )
+    assumed = rotor_inertia_of(drive)
     if assumed is None:
         raise InputError(
             f"joint {joint!r}: the rotor inertia of drive {drive.name!r} is unknown;"

@@ -20,7 +20,7 @@ from swgjoint.drives.fmu_variables import (
     fixed_variables,
 )
 from swgjoint.drives.references import load_drive
-from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.files import check_output_file, read_regular, write_whole
 from swgjoint.joint.plugin import config, friction_numbers
@@ -102,8 +102,8 @@ def export_fmu(
         drive: A map, a design, or the name or path of either.
         path: The file to write, which ends in ``.fmu``.
         version: Version of FMI, ``3.0`` or ``2.0``.
-        rotor_inertia: Start value of the rotor's inertia [kg·m²]; None is accepted for
-            catalogue drives.
+        rotor_inertia: Start value of the rotor's inertia [kg·m²]; None assumes twice
+            the inertia of the wave generator.
         load_inertia: Start value of the load's inertia [kg·m²]; None takes that of the
             rotor reflected to the output, i²J.
         step: Start value of ``internal_step`` [s].
@@ -127,9 +127,7 @@ def export_fmu(
             " swgjoint with a C++ compiler present"
         )
     source = load_drive(drive, model=model)
-    rotor = rotor_inertia
-    if rotor is None and source.level == "catalogue":
-        rotor = catalogue_rotor_inertia(source.name)
+    rotor = rotor_inertia_of(source) if rotor_inertia is None else rotor_inertia
     if rotor is None:
         raise InputError(
             f"the rotor inertia of drive {source.name!r} is unknown; set rotor_inertia"

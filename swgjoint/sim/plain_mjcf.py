@@ -72,7 +72,7 @@ def export_mjcf(
         drives: One drive for all hinges, or drives by joint name or pattern as in
             :func:`swgjoint.attach`. Names may omit the suffix ``_joint``.
         rotor_inertia: Inertia of rotor and wave generator about their axis [kg·m²].
-            None is accepted for catalogue drives.
+            None assumes twice the inertia of each drive's wave generator.
         model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``.
         step: Time step [s]; None takes that of the arm's file.
         motors: Whether joints with a drive but without an actuator get a motor

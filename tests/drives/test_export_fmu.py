@@ -298,7 +298,6 @@ def test_equal_drives_give_equal_files(synthetic_map, tmp_path):
         ({"rotor_inertia": 0.0}, ("rotor_inertia", "kg·m²", "> 0")),
         ({"load_inertia": float("nan")}, ("load_inertia", "nan kg·m²")),
         ({"step": -1.0}, ("step", "-1 s")),
-        ({"rotor_inertia": None}, ("rotor_inertia", "synthetic")),
     ],
 )
 def test_bad_values_are_refused(synthetic_map, tmp_path, options, parts):

@@ -14,7 +14,7 @@ from typing import Any
 
 from swgjoint.csv_text import csv_text
 from swgjoint.drives.references import given_drives, load_drive
-from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import InputError
 from swgjoint.explore.accept.figures import FIGURES, LOWER, TESTS, Bench, Figures
 from swgjoint.identify.log import BenchLog, read_log
@@ -217,7 +217,7 @@ def _scene_of(scene: Scene, reference: str, drive: DriveMap) -> Scene:
         share = RATIO / abs(drive.ratio)
         speeds = [share * speed for speed in scene.trajectory.speeds_deg_s]
         changes["trajectory.speeds_deg_s"] = speeds
-    if (inertia := catalogue_rotor_inertia(reference)) is not None:
+    if (inertia := rotor_inertia_of(reference)) is not None:
         changes["defaults.rotor_inertia_kgm2"] = inertia
     return scene.with_changes(changes).with_drive(reference)
 

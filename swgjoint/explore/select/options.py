@@ -11,7 +11,7 @@ from pathlib import Path
 
 from swgjoint.csv_columns import read_table
 from swgjoint.drives.references import load_drive
-from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.drives.sections import LifeSection
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -146,7 +146,7 @@ def _option(name: str, row: Row, cost: float, progress: Progress) -> DriveOption
         mass=number(MASS),
         max_input_speed=number("max_input_speed_rpm", rpm) or inf,
         average_input_speed=number("average_input_speed_rpm", rpm) or inf,
-        rotor_inertia=inertia or catalogue_rotor_inertia(name),
+        rotor_inertia=inertia or rotor_inertia_of(name),
         life=None if life is None else LifeSection(L50_h=life),
         map=load_drive(name, progress=progress),
     )

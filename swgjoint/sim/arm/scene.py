@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import InputError
 from swgjoint.models_path import bundled_names, is_file
 from swgjoint.sim.arm.drive_choice import DriveChoice, choose_drives
@@ -332,13 +332,14 @@ def _name(path: Path) -> str:
 def assumed_rotor_inertia(drive: str | None) -> float:
     """Inertia of rotor and wave generator that is assumed for a drive [kg·m²].
 
-    It is twice that of the wave generator of a catalogue drive, because a motor of
-    equal inertia is assumed, and :data:`ROTOR_INERTIA` for other drives.
+    It follows ratio and rated torque, see
+    :func:`swgjoint.drives.rotors.rotor_inertia_of`.
 
     Args:
-        drive: Design, map or catalogue name; None for a drive without a name.
+        drive: Design, map or catalogue name; None for a drive without a name, which
+            gets :data:`ROTOR_INERTIA`.
     """
-    known = None if drive is None else catalogue_rotor_inertia(drive)
+    known = None if drive is None else rotor_inertia_of(drive)
     return known or ROTOR_INERTIA
 
 
