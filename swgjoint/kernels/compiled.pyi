@@ -50,7 +50,13 @@ class Search:
         tooth: Index,
     ) -> None: ...
     def minima(
-        self, flank: Array, coarse: int, dense: int, limit: float, radius: float
+        self,
+        flank: Array,
+        searched: Mask,
+        coarse: int,
+        dense: int,
+        limit: float,
+        radius: float,
     ) -> tuple[Index, Index, Array]: ...
     def meet(
         self,

@@ -21,6 +21,7 @@ using Index = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::dev
 using IndexOut = nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using MaskOut = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Mask = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Masks = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using MasksOut = nb::ndarray<bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 inline void require(bool fits, const char* what) {

@@ -7,7 +7,6 @@
 
 namespace {
 
-using Masks = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 void check_dofs(const Index& dofs, std::size_t n) {
   for (std::size_t i = 0; i < dofs.shape(0); ++i) {

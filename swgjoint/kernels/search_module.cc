@@ -81,14 +81,17 @@ class Search {
   }
 
   // Sectors, sides and arc lengths of the local minima of the gap.
-  nb::tuple minima(In<4> flank, int coarse, int dense, double limit,
+  nb::tuple minima(In<4> flank, Masks searched, int coarse, int dense, double limit,
                    double radius) const {
     check(flank);
+    require(searched.shape(0) == flank.shape(0) && searched.shape(1) == 2,
+            "searched: (sectors, 2)");
     require(coarse > 1 && (dense == 0 || dense > 1), "coarse, dense");
     std::vector<swgjoint::Place> places;
     {
       const nb::gil_scoped_release release;
-      places = search_.minima(flank.data(), flank.shape(0), {coarse, dense, limit, radius});
+      places = search_.minima(flank.data(), flank.shape(0), searched.data(),
+                              {coarse, dense, limit, radius});
     }
     const std::size_t n = places.size();
     auto* index = new std::int64_t[2 * n];
@@ -240,8 +243,8 @@ void bind_search(nb::module_& m) {
            nb::arg("real").noconvert(), nb::arg("corner").noconvert(), nb::arg("tooth").noconvert())
       .def("refine", &Search::refine, nb::arg("station").noconvert(), nb::arg("mirrored").noconvert(),
            nb::arg("sector").noconvert(), nb::arg("side").noconvert(), nb::arg("spacing"))
-      .def("minima", &Search::minima, nb::arg("flank").noconvert(), nb::arg("coarse"),
-           nb::arg("dense"), nb::arg("limit"), nb::arg("radius"))
+      .def("minima", &Search::minima, nb::arg("flank").noconvert(),
+           nb::arg("searched").noconvert(), nb::arg("coarse"), nb::arg("dense"), nb::arg("limit"), nb::arg("radius"))
       .def("meet", &Search::meet, nb::arg("flank").noconvert(),
            nb::arg("sector").noconvert(), nb::arg("side").noconvert(),
            nb::arg("station").noconvert(), nb::arg("real").noconvert(),

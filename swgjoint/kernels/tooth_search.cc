@@ -315,6 +315,7 @@ std::vector<double> ToothSearch::elastic_gaps(const std::vector<Vec>& points,
 }
 
 std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
+                                       const bool* searched,
                                        const Sampling& sampling) const {
   const Samples coarse(flexspline_, spline_, low_, high_, sampling.coarse);
   std::vector<Samples> fine;
@@ -327,6 +328,7 @@ std::vector<Place> ToothSearch::minima(const double* flank, std::size_t sectors,
   std::vector<std::int64_t> sector, side;
   for (std::int64_t s = 0; s < static_cast<std::int64_t>(sectors); ++s) {
     for (std::int64_t f = 0; f < 2; ++f) {
+      if (!searched[2 * s + f]) continue;
       to_mirrored(flank, spline_.nodes, s, f, mirrored.data());
       const Pose pose = pose_of(s, f);
       if (!place(mirrored.data(), coarse, sampling.radius, &known.points)) continue;

@@ -130,9 +130,9 @@ class ToothSearch {
   Pose pose_of(std::int64_t sector, std::int64_t side) const;
 
   // Local minima of the gap, sampled and refined. flank: displacements in the sector
-  // frames (sectors, 2, nodes, 2)
+  // frames (sectors, 2, nodes, 2); searched: whether to search each flank (sectors, 2)
   std::vector<Place> minima(const double* flank, std::size_t sectors,
-                            const Sampling& sampling) const;
+                            const bool* searched, const Sampling& sampling) const;
 
   // Contact point at a place, and weights of its nodes (nodes,) on both flanks; the
   // second ones only for elastic flanks of the circular spline

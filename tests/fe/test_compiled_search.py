@@ -57,6 +57,21 @@ def both(monkeypatch, search):
 
 
 @pytest.mark.fe
+def test_search_of_some_flanks_finds_their_candidates_only(contact, monkeypatch):
+    """Candidates of every third flank are those of a search of all flanks there."""
+    search, flank, _, height = contact
+    some = np.arange(2 * len(flank)).reshape(-1, 2) % 3 == 0
+    for one in both(monkeypatch, search):
+        wanted = one.search(flank, 0.1 * height, None)
+        wanted = wanted.chosen(np.flatnonzero(some[wanted.sector, wanted.side]))
+        found = one.search(flank, 0.1 * height, None, searched=some)
+        assert len(found) > 2
+        for field in fields(wanted):
+            same = getattr(found, field.name), getattr(wanted, field.name)
+            np.testing.assert_allclose(*same, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.fe
 @pytest.mark.parametrize("thorough", [False, True])
 @pytest.mark.parametrize("reach", [0.02, 0.1])
 def test_candidates_are_those_of_numpy(contact, monkeypatch, thorough, reach):
@@ -193,7 +208,13 @@ def test_arrays_that_do_not_fit_are_refused(contact):
     with pytest.raises(ValueError):
         search.refine(np.zeros(3), np.zeros((3, 2, 2)), index, index, 1e-5)
     flank = np.ascontiguousarray(contact[1].reshape(len(contact[1]), 2, -1, 2))
-    for wrong in ((flank[1:], 2, 8), (flank[:, :, 1:].copy(), 2, 8), (flank, 1, 8)):
+    every = np.ones((len(flank), 2), dtype=bool)
+    for wrong in (
+        (flank[1:], every[1:], 2, 8),
+        (flank[:, :, 1:].copy(), every, 2, 8),
+        (flank, every[1:], 2, 8),
+        (flank, every, 1, 8),
+    ):
         with pytest.raises(ValueError):
             search.minima(*wrong, 1e-5, 0.01)
     own, other = contact[0]._compiled.nodes

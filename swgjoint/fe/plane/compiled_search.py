@@ -12,7 +12,7 @@ from swgjoint.fe.plane.circular_spline import CircularSpline, Feet
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.kernels import kernels
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array, Index, Mask
 
 if TYPE_CHECKING:
     from swgjoint.kernels.compiled import Search
@@ -136,19 +136,25 @@ class CompiledSearch:
         )
 
     def find_minima(
-        self, flank: Array, coarse: int, dense: int, limit: float
+        self, flank: Array, searched: Mask, coarse: int, dense: int, limit: float
     ) -> tuple[Index, Index, Array]:
         """Sectors, sides and arc lengths [m] of the local minima of the gap, each (n,).
 
         Args:
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            searched: Whether to search each flank (N, 2).
             coarse: Number of gap samples per flank node with a rigid circular spline.
             dense: Number of samples on the flanks that are near; zero for the others.
             limit: Largest gap of a sample near a minimum [m].
         """
         shaped = flank.reshape(len(flank), 2, -1, 2)
         return self.search.minima(
-            np.ascontiguousarray(shaped), coarse, dense, limit, self.radius
+            np.ascontiguousarray(shaped),
+            np.ascontiguousarray(searched),
+            coarse,
+            dense,
+            limit,
+            self.radius,
         )
 
     def gather(

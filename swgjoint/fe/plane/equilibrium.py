@@ -37,6 +37,10 @@ FOLLOWED = 100.0
 """Reach of the search for contacts after a small step, in this step [-]. No flank moves
 by as many of the next steps, which are smaller."""
 
+MOVED = 10.0
+"""Upper bound of the motion of a flank in a step, in increments of the nodes [-]. The
+flank is part of a tooth whose feet are nodes, and it turns with them."""
+
 TOUCH = 1e-15
 """Largest gap that counts as zero [m]."""
 
@@ -88,6 +92,7 @@ class NewtonSolver:
         state, history = start, list[float]()
         settled = False
         tried: set[bytes] = set()
+        near, searched_reach = np.ones((model.sectors, 2), dtype=bool), 0.0
         try:
             for iteration in range(self.max_iterations):
                 linear = linearise(model, state, load.on_flexspline)
@@ -99,9 +104,18 @@ class NewtonSolver:
                     reach = min(reach, FOLLOWED * history[-1])
                 contacts = linear.no_contacts
                 if load.teeth:
+                    # flanks beyond the last reach cannot have come within a smaller one
+                    if history and reach + MOVED * history[-1] > searched_reach:
+                        near[:] = True
                     contacts = linear.search.search(
-                        linear.flank, reach, state.contacts, thorough=thorough
+                        linear.flank,
+                        reach,
+                        state.contacts,
+                        thorough=thorough,
+                        searched=near,
                     )
+                    near[:], searched_reach = False, reach
+                    near[contacts.sector, contacts.side] = True
                 problem = NewtonProblem.from_candidates(
                     model, state, linear, load, contacts
                 )

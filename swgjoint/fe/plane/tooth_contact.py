@@ -26,7 +26,7 @@ from swgjoint.fe.plane.circular_spline import (
 from swgjoint.fe.plane.compiled_search import CompiledSearch, Flanks, SeenFeet
 from swgjoint.fe.plane.contact_points import Contacts, node_weights, outward_normals
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array, Index, Mask
 
 SAMPLES_PER_NODE = 2
 """Number of gap samples per flank node in a fast search."""
@@ -96,6 +96,7 @@ class ToothContact:
         held: Contacts | None,
         *,
         thorough: bool = True,
+        searched: Mask | None = None,
     ) -> Contacts:
         """Contact candidates: local minima of the gap, plus points that carry force.
 
@@ -112,19 +113,19 @@ class ToothContact:
             thorough: Whether to sample the gap densely, including the displacement of
                 the circular spline: minima on conforming flanks can be closer together
                 than the nodes.
-
-        Returns:
-            The candidates.
+            searched: Whether to search each flank (N, 2); None for all.
         """
+        if searched is None:
+            searched = np.ones((len(flank), 2), dtype=bool)
         low, high = self.element.flank_range
         limit = reach + NEAR * (high - low)
         if self._compiled is not None:
             dense = DENSE_SAMPLES if thorough else 0
             sector, side, station = self._compiled.find_minima(
-                flank, SAMPLES_PER_NODE, dense, limit
+                flank, searched, SAMPLES_PER_NODE, dense, limit
             )
         else:
-            sector, side, station = self._minima(flank, limit, thorough=thorough)
+            sector, side, station = self._minima(flank, searched, limit, thorough)
         if held is not None and len(held):
             sector, side, station = held.add_places(
                 sector, side, station, MERGE * (high - low)
@@ -132,21 +133,20 @@ class ToothContact:
         return self._gather(sector, side, station, flank, reach)
 
     def _minima(
-        self, flank: Array, limit: float, *, thorough: bool
+        self, flank: Array, searched: Mask, limit: float, thorough: bool
     ) -> tuple[Index, Index, Array]:
         """Sectors, sides and arc lengths [m] of the local minima of the gap, each (n,).
 
-        Args:
-            flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
-            limit: Largest gap of a sample near a minimum [m].
-            thorough: Whether to sample the gap densely, see :meth:`search`.
+        ``limit`` is the largest gap of a sample near a minimum [m]; for the other
+        arguments see :meth:`search`.
         """
         element = self.element
         size = element.flank_size
         # flanks in their mirrored frames: (N, 2 sides, size, 2)
         shaped = flank.reshape(-1, 2, size, 2) * MIRROR[:, None, :]
-        sides = shaped.reshape(-1, size, 2)
-        sector, side = np.divmod(np.arange(len(sides)), 2)
+        chosen = np.flatnonzero(searched)
+        sides = shaped.reshape(-1, size, 2)[chosen]
+        sector, side = np.divmod(chosen, 2)
         s, gap, sector, side = self._sampled(
             SAMPLES_PER_NODE, sides, sector, side, rigid=True
         )
