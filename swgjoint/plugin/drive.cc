@@ -18,6 +18,7 @@ constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
     "friction",        "contact_damping", "yield_curve"};
+constexpr int kCount = sizeof(kAttributes) / sizeof(kAttributes[0]);
 constexpr int kDeviations = 5;  // number of user values of a tendon
 // Largest cubic coefficient of the friction tendon, which is identified by so small a
 // value. The length of this tendon is a rotation of many turns, not a torsion; its
@@ -41,15 +42,40 @@ std::unique_ptr<Drive> Refuse(const mjModel* m, int instance, const std::string&
   return nullptr;
 }
 
+// Texts of all attributes of an instance. The model holds them one after the other, in
+// the order of kAttributes. Those of a map with thousands of harmonics are long, so they
+// are searched once, and not once per attribute as by mj_getPluginConfig.
+class Attributes {
+ public:
+  Attributes(const mjModel* m, int instance) {
+    const char* next = m->plugin_attr + m->plugin_attradr[instance];
+    for (const char*& text : texts_) {
+      text = next;
+      next += std::strlen(next) + 1;
+    }
+  }
+
+  // Text of an attribute, empty if the instance does not have it; null for other keys.
+  const char* operator()(const char* key) const {
+    for (int k = 0; k < kCount; ++k) {
+      if (!std::strcmp(kAttributes[k], key)) return texts_[k];
+    }
+    return nullptr;
+  }
+
+ private:
+  const char* texts_[kCount];
+};
+
 // Number of states of an instance in plugin_state.
 int CountStates(const mjModel* m, int instance) {
+  const Attributes text(m, instance);
   Hysteresis hysteresis;
   // Create rejects an invalid attribute
-  if (hysteresis.Parse(mj_getPluginConfig(m, instance, "hysteresis"),
-                       mj_getPluginConfig(m, instance, "yield_curve"))) {
+  if (hysteresis.Parse(text("hysteresis"), text("yield_curve"))) {
     return Law::kAccelerations;
   }
-  const char* friction = mj_getPluginConfig(m, instance, "friction");
+  const char* friction = text("friction");
   return Law::kAccelerations + static_cast<int>(hysteresis.states()) +
          (friction && *friction ? Law::kBristle : 0);
 }
@@ -126,9 +152,7 @@ void Drive::Watch(const mjModel* m, const mjData* d, int instance, int scheme) {
 
 std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   auto drive = std::make_unique<Drive>();
-  const auto text = [&](const char* key) {
-    return mj_getPluginConfig(m, instance, key);
-  };
+  const Attributes text(m, instance);
   const std::string fault = drive->Read(text);
   if (!fault.empty()) return Refuse(m, instance, fault);
 
@@ -416,7 +440,7 @@ void Drive::RegisterPlugin() {
   mjp_defaultPlugin(&plugin);
   plugin.name = kName;
   plugin.capabilityflags |= mjPLUGIN_PASSIVE;
-  plugin.nattribute = sizeof(kAttributes) / sizeof(kAttributes[0]);
+  plugin.nattribute = kCount;
   plugin.attributes = kAttributes;
   plugin.nstate = CountStates;
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
