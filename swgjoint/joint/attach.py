@@ -245,14 +245,13 @@ def attach_all(
 def _configs(drives: Iterable[JointDrive]) -> dict[str, dict[str, str]]:
     """Attributes of the plugin instances by joint; a shared map is formatted once."""
     texts: dict[int, dict[str, str]] = {}
-    rows: dict[bytes, str] = {}
     configs = {}
     for drive in drives:
         if drive.plugin is None:
             continue
         key = id(drive.drive)
         if key not in texts:
-            texts[key] = plugin.config(drive.drive, damping=drive.damping, known=rows)
+            texts[key] = plugin.config(drive.drive, damping=drive.damping)
         configs[drive.joint] = texts[key] | {
             "damping": repr(float(drive.damping)),
             "contact_damping": repr(float(drive.contact_damping)),

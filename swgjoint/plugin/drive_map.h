@@ -20,8 +20,11 @@ struct DriveText {
   const char* kinematic_error;
 };
 
-// Reads a string of numbers. Returns false if the string is empty or contains anything
-// other than finite numbers.
+// Start of a string that holds the bytes of little-endian doubles in base64.
+constexpr char kBase64[] = "base64:";
+
+// Reads a string of numbers, which are written in decimals or in base64. Returns false if
+// the string is empty or contains anything other than finite numbers.
 bool ParseNumbers(const char* text, std::vector<double>* out);
 
 // V and its derivatives at one state (Gradient) or over one step (Secant).

@@ -193,6 +193,14 @@ def run_on_spec(spec, joint):
         ("knots", "0 nan", ("finite",)),
         ("knots", "0 1e999", ("finite",)),
         ("potential", "1 2 3", ("3", "10")),
+        ("potential", "base64:AAAAAAAA8D8=", ("1", "10")),  # the number 1
+        ("potential", "base64:AAAAAAAA8H8=", ("finite",)),  # infinite
+        ("potential", "base64:AAAAAAAA8D8", ("finite",)),  # without its padding
+        ("potential", "base64:AAAAAA==8D8=", ("finite",)),  # padding inside
+        ("potential", "base64:AAAAAAAA 8D8", ("finite",)),
+        ("potential", "base64:AAAAAAAA", ("finite",)),  # six bytes
+        ("potential", "base64:====", ("finite",)),
+        ("potential", "base64:", ("finite",)),
         ("end_stiffness", "", ("list", "finite")),
         ("kinematic_error", "0 0 0", ("3", "2")),
         ("damping", "-1", ("one", ">= 0")),

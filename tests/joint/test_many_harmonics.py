@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from swgjoint import attach
 from swgjoint.joint import region
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
@@ -72,6 +73,30 @@ def test_the_sign_of_orders_does_not_matter(bench):
         bounds = check_region(b.drive, timestep=1e-3).bounds
         found.append([bound.value for bound in bounds])
     assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
+def test_a_potential_in_base64_is_that_in_decimals():
+    """Both texts of the attribute give the same bits after five steps."""
+    drive = with_many_harmonics(np.random.default_rng(7))
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><option timestep="1e-3" integrator="discrete"/><worldbody><body>'
+        '<joint name="j"/><geom size=".1"/></body></worldbody></mujoco>'
+    )
+    attach(spec, joint="j", drive=drive, rotor_inertia=1e-4)
+    [instance] = spec.plugins
+    text = instance.config
+    assert text["potential"].startswith("base64:")
+    numbers = map(repr, drive.potential.ravel().tolist())
+    models = [spec.compile()]
+    instance.config = {**text, "potential": " ".join(numbers)}
+    models.append(spec.compile())
+    found = []
+    for model in models:
+        data = mujoco.MjData(model)
+        data.qvel[:] = 3.0, 0.05
+        mujoco.mj_step(model, data, 5)
+        found.append([*data.qpos, *data.qvel])
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("rotor", [1e-6, 1e-5, 1e-4])
