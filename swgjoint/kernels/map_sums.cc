@@ -64,33 +64,6 @@ void error_sums(const double* phases, std::size_t n, std::size_t h,
   }
 }
 
-void error_sums_at(const double* theta, const double* psi, std::size_t n, std::size_t h,
-                   const WaveNumbers& numbers, const double* amplitudes,
-                   const std::int64_t* orders, double* cos, double* sin,
-                   double* result) {
-  const std::size_t u = numbers.count_theta, v = numbers.count_psi;
-  std::vector<double> terms(3 * h), waves(2 * (u + v));
-  double *c_theta = waves.data(), *s_theta = c_theta + u;
-  double *c_psi = s_theta + u, *s_psi = c_psi + v;
-  for (std::size_t p = 0; p < n; ++p) {
-    for (std::size_t k = 0; k < u; ++k) {
-      c_theta[k] = std::cos(theta[p] * numbers.theta[k]);
-      s_theta[k] = std::sin(theta[p] * numbers.theta[k]);
-    }
-    for (std::size_t k = 0; k < v; ++k) {
-      c_psi[k] = std::cos(psi[p] * numbers.psi[k]);
-      s_psi[k] = std::sin(psi[p] * numbers.psi[k]);
-    }
-    double *c = cos + p * h, *s = sin + p * h;
-    for (std::size_t k = 0; k < h; ++k) {
-      const std::int64_t i = numbers.which[2 * k], j = numbers.which[2 * k + 1];
-      c[k] = c_theta[i] * c_psi[j] - s_theta[i] * s_psi[j];
-      s[k] = s_theta[i] * c_psi[j] + c_theta[i] * s_psi[j];
-    }
-    add_errors(c, s, h, amplitudes, orders, terms.data(), result + p, n);
-  }
-}
-
 void potential_sums(const Pieces& map, const double* torsion, std::size_t n,
                     const double* cos, const double* sin, const std::int64_t* orders,
                     Rows rows, double* result) {

@@ -27,13 +27,6 @@ struct WaveNumbers {
   std::size_t count_theta, count_psi;
 };
 
-// The same from angles, where many harmonics share their numbers of waves: cosines and
-// sines are products of those of each number. theta, psi: (n).
-void error_sums_at(const double* theta, const double* psi, std::size_t n, std::size_t h,
-                   const WaveNumbers& numbers, const double* amplitudes,
-                   const std::int64_t* orders, double* cos, double* sin,
-                   double* result);
-
 // Polynomials of a map.
 struct Pieces {
   const double* knots;  // (m + 1)

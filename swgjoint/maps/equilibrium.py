@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from swgjoint.errors import ComputationError
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sliders import Sliders
-from swgjoint.maps.sums import error_sums_at, potential_sums
+from swgjoint.maps.sums import law_sums
 from swgjoint.typing import Array
 
 CHUNK = 2**14
@@ -118,22 +118,16 @@ def _torque(
 
     Without ``tangent`` the second array is empty.
     """
-    cos, sin, (e0, _, e_psi) = error_sums_at(drive, theta, psi)
-    x = theta / drive.ratio + e0 - psi
-    wanted = ["torque"]
-    if tangent:
-        wanted.append("stiffness")
-    if drive.angle_orders[:, 1].any():
-        wanted.append("by_phase")
-    torque, *others = potential_sums(drive, x, cos, sin, *wanted)
-    stiffness = others.pop(0) if tangent else np.empty(0)
+    turns = bool(drive.angle_orders[:, 1].any())
+    found = law_sums(drive, theta, psi, stiffness=tangent, by_phase=turns)
+    x, torque, stiffness = found.torsion, found.torque, found.stiffness
     if sliders is not None and tangent:
         slip, slope = sliders.torque_and_tangent(x, torque, stiffness)
         torque, stiffness = torque + slip, stiffness + slope
     elif sliders is not None:
         torque = torque + sliders.torque(x, torque)
-    total = torque * (1.0 - e_psi)
-    return total - others[1] if others else total, stiffness
+    total = torque * (1.0 - found.error_by_psi)
+    return total - found.by_psi if turns else total, stiffness
 
 
 def _bisect(

@@ -280,13 +280,11 @@ class Potential:
             theta: Input angle [rad].
             psi: Output angle [rad], of a shape that broadcasts with theta.
         """
-        cos, sin, (e0, e_theta, e_psi) = sums.error_sums_at(self, theta, psi)
-        x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float) + e0
-        g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
-        found = sums.potential_sums(self, x, cos, sin, "torque", "by_phase")
-        torque, by_theta, by_psi = found
+        found = sums.law_sums(self, theta, psi)
+        g_theta, g_psi = 1.0 / self.ratio + found.error_by_theta, found.error_by_psi - 1
+        torque, by_theta, by_psi = found.torque, found.by_theta, found.by_psi
         return Law(
-            torsion=x,
+            torsion=found.torsion,
             by_theta=g_theta,
             by_psi=g_psi,
             torque=torque,

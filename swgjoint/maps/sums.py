@@ -1,11 +1,13 @@
 """Sums over the harmonics of a map: kinematic error and derivatives of the potential.
 
-The numpy versions are the reference; the compiled ones give the same bits.
+The numpy versions are the reference; the compiled ones give the same bits, except
+:func:`law_sums` of many harmonics, which differs by round-off.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,8 +69,8 @@ def error_sums_at(
     """Result of :func:`error_sums` at given angles.
 
     Cosines and sines of many harmonics, as of tooth errors, are products of those of
-    the few numbers of waves that they share, which takes a fifth of the time. They
-    differ from those of the phases by round-off.
+    the few numbers of waves that they share, which takes less time. They differ from
+    those of the phases by round-off.
 
     Args:
         drive: The map.
@@ -79,28 +81,86 @@ def error_sums_at(
         return error_sums(drive, drive.phases(theta, psi))
     of_theta, of_psi, which = drive.wave_numbers
     theta, psi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(psi, float))
-    if (native := kernels()) is not None:
-        cos, sin = np.empty((2, *theta.shape, len(which)))
-        sums = np.empty((3, theta.size))
-        native.error_sums_at(
-            np.ascontiguousarray(theta).reshape(-1),
-            np.ascontiguousarray(psi).reshape(-1),
-            of_theta,
-            of_psi,
-            which,
-            np.ascontiguousarray(drive.kinematic_error),
-            np.ascontiguousarray(drive.angle_orders),
-            cos.reshape(-1, len(which)),
-            sin.reshape(-1, len(which)),
-            sums,
-        )
-        e0, by_theta, by_psi = sums.reshape(3, *theta.shape)
-        return cos, sin, (e0, by_theta, by_psi)
     about_theta, about_psi = theta[..., None] * of_theta, psi[..., None] * of_psi
     c1, s1 = (f(about_theta)[..., which[:, 0]] for f in (np.cos, np.sin))
     c2, s2 = (f(about_psi)[..., which[:, 1]] for f in (np.cos, np.sin))
     cos, sin = c1 * c2 - s1 * s2, s1 * c2 + c1 * s2
     return cos, sin, _errors(drive, cos, sin)
+
+
+class LawSums(NamedTuple):
+    """Sums over the harmonics at given angles, in the shape of the angles."""
+
+    torsion: Array
+    """Torsion [rad]."""
+    error_by_theta: Array
+    """Derivative of the kinematic error by theta [-]."""
+    error_by_psi: Array
+    """Derivative of the kinematic error by psi [-]."""
+    torque: Array
+    """First derivative of the potential by the torsion [N·m]."""
+    stiffness: Array
+    """Second derivative of the potential by the torsion [N·m/rad]."""
+    by_theta: Array
+    """Derivative of the potential by theta at a fixed torsion [N·m]."""
+    by_psi: Array
+    """Derivative of the potential by psi at a fixed torsion [N·m]."""
+
+
+def law_sums(
+    drive: Potential,
+    theta: ArrayLike,
+    psi: ArrayLike,
+    *,
+    stiffness: bool = False,
+    by_phase: bool = True,
+) -> LawSums:
+    """Torsion and derivatives of the potential at given angles.
+
+    Args:
+        drive: The map.
+        theta: Input angle [rad].
+        psi: Output angle [rad], of a shape that broadcasts with theta.
+        stiffness: Whether the stiffness is needed; otherwise it may be empty.
+        by_phase: Whether the derivatives by the angles are needed, similarly.
+    """
+    if len(drive.orders) - 1 > MANY and kernels() is not None:
+        theta, psi = np.broadcast_arrays(theta, psi)
+        flat = (np.array(angle, dtype=float).reshape(-1) for angle in (theta, psi))
+        rows = np.empty((7, theta.size))
+        _compiled(drive).evaluate(*flat, rows)
+        return LawSums(*rows.reshape(7, *theta.shape))
+    cos, sin, (e0, e_theta, e_psi) = error_sums_at(drive, theta, psi)
+    x = np.asarray(theta, float) / drive.ratio - np.asarray(psi, float) + e0
+    wanted = ["torque"] + stiffness * ["stiffness"] + by_phase * ["by_phase"]
+    torque, *others = potential_sums(drive, x, cos, sin, *wanted)
+    k = others.pop(0) if stiffness else np.empty(0)
+    by_theta, by_psi = others if by_phase else np.empty((2, 0))
+    return LawSums(x, e_theta, e_psi, torque, k, by_theta, by_psi)
+
+
+_made: WeakKeyDictionary[Potential, Any] = WeakKeyDictionary()
+
+
+def _compiled(drive: Potential) -> Any:
+    """Compiled sums of a map with many harmonics.
+
+    Each contains the coefficients in the order in which they are added, of the
+    intervals of the torsion that were needed.
+    """
+    if drive not in _made:
+        native = kernels()
+        assert native is not None
+        _made[drive] = native.HarmonicSums(
+            drive.torsion_knots,
+            np.ascontiguousarray(drive.potential),
+            np.ascontiguousarray(drive.end_stiffness),
+            np.ascontiguousarray(drive.kinematic_error),
+            np.ascontiguousarray(drive.angle_orders),
+            *drive.wave_numbers,
+            drive.ratio,
+        )
+    return _made[drive]
 
 
 def derivative_sum(

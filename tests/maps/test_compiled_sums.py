@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from swgjoint.kernels import kernels
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Jenkin, stretches
 from swgjoint.maps.phase_bounds import MANY
 from swgjoint.maps.sliders import Sliders
-from swgjoint.maps.sums import error_sums, error_sums_at
+from swgjoint.maps.sums import error_sums, error_sums_at, law_sums
 
 pytestmark = pytest.mark.skipif(kernels() is None, reason="needs the compiled loops")
 
@@ -54,35 +55,72 @@ def test_sums_over_harmonics(monkeypatch, synthetic_map, shape):
         assert np.array_equal(got, wanted)
 
 
-@pytest.mark.parametrize("shape", [(), (50,), (4, 7)])
-def test_sums_over_many_harmonics(monkeypatch, synthetic_map, shape):
-    """Products of waves: the same bits as numpy, and round-off from the phases."""
-    rng = np.random.default_rng(11)
+def with_many_harmonics(drive, rng, sign=1):
+    """The map with 340 random harmonics, of which some orders are negative."""
     orders = [(a, b) for a in range(12) for b in range(-14, 15) if (a, b) > (0, 0)]
-    orders = np.array([(0, 0), *orders])
-    size = len(orders)
-    drive = replace(
-        synthetic_map,
-        orders=orders,
+    orders = sign * rng.permutation(orders)
+    size = len(orders) + 1
+    assert size > MANY
+    return replace(
+        drive,
+        orders=np.concatenate([[[0, 0]], orders]),
         kinematic_error=1e-5 * rng.normal(size=(size, 2)),
-        potential=1e-3 * rng.normal(size=(size, *synthetic_map.potential.shape[1:])),
+        potential=1e-3 * rng.normal(size=(size, *drive.potential.shape[1:])),
         end_stiffness=rng.normal(size=(size, 2, 2)),
     )
-    assert size > MANY
+
+
+@pytest.mark.parametrize("shape", [(), (50,), (4, 7)])
+def test_sums_over_many_harmonics(synthetic_map, shape):
+    """Products of waves differ from cosines and sines of the phases by round-off."""
+    rng = np.random.default_rng(11)
+    drive = with_many_harmonics(synthetic_map, rng)
     theta = rng.uniform(-90.0, 90.0, shape)
     psi = theta / drive.ratio + rng.uniform(-1e-3, 1e-3, shape)
+    cos, sin, errors = error_sums_at(drive, theta, psi)
+    wanted_cos, wanted_sin, wanted = error_sums(drive, drive.phases(theta, psi))
+    for got, right in zip(
+        (cos, sin, *errors), (wanted_cos, wanted_sin, *wanted), strict=True
+    ):
+        assert got.shape == right.shape
+        assert np.allclose(got, right, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("shape", [(), (1,), (300,), (20, 7)])
+def test_law_of_many_harmonics(monkeypatch, synthetic_map, shape, sign):
+    """The law is that of numpy to round-off, inside, on and beyond the knots."""
+    rng = np.random.default_rng(12)
+    drive = with_many_harmonics(synthetic_map, rng, sign)
+    knots = drive.torsion_knots
+    theta = rng.uniform(-90.0, 90.0, shape)
+    psi = theta / drive.ratio + rng.uniform(-1.5, 1.5, shape) * knots[-1]
 
     def compute():
-        cos, sin, errors = error_sums_at(drive, theta, psi)
-        return cos, sin, *errors
+        sums = law_sums(drive, theta, psi, stiffness=True)
+        return [*vars(drive.law(theta, psi)).values(), *sums]
 
-    found, plain = both(monkeypatch, compute)
-    for got, wanted in zip(found, plain, strict=True):
-        assert got.shape == wanted.shape
-        assert np.allclose(got, wanted, rtol=0.0, atol=1e-14)
-    cos, sin, errors = error_sums(drive, drive.phases(theta, psi))
-    for got, wanted in zip(found, (cos, sin, *errors), strict=True):
-        assert np.allclose(got, wanted, rtol=0.0, atol=1e-12)
+    outside = 0
+    for got, wanted in zip(*both(monkeypatch, compute), strict=True):
+        assert np.shape(got) == np.shape(wanted) == shape
+        # a phase of 90 rad times 14 waves has a rounding error of 1e-13
+        assert np.allclose(got, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
+        outside += int(np.sum(np.abs(got) > knots[-1]))
+    assert outside or np.size(theta) < 50
+
+
+def test_law_on_the_knots(monkeypatch, synthetic_map):
+    """At the outermost knots the law is that of numpy, from one side to the other."""
+    drive = with_many_harmonics(synthetic_map, np.random.default_rng(13))
+    drive = replace(drive, kinematic_error=0.0 * drive.kinematic_error)
+    ends = drive.torsion_knots[[0, -1]]
+    psi = -np.concatenate([np.nextafter(ends, x) for x in (-1.0, ends, 1.0)])
+
+    def compute():
+        return list(law_sums(drive, np.zeros(psi.size), psi, stiffness=True))
+
+    for got, wanted in zip(*both(monkeypatch, compute), strict=True):
+        assert np.allclose(got, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 50, 129, 300])
@@ -136,6 +174,27 @@ def test_stretches(monkeypatch, count):
         assert np.array_equal(got, wanted)
 
 
+def test_equilibrium_with_many_harmonics(monkeypatch, synthetic_map):
+    """Output angles are those of numpy to round-off."""
+    rng = np.random.default_rng(5)
+    linear = DriveMap.linear(2e4)
+    many = with_many_harmonics(synthetic_map, rng)
+    size = len(many.orders)
+    potential, ends = np.zeros((size, 2, 1, 5)), np.zeros((size, 2, 2))
+    potential[0], ends[0] = linear.potential[0], linear.end_stiffness[0]
+    potential[1:, :, 0, 0] = 1e-6 * rng.normal(size=(size - 1, 2))
+    drive = replace(
+        linear,
+        orders=many.orders,
+        potential=potential,
+        end_stiffness=ends,
+        kinematic_error=0.01 * many.kinematic_error,
+    )
+    theta, torque = rng.uniform(-9.0, 9.0, 60), rng.uniform(-40.0, 40.0, 60)
+    got, wanted = both(monkeypatch, lambda: output_angle(drive, theta, torque))
+    assert np.allclose(got, wanted, rtol=0.0, atol=1e-13)
+
+
 def test_equilibrium(monkeypatch, synthetic_map):
     """Output angles with hysteresis elements have the same bits."""
     rng = np.random.default_rng(5)
@@ -160,6 +219,25 @@ def test_wrong_shapes_are_rejected():
             np.zeros((2, 2), dtype=np.int64),
             *np.zeros((2, 2, 3)),
             np.zeros((3, 2)),
+        )
+    arrays = {
+        "knots": np.zeros(2),
+        "powers": np.zeros((3, 2, 1, 5)),
+        "ends": np.zeros((3, 2, 2)),
+        "amplitudes": np.zeros((3, 2)),
+        "orders": np.zeros((3, 2), dtype=np.int64),
+        "of_theta": np.zeros(1),
+        "of_psi": np.zeros(1),
+        "which": np.zeros((3, 2), dtype=np.int64),
+    }
+    for name in ("knots", "powers", "ends", "amplitudes", "which"):
+        with pytest.raises(ValueError, match=name):
+            native.HarmonicSums(**{**arrays, name: arrays[name][1:]}, ratio=1.0)
+    with pytest.raises(ValueError, match="which"):
+        native.HarmonicSums(**{**arrays, "which": arrays["which"] + 1}, ratio=1.0)
+    with pytest.raises(ValueError, match="result"):
+        native.HarmonicSums(**arrays, ratio=1.0).evaluate(
+            *np.zeros((2, 2)), np.zeros((6, 2))
         )
     with pytest.raises(ValueError, match="first"):
         native.yield_torsions(
