@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
+from swgjoint.cli.shared.drive_option import add_drive_option, drives_of
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 
@@ -58,15 +58,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " internal step of co-simulation [s], default: 0.001",
     )
     mjcf = parser.add_argument_group("options of mjcf")
-    mjcf.add_argument(
-        "--drive",
-        metavar="[JOINT=]NAME",
-        action="append",
-        default=[],
-        dest="drives",
-        help="design, map or catalogue drive for all hinges, or for the joint or"
-        " pattern JOINT, as in 'wrist_*=CSG-17-100'; the first option that matches a"
-        " joint applies; repeatable; default: the drives that swgjoint run selects",
+    add_drive_option(
+        mjcf, "all hinges", "default: the drives that swgjoint run selects"
     )
     mjcf.add_argument(
         "--motors",
@@ -180,33 +173,6 @@ def _mjcf(args: argparse.Namespace) -> dict[str, Any]:
         },
         "files": [str(path) for path in (result.path, *result.assets)],
     }
-
-
-def drives_of(options: list[str]) -> dict[str, str]:
-    """Drive by joint name or pattern from the options ``--drive``.
-
-    Args:
-        options: Values of the option, each ``NAME`` or ``JOINT=NAME``. The name of an
-            existing file is a ``NAME``, even if it contains ``=``.
-
-    Raises:
-        InputError: If a value is incomplete, or a joint has two drives.
-    """
-    drives: dict[str, str] = {}
-    for text in options:
-        joint, equals, name = text.partition("=")
-        if not equals or Path(text).is_file():
-            joint, name = "*", text
-        if not (joint and name):
-            raise InputError(f"--drive {text!r}; accepted: NAME or JOINT=NAME")
-        if joint in drives:
-            what = "all joints" if joint == "*" else f"joint {joint!r}"
-            raise InputError(f"--drive {text!r}: {what} already has {drives[joint]!r}")
-        drives[joint] = name
-    # the drive of all other joints comes last, wherever its option stands
-    if "*" in drives:
-        drives["*"] = drives.pop("*")
-    return drives
 
 
 def report(result: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from swgjoint.cli.shared.arm_arguments import (
     choice_lines,
     scene_of,
 )
+from swgjoint.cli.shared.drive_option import add_drive_option
 from swgjoint.cli.shared.life_text import (
     bearing_lines,
     gauge_lines,
@@ -58,11 +59,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="scene file, MJCF or URDF file of an arm, or bundled name; an arm is moved"
         " through a slow sweep and gets default drives unless --drive is specified",
     )
-    parser.add_argument(
-        "--drive",
-        metavar="NAME",
-        help="design, map or catalogue drive for all joints; for a single joint use"
-        " --set joints.JOINT.drive=NAME",
+    add_drive_option(
+        parser,
+        "all joints",
+        "default: the drives of the scene, or those that a rule selects for an arm;"
+        " --set joints.JOINT.drive replaces that of a pattern or of all joints",
     )
     add_overrides(parser, "change a key of the scene, e.g. simulation.step_s=0.0005")
     parser.add_argument(

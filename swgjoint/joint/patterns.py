@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, TypeVar
 
 import mujoco
 
 from swgjoint.errors import InputError
 from swgjoint.joint.callers import depth_of_caller
 from swgjoint.joint.obstacles import Surroundings
+
+V = TypeVar("V")
 
 
 def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
@@ -93,6 +95,30 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
             stacklevel=depth_of_caller(),
         )
     return chosen
+
+
+def with_whole_names(spec: mujoco.MjSpec, values: Mapping[str, V]) -> dict[str, V]:
+    """Values by joint name or pattern, with the suffix ``_joint`` where it is omitted.
+
+    Args:
+        spec: Model; unchanged.
+        values: Values by name or pattern. The suffix is added to a name that no joint
+            has if a joint has the name with the suffix.
+
+    Raises:
+        InputError: If a joint is stated with and without the suffix.
+    """
+    named: dict[str, V] = {}
+    for key, value in values.items():
+        whole = f"{key}_joint"
+        omitted = spec.joint(str(key)) is None and spec.joint(whole) is not None
+        name = whole if omitted else key
+        if name in named:
+            raise InputError(
+                f"{key!r}: joint {name!r} has a drive already; accepted: one drive"
+            )
+        named[name] = value
+    return named
 
 
 def _is_pattern(key: str, around: Surroundings) -> bool:

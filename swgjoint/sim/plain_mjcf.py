@@ -16,6 +16,7 @@ from swgjoint.errors import InputError
 from swgjoint.files import check_output_file, write_whole
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native_error import NativeError, native_error, notes_of
+from swgjoint.joint.patterns import with_whole_names
 from swgjoint.joint.step_damping import StepMode
 from swgjoint.models_path import find
 from swgjoint.sim.arm.compiling import compile_spec
@@ -99,7 +100,7 @@ def export_mjcf(
         drives = {"*": drives}
     attached = attach(
         spec,
-        {_joint_name(spec, key): drive for key, drive in drives.items()},
+        with_whole_names(spec, drives),
         level="native",
         rotor_inertia=rotor_inertia,
         model=model,
@@ -122,14 +123,6 @@ def export_mjcf(
         errors=errors,
         step=timestep,
     )
-
-
-def _joint_name(spec: mujoco.MjSpec, key: str) -> str:
-    """The key with the suffix ``_joint`` if only that is the name of a joint."""
-    whole = f"{key}_joint"
-    if spec.joint(key) is None and spec.joint(whole) is not None:
-        return whole
-    return key
 
 
 def _add_motors(spec: mujoco.MjSpec, drives: Mapping[str, JointDrive]) -> None:

@@ -8,8 +8,8 @@ import mujoco
 import pytest
 from messages import names
 
-from swgjoint.cli.export import drives_of
 from swgjoint.cli.main import main
+from swgjoint.cli.shared.drive_option import drives_of
 from swgjoint.sim.arm.scene import arm_scene
 
 
@@ -65,6 +65,13 @@ def test_drives_by_rule_are_those_of_run(capsys):
         (
             ["ur5e", "-o", "arm.xml", *2 * ["--drive", "CSG-25-100"]],
             ["all joints", "CSG-25-100"],
+        ),
+        (
+            [
+                *("ur5e", "-o", "arm.xml", "--drive", "elbow=CSG-25-100"),
+                *("--drive", "elbow_joint=CSG-17-100"),
+            ],
+            ["'elbow_joint'", "already"],
         ),
         (["ur5e", "-o", "arm.xml", "--step", "nan"], ["nan s", "accepted"]),
         (["ur5e", "-o", "arm.xml", "--fmi", "3.0"], ["--fmi", "fmu"]),

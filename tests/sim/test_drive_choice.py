@@ -167,3 +167,79 @@ def test_the_table_has_the_names_that_keys_need(capsys):
     assert main(["run", "ur5e", "--joints", "elbow_joint", *QUICK]) in (0, 1)
     rows = capsys.readouterr().out.splitlines()
     assert sum(row.startswith("elbow_joint") for row in rows) >= 2
+
+
+@pytest.mark.parametrize("reference", ["ur5e", "ur5e-catalogue"])
+def test_drives_of_single_joints(reference, capsys):
+    """Names and patterns replace those of an arm's rule or of a scene, no others."""
+    own = ["--drive", "elbow=CSG-32-100", "--drive", "wrist_*=CSG-14-50"]
+    options = [*QUICK, "--json"]
+
+    def drives_of_run(*more):
+        assert main(["run", reference, *more, *options]) in (0, 1)
+        result = json.loads(capsys.readouterr().out)
+        joints = result["contains"]["joints"]
+        names = {joint: one["drive"] for joint, one in joints.items()}
+        return names, set(result["drive_choice"])
+
+    shoulder = {"shoulder_pan_joint", "shoulder_lift_joint"}
+    wrist = {f"wrist_{k}_joint": "CSG-14-50" for k in (1, 2, 3)}
+    before, rule = drives_of_run()
+    after, kept = drives_of_run(*own)
+    assert after == before | {"elbow_joint": "CSG-32-100"} | wrist
+    assert kept == rule & shoulder
+    change = ["--set", "joints.wrist_1_joint.drive=CSG-17-100"]
+    after, kept = drives_of_run("--drive", "CSG-20-100", *own, *change)
+    assert not kept and after == dict.fromkeys(shoulder, "CSG-20-100") | {
+        "elbow_joint": "CSG-32-100",
+        **wrist,
+        "wrist_1_joint": "CSG-17-100",
+    }
+
+
+@pytest.mark.parametrize("reference", ["ur5e", "ur5e-catalogue"])
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (["CSG-14-50", "CSG-17-50"], ["all joints", "CSG-14-50", "CSG-17-50"]),
+        (["CSG-14-50", "CSG-14-50"], ["all joints", "CSG-14-50"]),
+        (["elbow=CSG-14-50", "elbow=CSG-17-50"], ["'elbow'", "CSG-14-50"]),
+        (["elbow=CSG-14-50", "elbow_joint=CSG-17-50"], ["'elbow_joint'"]),
+        (["elbow="], ["'elbow='", "JOINT=NAME"]),
+        (["elbo=CSG-14-50"], ["'elbo'", "elbow_joint"]),
+        (["knee_*=CSG-14-50"], ["'knee_*'", "elbow_joint"]),
+        (["elb*=CSG-14-50", "elbow=CSG-17-50"], ["'elb*'", "more specific"]),
+    ],
+)
+def test_contradicting_drives_are_refused(reference, options, parts, capsys):
+    """In one line, for an arm and for a scene."""
+    arguments = [word for text in options for word in ("--drive", text)]
+    assert main(["run", reference, *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and len(err.splitlines()) == 1 and names(err, *parts)
+
+
+@pytest.mark.parametrize("reference", ["ur5e", "ur5e-catalogue"])
+@pytest.mark.parametrize(
+    ("drive", "change", "parts"),
+    [
+        ("CSG-14-50", "defaults.drive=CSG-17-50", ["all joints", "defaults"]),
+        ("elbow=CSG-14-50", "joints.elbow_joint.drive=CSG-17-50", ["'elbow_joint'"]),
+        ("elbow=CSG-14-50", "joints={}", ["'elbow_joint'"]),
+        ("elb*=CSG-14-50", "joints={}", ["'elbow_joint'"]),
+    ],
+)
+def test_a_change_that_contradicts_a_drive_is_refused(
+    reference, drive, change, parts, capsys
+):
+    """Option --set does not silently replace what --drive states for the same key."""
+    assert main(["run", reference, "--drive", drive, "--set", change]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1 and names(err, "CSG-14-50", *parts)
+
+
+def test_a_joint_without_a_drive_takes_none(capsys):
+    """The reason why it is held, and the joints that have drives."""
+    held = ["--joints", "elbow", "--drive", "wrist_1=CSG-14-50"]
+    assert main(["run", "ur5e", *held]) == 2
+    assert names(capsys.readouterr().err, "'wrist_1_joint'", "driven", "elbow_joint")

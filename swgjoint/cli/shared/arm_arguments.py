@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.shared.drive_option import drives_of
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 
@@ -82,7 +83,7 @@ def scene_of(
 
     Args:
         args: Parsed arguments: ``scene``, the options of :func:`add_arm_arguments` and,
-            if the command has it, ``drive``.
+            if the command has it, ``drives``.
         changes: Changes of the scene, each as ``KEY=VALUE``.
 
     Returns:
@@ -91,16 +92,17 @@ def scene_of(
         assumed.
 
     Raises:
-        InputError: If an option for an arm is combined with a scene.
+        InputError: If an option for an arm is combined with a scene, or if drives are
+            incomplete or contradict each other.
     """
     from swgjoint.sim.arm.scene import arm_scene, is_arm
     from swgjoint.sim.scene.scene import Scene
 
-    drive: str | None = getattr(args, "drive", None)
+    drives = drives_of(getattr(args, "drives", []))
     if is_arm(args.scene):
         made: ArmScene = arm_scene(
             args.scene,
-            drive=drive,
+            drive=drives,
             joints=args.joints,
             pose=args.pose,
             motion=args.motion,
@@ -116,10 +118,27 @@ def scene_of(
             f"{', '.join(arm_options)} with scene {args.scene!r}; accepted: with an arm"
             " (an MJCF or URDF file); with a scene, use --set KEY=VALUE instead"
         )
-    if drive:
-        scene = Scene.load_file(args.scene).with_drive(drive)
-        return scene.with_changes(changes), None, ()
+    if drives:
+        return _scene_with(args.scene, drives, changes), None, ()
     return Scene.load_file(args.scene, changes), None, ()
+
+
+def _scene_with(reference: str, drives: dict[str, str], changes: list[str]) -> Scene:
+    """Load a scene with other drives in all joints or in some of them."""
+    from swgjoint.sim.arm.named_drives import ALL, check_drives, drives_by_joint
+    from swgjoint.sim.arm.scene import rigid_arm_of
+    from swgjoint.sim.scene.overrides import parse_override
+    from swgjoint.sim.scene.scene import Scene
+
+    scene, own = Scene.load_file(reference), {}
+    if drives.keys() - {ALL}:
+        # the changes may state another arm or other joints that have drives
+        own = drives_by_joint(drives, rigid_arm_of(scene.with_changes(changes)))
+    if ALL in drives:
+        scene = scene.with_drive(drives[ALL])
+    changed = scene.with_drives(own).with_changes(changes)
+    check_drives(changed, drives, own, [parse_override(one)[0] for one in changes])
+    return changed
 
 
 def choice_lines(choice: dict[str, Any]) -> list[str]:
@@ -145,7 +164,7 @@ def choice_lines(choice: dict[str, Any]) -> list[str]:
     lines = [
         "drives selected by rule: the smallest CSG drive of ratio 100 that covers the"
         " motor torque limit in the file (effort), the weight and the motion; to select"
-        " others: --drive NAME or --set joints.JOINT.drive=NAME; to leave joints such"
+        " others: --drive [JOINT=]NAME; to leave joints such"
         " as a gripper's without a drive: --joints 'PATTERN,...'",
         table(
             [("", "", "N·m", "N·m", ""), *rows],

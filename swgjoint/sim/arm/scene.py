@@ -23,6 +23,7 @@ from swgjoint.sim.arm.gentle_sweep import (
     place_arm,
 )
 from swgjoint.sim.arm.motions import TOOL_MOTIONS, tables_of
+from swgjoint.sim.arm.named_drives import ALL, check_drives, drives_by_joint
 from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.reading import ArmReading, patterns_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -66,7 +67,7 @@ def is_arm(reference: str) -> bool:
 def scene_of_arm(
     reference: str,
     *,
-    drive: str | None = None,
+    drive: str | Mapping[str, str] | None = None,
     joints: Iterable[str] = (),
     pose: str | None = None,
     motion: str | None = None,
@@ -77,7 +78,8 @@ def scene_of_arm(
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
-        drive: Drive of all joints; None selects one for each joint.
+        drive: Drive of all joints, or drives by joint name or pattern; None selects one
+            for each joint.
         joints: Names or patterns of the hinges that move; all if empty.
         pose: Start pose; None chooses one without contact.
         motion: Kind of the trajectory; None uses a sweep.
@@ -104,7 +106,7 @@ def scene_of_arm(
 def arm_scene(
     reference: str,
     *,
-    drive: str | None = None,
+    drive: str | Mapping[str, str] | None = None,
     joints: Iterable[str] = (),
     pose: str | None = None,
     motion: str | None = None,
@@ -113,15 +115,15 @@ def arm_scene(
 ) -> ArmScene:
     """Generate a scene in which the chosen hinges have drives and move slowly.
 
-    Without ``drive``, :func:`swgjoint.sim.arm.drive_choice.choose_drives` selects a
-    drive for each joint. This rule is a starting point; the manufacturer of the arm may
-    have chosen other drives. The rotor inertia of a joint follows its drive, see
-    :func:`assumed_rotor_inertia`, unless the changes state one.
+    :func:`swgjoint.sim.arm.drive_choice.choose_drives` selects a drive for each joint
+    whose drive is not stated. This rule is a starting point; the manufacturer of the
+    arm may have chosen other drives. The rotor inertia of a joint follows its drive,
+    see :func:`assumed_rotor_inertia`, unless the changes state one.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
-        drive: Drive of all joints: design, map or catalogue name;
-            ``defaults.drive`` of the overrides takes precedence.
+        drive: Drive of all joints: design, map or catalogue name; or drives by joint
+            name or pattern, of which the first that matches a joint applies.
         joints: Names or patterns of the hinges that move. A string may contain several,
             separated by commas. If empty, all hinges move. The others are held in the
             start pose.
@@ -142,7 +144,8 @@ def arm_scene(
         InputError: If the arm cannot be used.
     """
     changes = _as_mapping(overrides)
-    drive = changes.get("defaults.drive", drive)
+    drives = {ALL: drive} if isinstance(drive, str) else drive or {}
+    common = changes.get("defaults.drive", drives.get(ALL))
     kind = str(changes.get("trajectory.kind", motion or "sweep"))
     reading = ArmReading(
         driven=patterns_of(list(joints)), balance_inertia=balance_inertia
@@ -182,17 +185,21 @@ def arm_scene(
                 break
         else:
             raise
-    if drive is not None:
-        data["defaults"] |= {"drive": drive}
+    single = drives_by_joint(drives, rigid)
+    if common is not None:
+        data["defaults"] |= {"drive": common}
         choice = {}
     else:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the run repeats these warnings
             choice = choose_drives(rigid, trajectory_of(scene, rigid))
-        data["joints"] = {joint: {"drive": one.drive} for joint, one in choice.items()}
+    named = {joint: one.drive for joint, one in choice.items()} | single
+    if named:
+        data["joints"] = {joint: {"drive": name} for joint, name in named.items()}
     where = f"scene of {reference}"
     scene = Scene.from_data(data, where=where, overrides=changes)
-    assumed = _add_rotors(data, scene, rigid.joints, drive, changes)
+    check_drives(scene, drives, single, changes)
+    assumed = _add_rotors(data, scene, rigid.joints, common, changes)
     scene = Scene.from_data(data, where=where, overrides=changes)
     if not changes.keys() & {"simulation", "simulation.step_s"}:
         data["simulation"]["step_s"] = resolving_step(scene, rigid)
@@ -200,7 +207,7 @@ def arm_scene(
     kept = {
         joint: one
         for joint, one in choice.items()
-        if scene.joint_settings(joint).drive == one.drive
+        if joint not in single and scene.joint_settings(joint).drive == one.drive
     }
     return ArmScene(scene=scene, drive_choice=kept, assumed_rotors=assumed)
 

@@ -290,6 +290,14 @@ class Scene(Section):
         none = dict.fromkeys((*DRIVE_KEYS, "model"))
         return self._with_all(**{**none, "drive": drive})
 
+    def with_drives(self, drives: Mapping[str, str]) -> Self:
+        """A copy in which some joints have these drives, by joint name."""
+        own = {
+            name: self.joints.get(name, JointSection()).with_drive(drive)
+            for name, drive in drives.items()
+        }
+        return self._updated(joints=self.joints | own)
+
     def with_model(self, model: str) -> Self:
         """A copy whose designs get maps of this fidelity.
 
