@@ -1,6 +1,7 @@
 """Limits, payload, sensors and disturbances: closed forms, and no trace without."""
 
 import json
+from math import pi
 
 import mujoco
 import numpy as np
@@ -10,12 +11,14 @@ from messages import names
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
+from swgjoint.joint.step_damping import StepMode
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.equilibrium import set_start
+from swgjoint.sim.figures import contains
 from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.scene.feature_sections import Payload
 from swgjoint.sim.scene.scene import Scene
@@ -400,3 +403,20 @@ def test_what_does_not_fit_is_one_line(overrides, message, synthetic_map):
         )
     assert names(str(caught.value), "bench.toml", *message)
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(("own", "where"), [(0.02, "100 Hz to 0.3;"), (6e2, None)])
+def test_added_damping_is_stated_for_what_vibrates(own, where, monkeypatch):
+    """In a clearance the drive hardly has a stiffness, and nothing vibrates."""
+    vibration = StepMode(
+        frequency=200.0 * pi,
+        damping_ratio=own + 0.28,
+        own_frequency=200.0 * pi,
+        own_damping_ratio=own,
+    )
+    monkeypatch.setattr(contains, "_modes", lambda *_: (vibration, None))
+    found = contents(
+        assemble(Scene.load_file("bench"), drives={"reference-2d": LINEAR})
+    )
+    stated = [one["reason"] for one in found["left_out"] if "damping" in one["part"]]
+    assert [where in text for text in stated] == ([True] if where else [])

@@ -257,9 +257,12 @@ def _off_damping(
     for mode, where in zip(
         _modes(assembly, transmission), ("", " at rated torque"), strict=True
     ):
-        if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
+        # in a clearance, where the spring hardly acts, nothing vibrates
+        if mode is None or mode.own_damping_ratio >= 1.0:
             continue
         own, got = mode.own_damping_ratio, mode.damping_ratio
+        if got < own + OFF_DAMPING:
+            continue
         full = transmission.attached.level == "full"
         other = "" if full else " or joints.*.level = 'full'"
         part = f"damping ratio {own:.2g} of the drive"
