@@ -12,7 +12,8 @@ namespace {
 using Values = std::vector<double>;
 using Numbers = std::vector<std::size_t>;
 
-constexpr int kTries = 25;
+// TRIES and PATIENCE of complementarity.py
+constexpr int kTries = 120, kPatience = 3;
 constexpr double kTolerance = 1e-12, kTiny = 1e-300;
 
 // A square matrix with a right-hand side for some of its rows and columns.
@@ -115,10 +116,15 @@ bool solve_contact_step(const ContactStep& step, const double* products, bool* a
     }
   };
   bool settled = false;
+  std::size_t fewest = n + 1;
+  int patience = kPatience;
+  Numbers bad;
   for (int k = 0; k < kTries && !settled; ++k) {
     gather();
     if (!system.solve(scaled, size, index, right, &z)) return false;
-    settled = true;
+    bad.clear();
+    std::size_t worst = 0;
+    double most = tolerance;
     for (std::size_t i = 0; i < n; ++i) {
       double wrong = -z[i];
       if (!active[i]) {
@@ -126,10 +132,22 @@ bool solve_contact_step(const ContactStep& step, const double* products, bool* a
         for (const std::size_t j : index) wrong -= scaled[size * i + j] * z[j];
       }
       if (!(wrong > tolerance)) continue;
-      // a new set takes effect when all rows are checked
-      active[i] = !active[i];
-      settled = false;
+      bad.push_back(i);
+      if (wrong > most) {
+        most = wrong;
+        worst = i;
+      }
     }
+    settled = bad.empty();
+    if (bad.size() < fewest) {
+      fewest = bad.size();
+      patience = kPatience;
+    } else if (patience > 0) {
+      --patience;
+    } else if (!settled) {
+      bad.assign(1, worst);
+    }
+    for (const std::size_t i : bad) active[i] = !active[i];
   }
   if (!settled) return false;
   for (std::size_t i = 0; i < size; ++i) result[i] = z[i] / scale[i];

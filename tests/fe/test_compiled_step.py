@@ -93,6 +93,25 @@ def problem_of(rng, rows):
     )
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_neighbouring_contacts_are_found(seed):
+    """Forces and gaps of many contacts on a soft surface are non-negative."""
+    rng, rows = np.random.default_rng(seed), 40
+    factor, given = problem_of(rng, rows)
+    given["rows"] *= 1e-6
+    x = np.sort(rng.random(rows))
+    gap, arm, compliance, _ = given["gaps"]
+    gap[:] = 3.0 * x**2 - 1.0 + 0.02 * np.cos(40.0 * x)
+    compliance[:] = np.exp(-(((x[:, None] - x) / 0.3) ** 2)) + 1e-5 * np.eye(rows)
+    arm[:], given["active"][:] = 0.0, True
+    found = factor.solve_contacts(**given)
+    assert found is not None
+    force = given["result"][:rows]
+    moved = np.einsum("kn,kn->k", given["rows"], found[0][given["sector"]])
+    assert (force >= 0.0).all() and 2 <= np.count_nonzero(force) < 10
+    assert (gap + moved + compliance @ force >= -1e-10).all()
+
+
 def test_singular_contacts_are_left_to_numpy():
     """A line without compliance that moves nothing."""
     factor, given = problem_of(np.random.default_rng(1), 3)

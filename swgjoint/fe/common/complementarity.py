@@ -8,6 +8,13 @@ from scipy.optimize import nnls
 from swgjoint.errors import Outcome
 from swgjoint.typing import Array, Mask
 
+TRIES = 120
+"""Largest number of active sets that are tried. Contacts of conforming flanks need up
+to 100."""
+PATIENCE = 3
+"""Number of active sets without fewer violated conditions than any before, after which
+one contact at a time is exchanged."""
+
 
 class ActiveSetError(ArithmeticError):
     """No active set was found, or the system of an active set is singular."""
@@ -26,9 +33,11 @@ def solve_mixed(
 
     .. math:: 0 \le z_i \perp g_i \ge 0 \quad (i < m), \qquad g_i = 0 \quad (i \ge m)
 
-    A primal-dual active-set method finds the solution in a few small solves. If it
-    cycles, as nearly coincident contact points may cause, the free unknowns are
-    eliminated and the active set follows from a non-negative least-squares problem.
+    A primal-dual active-set method finds the solution in a few small solves. If the
+    number of violated conditions does not decrease, as nearly coincident contact points
+    may cause, only the worst one is exchanged until it does. If even this cycles, the
+    free unknowns are eliminated and the active set follows from a non-negative
+    least-squares problem.
 
     Args:
         matrix: Matrix M (n, n), symmetric, positive definite after elimination of the
@@ -60,12 +69,21 @@ def solve_mixed(
     scaled = matrix / scale[:, None] / scale
     q = offset / scale
     tolerance = 1e-12 * max(float(np.abs(q).max(initial=0.0)), 1e-300)
-    for _ in range(25):
+    fewest, patience = m + 1, PATIENCE
+    for _ in range(TRIES):
         z = _solve_active(scaled, q, active)
         gap = q + scaled @ z
-        bad = np.where(active, -z[:m], -gap[:m]) > tolerance
-        if not bad.any():
+        wrong = np.where(active, -z[:m], -gap[:m])
+        bad = wrong > tolerance
+        count = int(np.count_nonzero(bad))
+        if count == 0:
             return z / scale, active
+        if count < fewest:
+            fewest, patience = count, PATIENCE
+        elif patience > 0:
+            patience -= 1
+        else:
+            bad = np.arange(m) == wrong.argmax()
         active = active ^ bad
     active = _least_squares(scaled, q, m, multipliers)
     z = _solve_active(scaled, q, active)
