@@ -76,6 +76,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, floor, inf, log10, sqrt
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -250,7 +251,9 @@ def _discrete_bounds(
     m, i, rotor = drive.drive, abs(drive.ratio), drive.rotor_inertia
     sticking = sticking_stiffness(m.hysteresis)
     n = input_orders(m)[1:]
-    slope, curvature = _error_bounds(m, n)
+    if m not in _known_bounds:
+        _known_bounds[m] = _error_bounds(m, n)
+    slope, curvature = _known_bounds[m]
     order = float(n.max(initial=0.0))
     inertia = rotor + drive.link_inertia / i**2
     held = drive.stiffness / i**2
@@ -288,6 +291,10 @@ def _discrete_bounds(
             timestep=None,
         ),
     )
+
+
+# the joints of an arm, and runs of them, share their maps
+_known_bounds: WeakKeyDictionary[DriveMap, tuple[float, float]] = WeakKeyDictionary()
 
 
 def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:

@@ -294,7 +294,7 @@ class Potential:
 
     # -- figures used by joints -----------------------------------------------
 
-    @property
+    @cached_property
     def mean_stiffness(self) -> float:
         """Secant stiffness of the mean curve from -rated to +rated torque [N·m/rad]."""
         low, high = (
@@ -310,15 +310,9 @@ class Potential:
         three) and in the linear continuation beyond the knots.
         """
         points = 3 if len(self.orders) - 1 > MANY else 9
-        x = np.concatenate(
-            [
-                np.linspace(a, b, points)
-                for a, b in zip(
-                    self.torsion_knots, self.torsion_knots[1:], strict=False
-                )
-            ]
-        )
-        inside = self.coefficients(x, 2)
+        knots = self.torsion_knots
+        x = np.linspace(knots[:-1], knots[1:], points)
+        inside = self.coefficients(np.unique(x), 2)
         ends = np.moveaxis(self.end_stiffness, 2, 0)
         values = np.concatenate([inside, ends])
         swing = largest_sums(self.orders[1:], values[:, 1:])
