@@ -46,7 +46,8 @@ def test_positions_are_at_the_corner(place):
     # at every validation torque, and at other positions more often than by chance (1/8)
     found = {torque for (torque, _), at in zip(positions, near, strict=True) if at}
     assert set(UNSEEN.torque[UNSEEN.torque != 0.0]) <= found
-    assert near.mean() > 0.3
+    assert near.sum() > 12
+    assert near.mean() > 0.2
     # without the corner other places are worst
     smooth = replace(samples_of(n_angles=ANGLES), unseen=UNSEEN)
     others = worst_positions(fit_map(smooth), smooth)

@@ -26,12 +26,12 @@ from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import MapSamples
 from swgjoint.typing import Array
 
-EXTRA = 8
+EXTRA = 16
 """Number of additional positions of one sign for each of the two quantities."""
 APART = (0.03, 0.1)
 """Smallest distance of torques that are not about the same, relative to the repeated
 peak torque and to the torque itself, whichever is less [-]."""
-AT_TORQUE = 2
+AT_TORQUE = 4
 """Largest number of additional positions of each quantity at about the same torque."""
 LEAST = 0.01
 """Smallest additional torque relative to the repeated peak torque [-]."""
