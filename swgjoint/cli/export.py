@@ -234,7 +234,7 @@ def _mjcf_text(result: dict[str, Any]) -> str:
     lines = [
         *([by_rule] if result["drives_by_rule"] else []),
         "level native without a plugin; differences from level full at equal motor"
-        " angle and torque, and resonance at the time step of"
+        " angle and torque, and resonance without load at the time step of"
         f" {1e3 * result['step_s']:g} ms:",
         table(rows, header=header),
         *(

@@ -212,7 +212,7 @@ def map_accuracy(results: Sequence[Row]) -> list[list[str]]:
     """Differences of maps from unseen solves, and those that their records state."""
     table = [["design", "wave generator", "angles, solves", "CPU s"]]
     for name in ("input torque", "output error"):
-        table[0] += [f"{name}: largest, rms [%]", "largest of 720 [%]", "record [%]"]
+        table[0] += [f"{name}: largest, rms [%]", "largest of 1,440 [%]", "record [%]"]
     for result in results:
         own = f"{result['teeth']} teeth, of the test"
         name = own if result["design"].startswith("own") else f"`{result['design']}`"
