@@ -99,6 +99,11 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
     mujoco.mj_forward(model, data)
     for j, transmission in enumerate(assembly.transmissions):
         plugin = transmission.attached.plugin
+        # hysteresis starts relaxed, so only the elastic law carries the initial load
+        for name in transmission.attached.hysteresis:
+            tendon = int(model.tendon(name).id)
+            rest = int(model.tendon_plasticadr[tendon])
+            data.plastic[rest : rest + 2] = data.ten_length[tendon]
         if transmission.law is None or plugin is None:
             continue
         rotor, link = assembly.motor_velocity[j], assembly.link_velocity[j]
@@ -112,7 +117,6 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
             float(on_input),
             float(on_output),
         ]
-        # hysteresis starts relaxed, so only the elastic law carries the initial load
         torsion = float(transmission.law.torsion(theta, psi))
         elements = len(transmission.attached.elements)
         data.plugin_state[first + 2 : first + 2 + elements] = torsion

@@ -16,9 +16,10 @@ LOSSY = replace(
 )
 
 
-def test_a_run_starts_relaxed_under_its_load(bench):
+@pytest.mark.parametrize("level", ["full", "native"])
+def test_a_run_starts_relaxed_under_its_load(bench, level):
     """The balance of the spring stands: torsion T/K from the first instant."""
-    run = bench(LOSSY)
+    run = bench(LOSSY, defaults__level=level)
     np.testing.assert_allclose(run.torsion, 20.0 / 2e4, rtol=1e-6)
     np.testing.assert_allclose(run.output_torque, 20.0, rtol=1e-6)
 
