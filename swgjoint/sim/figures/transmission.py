@@ -140,7 +140,8 @@ class Transmission:
         elements = self.attached.elements
         if elements:
             elastic = np.concatenate([law.torque for law in laws]) if laws else 0.0
-            relaxed = self._relaxed(torsion)
+            # hysteresis starts relaxed
+            relaxed = float(torsion[0])
             begins = rests.elements if rests else len(elements) * (relaxed,)
             for element, rest in zip(elements, begins, strict=True):
                 stretch = stretches(torsion - rest, element.reach(elastic))
@@ -171,13 +172,6 @@ class Transmission:
             stored=stored,
             rests=Rests(elements=tuple(ends), bristle=bristle),
         )
-
-    def _relaxed(self, torsion: Array) -> float:
-        """Torsion at which the hysteresis springs are relaxed at the start [rad].
-
-        It is the initial torsion at level ``full``, and zero at level ``native``.
-        """
-        return float(torsion[0]) if self.level == "full" else 0.0
 
 
 def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
