@@ -360,11 +360,21 @@ mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
 // the processor works on several of them at the same time.
 SWGJOINT_CLONES void Drive::PredictGroup(const mjModel* m, mjData* d, int instance) {
   Drive* group[kGroup];
-  int size = 0, passes = 0;
-  for (int n = instance; n < m->nplugin && size < kGroup; ++n) {
+  int members = 0, size = 0, passes = 0;
+  for (int n = instance; n < m->nplugin && members < kGroup; ++n) {
     if (m->plugin[n] != m->plugin[instance]) continue;
-    Drive* drive = group[size++] = Get(d, n);
+    ++members;
+    Drive* drive = Get(d, n);
     drive->Begin(m, d, n);
+    if (drive->map_.many()) {
+      // the table is in the cache from one pass to the next
+      for (int pass = 0; pass < drive->passes_; ++pass) {
+        drive->Secant(&drive->step_);
+        drive->Solve(pass, &drive->step_);
+      }
+      continue;
+    }
+    group[size++] = drive;
     passes = std::max(passes, drive->passes_);
   }
   for (int pass = 0; pass < passes; ++pass) {

@@ -9,6 +9,14 @@
 namespace swgjoint {
 namespace {
 
+// Whether the processor has vectors for eight numbers. The others add the two halves of
+// such vectors one after the other, with the same bits.
+#if defined(SWGJOINT_WIDE_CLONES)
+const bool kHasWide = __builtin_cpu_supports("x86-64-v4");
+#else
+constexpr bool kHasWide = false;
+#endif
+
 // The mean torque between two torsions that belong to one polynomial of the potential,
 // and its derivative by the second torsion.
 SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
@@ -53,175 +61,225 @@ void DriveMap::Begin(double theta, double psi) {
 }
 
 // Computes cos and sin of all phases at the given angles, and returns e0.
-SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
+template <class V, int kSize>
+SWGJOINT_INLINE double DriveMap::RotateBlocks(double theta, double psi) {
+  constexpr BlockSizes size = {kSize};
+  constexpr int width = sizeof(V) / sizeof(double);
   theta += shift_theta_;
   psi += shift_psi_;
-  Lanes sum = {};
   double* all = harmonics_.data();
-  double* own = all;
-  for (int b = 0; b < blocks_; ++b, own += kHarmonics) {
-    Lanes c, s, error_c, error_s;
+  V sums[kSize / width] = {};
+  for (int b = 0; b < blocks_; ++b) {
     const Recipe& recipe = recipe_[b];
-    if (recipe.from < 0) {
-      Lanes n, m;
-      Load(own, &n);
-      Load(own + kLanes, &m);
-      CosSin(n * theta + m * psi, &c, &s);
-    } else {
-      const double* from = all + recipe.from + kPhases;
-      const double* shift = all + recipe.shift + kPhases;
-      const double shift_c = shift[0], shift_s = shift[kLanes];
-      Lanes c0, s0;
-      Load(from, &c0);
-      Load(from + kLanes, &s0);
-      c = c0 * shift_c - s0 * shift_s;
-      s = s0 * shift_c + c0 * shift_s;
+    for (int part = 0; part < kSize; part += width) {
+      double* own = all + b * size.harmonics() + part;
+      V c, s, error_c, error_s;
+      if (recipe.from < 0) {
+        V n, m;
+        Load(own, &n);
+        Load(own + size.lanes, &m);
+        CosSin(n * theta + m * psi, &c, &s);
+      } else {
+        const double* from = all + recipe.from + size.phases() + part;
+        const double* shift = all + recipe.shift + size.phases();
+        const double shift_c = shift[0], shift_s = shift[size.lanes];
+        V c0, s0;
+        Load(from, &c0);
+        Load(from + size.lanes, &s0);
+        c = c0 * shift_c - s0 * shift_s;
+        s = s0 * shift_c + c0 * shift_s;
+      }
+      Load(own + 2 * size.lanes, &error_c);
+      Load(own + 3 * size.lanes, &error_s);
+      sums[part / width] += error_c * c + error_s * s;
+      Store(own + 4 * size.lanes, c);
+      Store(own + 5 * size.lanes, s);
     }
-    Load(own + 2 * kLanes, &error_c);
-    Load(own + 3 * kLanes, &error_s);
-    sum += error_c * c + error_s * s;
-    Store(own + 4 * kLanes, c);
-    Store(own + 5 * kLanes, s);
   }
-  return error_mean_ + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
+  V sum = sums[0];
+  for (int part = 1; part < kSize / width; ++part) sum += sums[part];
+  double error[4];
+  Sums(sum, sum, sum, sum, error);
+  return error_mean_ + error[0];
+}
+
+SWGJOINT_CLONES double DriveMap::Rotate(double theta, double psi) {
+  if (!many()) return RotateBlocks<Lanes, kLanes>(theta, psi);
+  return kHasWide ? RotateBlocks<Wide, kWideLanes>(theta, psi)
+                  : RotateBlocks<Lanes, kWideLanes>(theta, psi);
 }
 
 // Stores, at the place of the first weights of every block, cos and sin of half the phase
 // change eta of its harmonics, and n sin(eta)/eta for their orders n. kPsi means that a
 // harmonic depends on psi. No phase changes by more than 2^kHalvings rad; at
 // kHalvings < 0 phases may change by any angle.
-template <bool kPsi, int kHalvings>
+template <class V, int kSize, bool kPsi, int kHalvings>
 SWGJOINT_INLINE void DriveMap::HalfStep(double dtheta, double dpsi) {
-  const double* own = harmonics_.data();
+  constexpr BlockSizes size = {kSize};
+  constexpr int width = sizeof(V) / sizeof(double);
   double* all = weight_.data();
-  double* out = all;
   const Recipe* recipe = recipe_.data();
-  for (int b = 0; b < blocks_; ++b, ++recipe, own += kHarmonics, out += kWeights) {
-    Lanes n, m = {}, c, s, sinc;
-    Load(own, &n);
-    if (kPsi) Load(own + kLanes, &m);
-    Lanes eta = n * (0.5 * dtheta);
-    if (kPsi) eta += m * (0.5 * dpsi);
-    if (!kPsi && recipe->from >= 0) {
-      const double shift_c = all[recipe->shift], shift_s = all[recipe->shift + kLanes];
-      Lanes c0, s0;
-      Load(all + recipe->from, &c0);
-      Load(all + recipe->from + kLanes, &s0);
-      c = c0 * shift_c - s0 * shift_s;
-      s = s0 * shift_c + c0 * shift_s;
-    } else if constexpr (kHalvings >= 0) {
-      SincCos<kHalvings>(eta, &sinc, &c);
-      s = eta * sinc;
-    } else {
-      CosSin(eta, &c, &s);
-      for (int lane = 0; kPsi && lane < kLanes; ++lane) {
-        const double x = eta[lane];
-        out[lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : s[lane] / x;
+  for (int b = 0; b < blocks_; ++b, ++recipe) {
+    for (int part = 0; part < kSize; part += width) {
+      const double* own = harmonics_.data() + b * size.harmonics() + part;
+      double* out = all + b * size.weights() + part;
+      V n, m = {}, c, s, sinc;
+      Load(own, &n);
+      if (kPsi) Load(own + size.lanes, &m);
+      V eta = n * (0.5 * dtheta);
+      if (kPsi) eta += m * (0.5 * dpsi);
+      if (!kPsi && recipe->from >= 0) {
+        const double* shift = all + recipe->shift;
+        const double shift_c = shift[0], shift_s = shift[size.lanes];
+        V c0, s0;
+        Load(all + recipe->from + part, &c0);
+        Load(all + recipe->from + size.lanes + part, &s0);
+        c = c0 * shift_c - s0 * shift_s;
+        s = s0 * shift_c + c0 * shift_s;
+      } else if constexpr (kHalvings >= 0) {
+        SincCos<kHalvings>(eta, &sinc, &c);
+        s = eta * sinc;
+      } else {
+        CosSin(eta, &c, &s);
+        for (int lane = 0; kPsi && lane < width; ++lane) {
+          const double x = eta[lane];
+          out[lane] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : s[lane] / x;
+        }
+        if (kPsi) Load(out, &sinc);
       }
-      if (kPsi) Load(out, &sinc);
-    }
-    Store(out, c);
-    Store(out + kLanes, s);
-    if (kPsi) {
-      Store(out + 2 * kLanes, n * sinc);
-      Store(out + 3 * kLanes, m * sinc);
+      Store(out, c);
+      Store(out + size.lanes, s);
+      if (kPsi) {
+        Store(out + 2 * size.lanes, n * sinc);
+        Store(out + 3 * size.lanes, m * sinc);
+      }
     }
   }
 }
 
 // Adds to `out` the polynomial coefficients of a weighted sum over the harmonics in one
 // segment; `weight` points to the weights of A and B in the first block.
-SWGJOINT_CLONES void DriveMap::Combine(int segment, const double* weight,
-                                       double out[5]) const {
-  Lanes sum[5] = {};
-  // data() is used because a map without harmonics has an empty table
-  const double* row = table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock;
-  for (int b = 0; b < blocks_; ++b, row += kBlock, weight += kWeights) {
-    Lanes wc, ws, even, odd;
-    Load(weight, &wc);
-    Load(weight + kLanes, &ws);
-    for (int p = 0; p < 5; ++p) {
-      Load(row + 2 * p * kLanes, &even);
-      Load(row + (2 * p + 1) * kLanes, &odd);
-      sum[p] += wc * even + ws * odd;
+template <class V, int kSize>
+SWGJOINT_INLINE void DriveMap::CombineBlocks(int segment, const double* weight,
+                                             double out[5]) const {
+  constexpr BlockSizes size = {kSize};
+  constexpr int width = sizeof(V) / sizeof(double);
+  V total[5] = {};
+  for (int part = 0; part < kSize; part += width) {
+    V sum[5] = {};
+    const double* by = weight + part;
+    // data() is used because a map without harmonics has an empty table
+    const double* row =
+        table_.data() + static_cast<size_t>(segment) * blocks_ * size.block() + part;
+    for (int b = 0; b < blocks_; ++b, row += size.block(), by += size.weights()) {
+      V wc, ws, even, odd;
+      Load(by, &wc);
+      Load(by + size.lanes, &ws);
+      for (int p = 0; p < 5; ++p) {
+        Load(row + 2 * p * size.lanes, &even);
+        Load(row + (2 * p + 1) * size.lanes, &odd);
+        sum[p] += wc * even + ws * odd;
+      }
     }
+    for (int p = 0; p < 5; ++p) total[p] += sum[p];
   }
   double low[4], high[4];
-  Sums(sum[0], sum[1], sum[2], sum[3], low);
-  Sums(sum[4], sum[4], sum[4], sum[4], high);
+  Sums(total[0], total[1], total[2], total[3], low);
+  Sums(total[4], total[4], total[4], total[4], high);
   for (int p = 0; p < 4; ++p) out[p] += low[p];
   out[4] += high[0];
 }
 
+SWGJOINT_CLONES void DriveMap::Combine(int segment, const double* weight,
+                                       double out[5]) const {
+  if (!many()) {
+    CombineBlocks<Lanes, kLanes>(segment, weight, out);
+  } else if (kHasWide) {
+    CombineBlocks<Wide, kWideLanes>(segment, weight, out);
+  } else {
+    CombineBlocks<Lanes, kWideLanes>(segment, weight, out);
+  }
+}
+
 // Computes, in one pass over the table, the weights of all A and B, the weighted sums
 // in the segment of the start state, and g. HalfStep must have been called.
-template <bool kPsi>
+template <class V, int kSize, bool kPsi>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
-  const double* row =
-      table_.data() + static_cast<size_t>(j0_) * blocks_ * kBlock;
-  const double* own = harmonics_.data();
-  double* weight = weight_.data();
-  Lanes w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
+  constexpr BlockSizes size = {kSize};
+  constexpr int width = sizeof(V) / sizeof(double);
+  V all_w[5] = {}, all_u[5] = {}, all_v[5] = {}, all_theta = {}, all_psi = {};
   const int blocks = blocks_;
   // n sin(eta)/eta is sin(eta) times this number, or n if eta^2/6 is less than 2^-53
   const bool still = std::fabs(dtheta) * top_theta_ < 1e-8;
   const double per_step = still ? 0 : 2 / dtheta;
-  for (int b = 0; b < blocks;
-       ++b, row += kBlock, own += kHarmonics, weight += kWeights) {
-    Lanes c0, s0, ch, sh, by_theta, by_psi, error_c, error_s, psi_c, psi_s, even, odd;
-    Load(weight, &ch);
-    Load(weight + kLanes, &sh);
-    if (kPsi) {
-      Load(weight + 2 * kLanes, &by_theta);
-      Load(weight + 3 * kLanes, &by_psi);
-    } else if (still) {
-      Load(own, &by_theta);
-    } else {
-      by_theta = sh * per_step;
+  for (int part = 0; part < kSize; part += width) {
+    const double* row =
+        table_.data() + static_cast<size_t>(j0_) * blocks_ * size.block() + part;
+    const double* own = harmonics_.data() + part;
+    double* weight = weight_.data() + part;
+    V w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
+    for (int b = 0; b < blocks;
+         ++b, row += size.block(), own += size.harmonics(), weight += size.weights()) {
+      V c0, s0, ch, sh, by_theta, by_psi, error_c, error_s, psi_c, psi_s, even, odd;
+      Load(weight, &ch);
+      Load(weight + size.lanes, &sh);
+      if (kPsi) {
+        Load(weight + 2 * size.lanes, &by_theta);
+        Load(weight + 3 * size.lanes, &by_psi);
+      } else if (still) {
+        Load(own, &by_theta);
+      } else {
+        by_theta = sh * per_step;
+      }
+      Load(own + 2 * size.lanes, &error_c);
+      Load(own + 3 * size.lanes, &error_s);
+      Load(own + 4 * size.lanes, &c0);
+      Load(own + 5 * size.lanes, &s0);
+      const V c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
+      const V mean_c = c * ch, mean_s = s * ch;
+      const V theta_c = s * (by_theta * -1), theta_s = c * by_theta;
+      g_theta += error_c * theta_c + error_s * theta_s;
+      Store(weight, mean_c);
+      Store(weight + size.lanes, mean_s);
+      Store(weight + 2 * size.lanes, theta_c);
+      Store(weight + 3 * size.lanes, theta_s);
+      if (kPsi) {
+        psi_c = s * (by_psi * -1);
+        psi_s = c * by_psi;
+        g_psi += error_c * psi_c + error_s * psi_s;
+        Store(weight + 4 * size.lanes, psi_c);
+        Store(weight + 5 * size.lanes, psi_s);
+      }
+      for (int p = 0; p < 5; ++p) {
+        Load(row + 2 * p * size.lanes, &even);
+        Load(row + (2 * p + 1) * size.lanes, &odd);
+        // the torque does not need w[0]
+        if (p > 0) w[p] += mean_c * even + mean_s * odd;
+        u[p] += theta_c * even + theta_s * odd;
+        if (kPsi) v[p] += psi_c * even + psi_s * odd;
+      }
     }
-    Load(own + 2 * kLanes, &error_c);
-    Load(own + 3 * kLanes, &error_s);
-    Load(own + 4 * kLanes, &c0);
-    Load(own + 5 * kLanes, &s0);
-    const Lanes c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
-    const Lanes mean_c = c * ch, mean_s = s * ch;
-    const Lanes theta_c = s * (by_theta * -1), theta_s = c * by_theta;
-    g_theta += error_c * theta_c + error_s * theta_s;
-    Store(weight, mean_c);
-    Store(weight + kLanes, mean_s);
-    Store(weight + 2 * kLanes, theta_c);
-    Store(weight + 3 * kLanes, theta_s);
-    if (kPsi) {
-      psi_c = s * (by_psi * -1);
-      psi_s = c * by_psi;
-      g_psi += error_c * psi_c + error_s * psi_s;
-      Store(weight + 4 * kLanes, psi_c);
-      Store(weight + 5 * kLanes, psi_s);
-    }
+    // the mean harmonic joins the others in one of their lanes
+    const double* mean = &mean_[static_cast<size_t>(j0_) * size.mean()] + part;
     for (int p = 0; p < 5; ++p) {
-      Load(row + 2 * p * kLanes, &even);
-      Load(row + (2 * p + 1) * kLanes, &odd);
-      if (p > 0) w[p] += mean_c * even + mean_s * odd;  // the torque does not need w[0]
-      u[p] += theta_c * even + theta_s * odd;
-      if (kPsi) v[p] += psi_c * even + psi_s * odd;
+      V a;
+      Load(mean + p * size.lanes, &a);
+      all_w[p] += w[p] + a;
+      all_u[p] += u[p];
+      all_v[p] += v[p];
     }
-  }
-  // the mean harmonic joins the others in one of their lanes
-  const double* mean = &mean_[static_cast<size_t>(j0_) * kMean];
-  for (int p = 1; p < 5; ++p) {
-    Lanes a;
-    Load(mean + p * kLanes, &a);
-    w[p] += a;
+    all_theta += g_theta;
+    all_psi += g_psi;
   }
   double rest[4];
-  Sums(w[1], w[2], w[3], w[4], w_ + 1);
-  Sums(u[0], u[1], u[2], u[3], u_theta_);
-  Sums(u[4], g_theta, g_psi, g_psi, rest);
+  Sums(all_w[1], all_w[2], all_w[3], all_w[4], w_ + 1);
+  Sums(all_u[0], all_u[1], all_u[2], all_u[3], u_theta_);
+  Sums(all_u[4], all_theta, all_psi, all_psi, rest);
   u_theta_[4] = rest[0];
   out->g = Pair{inverse_ratio_, -1.0} + Pair{rest[1], rest[2]} * error_scale_;
   if (kPsi) {
-    Sums(v[0], v[1], v[2], v[3], u_psi_);
-    Sums(v[4], v[4], v[4], v[4], rest);
+    Sums(all_v[0], all_v[1], all_v[2], all_v[3], u_psi_);
+    Sums(all_v[4], all_v[4], all_v[4], all_v[4], rest);
     u_psi_[4] = rest[0];
   }
 }
@@ -236,8 +294,8 @@ MeanTorque DriveMap::Work(int j1, double x1) const {
     if (j == j0_) {
       std::copy_n(w_, 5, w);
     } else {
-      const double* mean = &mean_[static_cast<size_t>(j) * kMean];
-      for (int p = 0; p < 5; ++p) w[p] = mean[p * kLanes];
+      const double* mean = &mean_[static_cast<size_t>(j) * size_.mean()];
+      for (int p = 0; p < 5; ++p) w[p] = mean[p * size_.lanes];
       Combine(j, weight_.data(), w);
     }
     const double to = j == j1 ? x1 : knots_[step > 0 ? j : j - 1];
@@ -252,30 +310,41 @@ MeanTorque DriveMap::Work(int j1, double x1) const {
   }
 }
 
+template <class V, int kSize>
+SWGJOINT_INLINE void DriveMap::Step(double dtheta, double dpsi, DriveValue* out) {
+  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
+  if (moves_psi_) {
+    if (top <= 1) {
+      HalfStep<V, kSize, true, 0>(dtheta, dpsi);
+    } else if (top <= 4) {
+      HalfStep<V, kSize, true, 2>(dtheta, dpsi);
+    } else {
+      HalfStep<V, kSize, true, -1>(dtheta, dpsi);
+    }
+    Sweep<V, kSize, true>(dtheta, out);
+  } else {
+    if (top <= 1) {
+      HalfStep<V, kSize, false, 0>(dtheta, dpsi);
+    } else if (top <= 4) {
+      HalfStep<V, kSize, false, 2>(dtheta, dpsi);
+    } else {
+      HalfStep<V, kSize, false, -1>(dtheta, dpsi);
+    }
+    Sweep<V, kSize, false>(dtheta, out);
+  }
+}
+
 SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   // With the phase phi at the midpoint and half the phase change eta,
   //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), and similarly for sin.
   // The secants of every harmonic for theta and psi therefore have a closed form, and
   // the mean of its two end values is cos(eta) times its value at the midpoint.
-  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
-  if (moves_psi_) {
-    if (top <= 1) {
-      HalfStep<true, 0>(dtheta, dpsi);
-    } else if (top <= 4) {
-      HalfStep<true, 2>(dtheta, dpsi);
-    } else {
-      HalfStep<true, -1>(dtheta, dpsi);
-    }
-    Sweep<true>(dtheta, out);
+  if (!many()) {
+    Step<Lanes, kLanes>(dtheta, dpsi, out);
+  } else if (kHasWide) {
+    Step<Wide, kWideLanes>(dtheta, dpsi, out);
   } else {
-    if (top <= 1) {
-      HalfStep<false, 0>(dtheta, dpsi);
-    } else if (top <= 4) {
-      HalfStep<false, 2>(dtheta, dpsi);
-    } else {
-      HalfStep<false, -1>(dtheta, dpsi);
-    }
-    Sweep<false>(dtheta, out);
+    Step<Lanes, kWideLanes>(dtheta, dpsi, out);
   }
   const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
   const int j1 = SegmentNear(j0_, x1);
@@ -294,7 +363,7 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   const auto angle = [&](const double u[5], int weights) {
     if (j1 == j0_) return MeanValue(u, d);
     double other[5] = {0, 0, 0, 0, 0};
-    Combine(j1, weight_.data() + weights * kLanes, other);
+    Combine(j1, weight_.data() + weights * size_.lanes, other);
     return 0.5 * (Value(u, d[0]) + Value(other, d[1]));
   };
   const double e_theta = scale_ * angle(u_theta_, 2);

@@ -50,22 +50,28 @@ inline double Slope(const double w[5], double d) {
   return w[1] + d * (2 * w[2] + d * (3 * w[3] + d * 4 * w[4]));
 }
 
+// Sizes of what belongs to the harmonics that are processed together, a block:
+struct BlockSizes {
+  int lanes;  // number of harmonics
+  // coefficients A0, B0, .. A4, B4 in one segment;
+  constexpr int block() const { return 10 * lanes; }
+  // A0, .. A4 of the mean in one segment, each with zeros in all lanes but the first;
+  constexpr int mean() const { return 5 * lanes; }
+  // orders in theta and psi, amplitudes of cos and sin in e0, and cos and sin of the
+  // phases at the start state, of which the places begin at `phases`;
+  constexpr int harmonics() const { return 6 * lanes; }
+  constexpr int phases() const { return 4 * lanes; }
+  // weights of A and B in the mean, and in the secants for theta and for psi.
+  constexpr int weights() const { return 6 * lanes; }
+};
+
 class DriveMap {
  public:
-  // Sizes of what belongs to the harmonics that are processed together, a block:
-  // coefficients A0, B0, .. A4, B4 in one segment;
-  static constexpr int kBlock = 10 * kLanes;
-  // A0, .. A4 of the mean in one segment, each with zeros in all lanes but the first;
-  static constexpr int kMean = 5 * kLanes;
-  // orders in theta and psi, amplitudes of cos and sin in e0, and cos and sin of the
-  // phases at the start state;
-  static constexpr int kHarmonics = 6 * kLanes;
-  // weights of A and B in the mean, and in the secants for theta and for psi.
-  static constexpr int kWeights = 6 * kLanes;
-
   // On failure returns false and names the invalid attribute in `error`.
   bool Parse(const DriveText& text, std::string* error);
 
+  // Whether the map has so many harmonics that its table exceeds the fastest cache.
+  bool many() const { return size_.lanes == kWideLanes; }
   double ratio() const { return ratio_; }
   // Largest order of a harmonic, in cycles per rotor turn.
   double top_order() const { return top_order_; }
@@ -92,8 +98,8 @@ class DriveMap {
   void Secant(double dtheta, double dpsi, DriveValue* out);
 
  private:
-  static_assert(kHarmonics == kWeights, "places are the same in harmonics and weights");
-  static constexpr int kPhases = 4 * kLanes;  // of cos of the phases in a block
+  // Number of harmonics above which blocks are wide.
+  static constexpr int kMany = 128;
 
   // Rule that computes cos and sin of one block of harmonics from those of an earlier
   // block, if all four orders differ from it by the same amount.
@@ -109,16 +115,25 @@ class DriveMap {
   int SegmentNear(int guess, double torsion) const {
     return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
   }
-  template <bool kPsi, int kHalvings>
+  // Parts of Begin and Secant. Each processes all blocks, which have kSize harmonics, as
+  // often as vectors V fit in a block.
+  template <class V, int kSize, bool kPsi, int kHalvings>
   void HalfStep(double dtheta, double dpsi);
-  template <bool kPsi>
+  template <class V, int kSize, bool kPsi>
   void Sweep(double dtheta, DriveValue* out);
+  template <class V, int kSize>
+  void Step(double dtheta, double dpsi, DriveValue* out);
+  template <class V, int kSize>
+  double RotateBlocks(double theta, double psi);
+  template <class V, int kSize>
+  void CombineBlocks(int segment, const double* weight, double out[5]) const;
   MeanTorque Work(int j1, double x1) const;
   double Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;
 
   int n_ = 0;         // number of harmonics, including the mean
-  int blocks_ = 0;    // number of blocks of kLanes harmonics, without the mean
+  BlockSizes size_ = {kLanes};
+  int blocks_ = 0;    // number of blocks of harmonics, without the mean
   int segments_ = 0;  // number of intervals between knots, plus two end parabolas
   bool moves_psi_ = false;  // whether a harmonic depends on psi
   double ratio_ = 1, inverse_ratio_ = 1;
@@ -128,9 +143,9 @@ class DriveMap {
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion origin of each polynomial
   std::vector<double> low_, high_;  // (segments) bounds of the open interval
-  LaneVector mean_;                 // (segments, kMean)
-  LaneVector table_;                // (segments, blocks, kBlock)
-  LaneVector harmonics_;            // (blocks, kHarmonics), padded with zeros
+  LaneVector mean_;                 // (segments, mean)
+  LaneVector table_;                // (segments, blocks, block)
+  LaneVector harmonics_;            // (blocks, harmonics), padded with zeros
   double error_mean_ = 0;
   std::vector<Recipe> recipe_;  // one per block
 
@@ -139,7 +154,7 @@ class DriveMap {
   int j0_ = 0;  // segment; between steps an initial guess that does not affect results
 
   // data of a step, sized in Parse, so that no step allocates memory
-  LaneVector weight_;  // (blocks, kWeights)
+  LaneVector weight_;  // (blocks, weights)
   double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0_
 };
 

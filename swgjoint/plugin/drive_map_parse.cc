@@ -14,8 +14,8 @@
 
 namespace swgjoint {
 
-#define SWGJOINT_FILL(x) {x, x, x, x}
-alignas(64) static const double kTable[kSincTerms + kCosTerms][kLanes] = {
+#define SWGJOINT_FILL(x) {x, x, x, x, x, x, x, x}
+alignas(64) static const double kTable[kSincTerms + kCosTerms][kWideLanes] = {
     // sin(x)/x
     SWGJOINT_FILL(1), SWGJOINT_FILL(-1. / 6), SWGJOINT_FILL(1. / 120),
     SWGJOINT_FILL(-1. / 5040), SWGJOINT_FILL(1. / 362880),
@@ -91,7 +91,8 @@ bool ParseBase64(const char* text, const char* end, std::vector<double>* out) {
   }
   out->pop_back();
   return seen < Digits::kOther &&
-         std::all_of(out->begin(), out->end(), [](double x) { return std::isfinite(x); });
+         std::all_of(out->begin(), out->end(),
+                     [](double x) { return std::isfinite(x); });
 }
 
 }  // namespace
@@ -153,16 +154,18 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
       !Numbers(text.kinematic_error, "kinematic_error", n * 2, &list, error)) {
     return false;
   }
-  blocks_ = (n_ - 1 + kLanes - 1) / kLanes;
-  weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
-  harmonics_.assign(static_cast<size_t>(blocks_) * kHarmonics, 0.0);
+  size_.lanes = n_ - 1 > kMany ? kWideLanes : kLanes;
+  const int lanes = size_.lanes;
+  blocks_ = (n_ - 1 + lanes - 1) / lanes;
+  weight_.assign(static_cast<size_t>(blocks_) * size_.weights(), 0.0);
+  harmonics_.assign(static_cast<size_t>(blocks_) * size_.harmonics(), 0.0);
   for (int k = 1; k < n_; ++k) {
-    double* to = &harmonics_[static_cast<size_t>((k - 1) / kLanes) * kHarmonics];
-    to += (k - 1) % kLanes;
+    double* to = &harmonics_[static_cast<size_t>((k - 1) / lanes) * size_.harmonics()];
+    to += (k - 1) % lanes;
     to[0] = orders[2 * k];
-    to[kLanes] = orders[2 * k + 1];
-    to[2 * kLanes] = list[2 * k];
-    to[3 * kLanes] = list[2 * k + 1];
+    to[lanes] = orders[2 * k + 1];
+    to[2 * lanes] = list[2 * k];
+    to[3 * lanes] = list[2 * k + 1];
   }
   error_mean_ = list[0];
 
@@ -171,8 +174,8 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   base_.resize(segments_);
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
   high_.assign(segments_, std::numeric_limits<double>::infinity());
-  mean_.assign(static_cast<size_t>(segments_) * kMean, 0.0);
-  table_.assign(static_cast<size_t>(segments_) * blocks_ * kBlock, 0.0);
+  mean_.assign(static_cast<size_t>(segments_) * size_.mean(), 0.0);
+  table_.assign(static_cast<size_t>(segments_) * blocks_ * size_.block(), 0.0);
   for (int seg = 0; seg < segments_; ++seg) {
     base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
     if (seg > 0) low_[seg] = knots_[seg - 1];
@@ -191,13 +194,14 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
           to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
         }
         if (k == 0) {
-          double* mean = &mean_[static_cast<size_t>(seg) * kMean];
-          for (int p = 0; ab == 0 && p < 5; ++p) mean[p * kLanes] = to[p];
+          double* mean = &mean_[static_cast<size_t>(seg) * size_.mean()];
+          for (int p = 0; ab == 0 && p < 5; ++p) mean[p * lanes] = to[p];
           continue;
         }
-        const int block = (k - 1) / kLanes, lane = (k - 1) % kLanes;
-        double* row = &table_[(static_cast<size_t>(seg) * blocks_ + block) * kBlock];
-        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * kLanes + lane] = to[p];
+        const int block = (k - 1) / lanes, lane = (k - 1) % lanes;
+        const size_t place = static_cast<size_t>(seg) * blocks_ + block;
+        double* row = &table_[place * size_.block()];
+        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * lanes + lane] = to[p];
       }
     }
   }
@@ -212,26 +216,27 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
 void DriveMap::FindRecipes(const std::vector<double>& orders) {
   const int count = n_ - 1;
   const double* n = orders.data() + 2;  // without the mean
-  const auto place = [](int k) { return k / kLanes * kHarmonics + k % kLanes; };
+  const int lanes = size_.lanes, harmonics = size_.harmonics();
+  const auto place = [=](int k) { return k / lanes * harmonics + k % lanes; };
   std::map<std::pair<double, double>, int> earlier;  // first harmonic of every order
   recipe_.assign(blocks_, Recipe());
   std::vector<int> depth(blocks_, 0);  // number of rotations one after the other
   int few = 0;                         // as many as multiples of one order need
-  for (int k = kLanes; k < count; k += kLanes) {
-    const int block = k / kLanes;
-    for (int b = k - kLanes; b < k; ++b) {
+  for (int k = lanes; k < count; k += lanes) {
+    const int block = k / lanes;
+    for (int b = k - lanes; b < k; ++b) {
       earlier.emplace(std::pair(n[2 * b], n[2 * b + 1]), b);
     }
     if (block >> few) ++few;
     for (int a = 0; a < k && !(recipe_[block].from >= 0 && depth[block] <= few);
-         a += kLanes) {
+         a += lanes) {
       const double theta = n[2 * k] - n[2 * a], psi = n[2 * k + 1] - n[2 * a + 1];
       const auto found = earlier.find({theta, psi});
       if (found == earlier.end()) continue;
       const int shift = found->second;
-      const int need = 1 + std::max(depth[a / kLanes], depth[shift / kLanes]);
+      const int need = 1 + std::max(depth[a / lanes], depth[shift / lanes]);
       bool shifted = recipe_[block].from < 0 || need < depth[block];
-      for (int b = 1; b < std::min(kLanes, count - k); ++b) {
+      for (int b = 1; b < std::min(lanes, count - k); ++b) {
         shifted = shifted && n[2 * (k + b)] - n[2 * (a + b)] == theta &&
                   n[2 * (k + b) + 1] - n[2 * (a + b) + 1] == psi;
       }

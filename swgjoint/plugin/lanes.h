@@ -1,5 +1,5 @@
 // Vectors of numbers that undergo the same operations: four harmonics with their cos
-// and sin, or rotor and link.
+// and sin, eight of a map with many harmonics, or rotor and link.
 #ifndef SWGJOINT_PLUGIN_LANES_H_
 #define SWGJOINT_PLUGIN_LANES_H_
 
@@ -14,6 +14,7 @@
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && \
     defined(__GLIBC__)
 #if __GNUC__ >= 12
+#define SWGJOINT_WIDE_CLONES
 #define SWGJOINT_CLONES \
   __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
 #else
@@ -25,10 +26,11 @@
 
 namespace swgjoint {
 
-constexpr int kLanes = 4;
+constexpr int kLanes = 4, kWideLanes = 8;
 
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(8 * kLanes)));
+typedef double Wide __attribute__((vector_size(8 * kWideLanes)));
 typedef double Pair __attribute__((vector_size(16)));
 #define SWGJOINT_INLINE inline __attribute__((always_inline))
 #else
@@ -64,6 +66,7 @@ struct Vector {
   friend Vector operator-(double a, const Vector& b) { return b * -1 + a; }
 };
 typedef Vector<kLanes> Lanes;
+typedef Vector<kWideLanes> Wide;
 typedef Vector<2> Pair;
 #define SWGJOINT_INLINE inline
 #endif
@@ -89,15 +92,23 @@ typedef std::vector<double, LaneAllocator<double>> LaneVector;
 // Vectors among other numbers; the compiler would copy bytes in two halves.
 typedef double LanesInMemory
     __attribute__((vector_size(8 * kLanes), aligned(8), may_alias));
+typedef double WideInMemory
+    __attribute__((vector_size(8 * kWideLanes), aligned(8), may_alias));
 typedef double PairInMemory __attribute__((vector_size(16), aligned(8), may_alias));
 SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
   *x = *reinterpret_cast<const LanesInMemory*>(from);
+}
+SWGJOINT_INLINE void Load(const double* from, Wide* x) {
+  *x = *reinterpret_cast<const WideInMemory*>(from);
 }
 SWGJOINT_INLINE void Load(const double* from, Pair* x) {
   *x = *reinterpret_cast<const PairInMemory*>(from);
 }
 SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
   *reinterpret_cast<LanesInMemory*>(to) = x;
+}
+SWGJOINT_INLINE void Store(double* to, const Wide& x) {
+  *reinterpret_cast<WideInMemory*>(to) = x;
 }
 SWGJOINT_INLINE void Store(double* to, const Pair& x) {
   *reinterpret_cast<PairInMemory*>(to) = x;
@@ -137,6 +148,21 @@ SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
 #endif
 }
 
+SWGJOINT_INLINE void Sums(const Wide& a, const Wide& b, const Wide& c, const Wide& d,
+                          double out[4]) {
+  const Wide* all[4] = {&a, &b, &c, &d};
+  Lanes sums[4];
+  for (int k = 0; k < 4; ++k) {
+    double lanes[kWideLanes];
+    Lanes high;
+    Store(lanes, *all[k]);
+    Load(lanes, &sums[k]);
+    Load(lanes + kLanes, &high);
+    sums[k] += high;
+  }
+  Sums(sums[0], sums[1], sums[2], sums[3], out);
+}
+
 // Coefficients of the series of sin(x)/x and cos(x) in powers of x^2, one vector each,
 // first those of sin(x)/x. They are defined elsewhere, so that the compiler reads them
 // where it needs them. It would fill more vectors with constants than the processor has,
@@ -145,35 +171,35 @@ constexpr int kSincTerms = 7, kCosTerms = 8;
 extern const double* const kSeries;
 
 // Computes sin(x)/x and cos(x) for |x| <= 2^(kHalvings - 1).
-template <int kHalvings>
-SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
+template <int kHalvings, class V>
+SWGJOINT_INLINE void SincCos(const V& x, V* sinc, V* cos) {
   // Series with a truncation error below 2^-53 for |y| <= 1/2. They are summed in pairs
   // of terms, because one term after the other would take twice as long.
-  Lanes y = x * (1.0 / (1 << kHalvings));
-  const Lanes z = y * y, z2 = z * z, z4 = z2 * z2;
+  V y = x * (1.0 / (1 << kHalvings));
+  const V z = y * y, z2 = z * z, z4 = z2 * z2;
   const double* at = kSeries;
-  Lanes a, b, c, d, e, f, g, h;
+  V a, b, c, d, e, f, g, h;
   Load(at, &a);
-  Load(at + kLanes, &b);
-  Load(at + 2 * kLanes, &c);
-  Load(at + 3 * kLanes, &d);
-  Load(at + 4 * kLanes, &e);
-  Load(at + 5 * kLanes, &f);
-  Load(at + 6 * kLanes, &g);
+  Load(at + kWideLanes, &b);
+  Load(at + 2 * kWideLanes, &c);
+  Load(at + 3 * kWideLanes, &d);
+  Load(at + 4 * kWideLanes, &e);
+  Load(at + 5 * kWideLanes, &f);
+  Load(at + 6 * kWideLanes, &g);
   *sinc = ((a + z * b) + z2 * (c + z * d)) + z4 * ((e + z * f) + z2 * g);
-  at += kSincTerms * kLanes;
-  Load(at + kLanes, &b);
-  Load(at + 2 * kLanes, &c);
-  Load(at + 3 * kLanes, &d);
-  Load(at + 4 * kLanes, &e);
-  Load(at + 5 * kLanes, &f);
-  Load(at + 6 * kLanes, &g);
-  Load(at + 7 * kLanes, &h);
+  at += kSincTerms * kWideLanes;
+  Load(at + kWideLanes, &b);
+  Load(at + 2 * kWideLanes, &c);
+  Load(at + 3 * kWideLanes, &d);
+  Load(at + 4 * kWideLanes, &e);
+  Load(at + 5 * kWideLanes, &f);
+  Load(at + 6 * kWideLanes, &g);
+  Load(at + 7 * kWideLanes, &h);
   *cos = ((a + z * b) + z2 * (c + z * d)) + z4 * ((e + z * f) + z2 * (g + z * h));
   // sin(2y) = 2 sin(y) cos(y), cos(2y) = 1 - 2 sin(y)^2
   for (int k = 0; k < kHalvings; ++k) {
-    const Lanes twice = y * 2;
-    const Lanes product = *sinc * *cos;
+    const V twice = y * 2;
+    const V product = *sinc * *cos;
     *cos = 1 - (twice * *sinc) * (y * *sinc);
     *sinc = product;
     y = twice;
@@ -181,18 +207,19 @@ SWGJOINT_INLINE void SincCos(const Lanes& x, Lanes* sinc, Lanes* cos) {
 }
 
 // Computes cos and sin of any phase.
-SWGJOINT_INLINE void CosSin(const Lanes& phase, Lanes* cos, Lanes* sin) {
+template <class V>
+SWGJOINT_INLINE void CosSin(const V& phase, V* cos, V* sin) {
   // Adding and subtracting kRound rounds to an integer. Pi is the sum of two numbers, of
   // which the first has 26 bits: its product with up to 2^27 half turns is exact. More
   // half turns lose no more than the phase itself has lost.
   constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52
   constexpr double kPi = 0x1.921fb5p+1, kRest = 0x1.110b4611a6263p-25;
-  const Lanes halves = (phase * 0.31830988618379069 + kRound) - kRound;
-  const Lanes rest = (phase - halves * kPi) - halves * kRest;
+  const V halves = (phase * 0.31830988618379069 + kRound) - kRound;
+  const V rest = (phase - halves * kPi) - halves * kRest;
   // an odd number of half turns changes both signs
-  const Lanes odd = halves - ((halves * 0.5 + kRound) - kRound) * 2;
-  const Lanes sign = 1 - odd * odd * 2;
-  Lanes sinc, even;
+  const V odd = halves - ((halves * 0.5 + kRound) - kRound) * 2;
+  const V sign = 1 - odd * odd * 2;
+  V sinc, even;
   SincCos<2>(rest, &sinc, &even);
   *cos = sign * even;
   *sin = sign * rest * sinc;

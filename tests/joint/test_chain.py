@@ -12,6 +12,7 @@ from swgjoint.joint.attach import attach
 from swgjoint.joint.response import responses
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.phase_bounds import MANY
 
 LINKS = ((8.0, 0.42), (6.0, 0.38), (2.0, 0.1), (1.2, 0.1), (1.2, 0.1), (0.3, 0.06))
 
@@ -210,9 +211,24 @@ def test_a_drive_is_predicted_with_all_other_joints_free():
 def test_a_drive_gets_the_same_bits_alone_and_among_others(synthetic_map):
     """The plugin predicts up to eight drives together; here there are twelve.
 
-    Every third one has hysteresis. The drives are on separate bodies, so that none
-    changes the motion of another.
+    Every third one has hysteresis, and every fourth one many harmonics, which the
+    plugin predicts alone. The drives are on separate bodies, so that none changes the
+    motion of another.
     """
+    error = 1e-9 * np.ones((MANY + 1, 2))
+    many = replace(
+        synthetic_map,
+        orders=np.concatenate(
+            [synthetic_map.orders, [(500 + p, 1) for p in range(MANY + 1)]]
+        ),
+        potential=np.concatenate(
+            [synthetic_map.potential, [0.0 * synthetic_map.potential[0]] * (MANY + 1)]
+        ),
+        end_stiffness=np.concatenate(
+            [synthetic_map.end_stiffness, np.zeros((MANY + 1, 2, 2))]
+        ),
+        kinematic_error=np.concatenate([synthetic_map.kinematic_error, error]),
+    )
     elements = (Jenkin(stiffness=4e3, yield_torque=1.0),)
     rng = np.random.default_rng(5)
     turns, speeds = rng.uniform(-1e-3, 1e-3, 12), rng.uniform(-40.0, 40.0, 12)
@@ -228,7 +244,10 @@ def test_a_drive_gets_the_same_bits_alone_and_among_others(synthetic_map):
             attach(
                 spec,
                 joint=f"j{k}",
-                drive=replace(synthetic_map, hysteresis=() if k % 3 else elements),
+                drive=replace(
+                    synthetic_map if k % 4 else many,
+                    hysteresis=() if k % 3 else elements,
+                ),
                 rotor_inertia=1e-4,
                 friction=False,
             )

@@ -158,8 +158,8 @@ def test_hostile_models_are_refused_or_step(tmp_path):
 
 def test_a_planted_overflow_is_found(tmp_path):
     """A lane too few in the weights, which pointers alone reach, stops the run."""
-    line = "weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);"
-    short = line.replace("kWeights", "kWeights - kLanes")
+    line = "weight_.assign(static_cast<size_t>(blocks_) * size_.weights(), 0.0);"
+    short = line.replace("weights()", "weights() - kLanes")
     library = build(tmp_path, ("drive_map_parse.cc", line, short))
     done = run_tests(library, "tests/joint/test_twin.py", "-k", "trajectory")
     assert done.returncode != 0
@@ -169,8 +169,8 @@ def test_a_planted_overflow_is_found(tmp_path):
 
 def test_a_planted_index_past_an_empty_table_is_found(tmp_path):
     """A map without harmonics has no table, of which nothing may be indexed."""
-    line = "table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock"
-    planted = "&table_[static_cast<size_t>(segment) * blocks_ * kBlock]"
+    line = "table_.data() + static_cast<size_t>(segment) * blocks_ * size.block()"
+    planted = "&table_[static_cast<size_t>(segment) * blocks_ * size.block()]"
     library = build(tmp_path, ("drive_map.cc", line, planted))
     done = run_tests(library, "tests/joint/test_twin.py", "-k", "without_harmonics")
     assert done.returncode != 0

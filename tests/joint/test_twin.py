@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -11,6 +12,7 @@ import pytest
 from swgjoint.drives.references import load_drive
 from swgjoint.joint.reference import gradient_force, scheme_force
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.phase_bounds import MANY
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,6 +99,39 @@ def test_scheme_force_of_many_harmonics_equals_twin(bench, phase):
     b = bench(drive, damping_ratio=0.05)
     top = np.abs(drive.angle_orders).max()
     check_scheme(b, phase / top / b.model.opt.timestep)
+
+
+def with_many_harmonics(drive, orders):
+    """The map with weak harmonics of the given orders that it does not have yet."""
+    own = {tuple(order) for order in drive.orders.tolist()}
+    more = np.array([order for order in orders if order not in own])
+    rng = np.random.default_rng(4)
+    size = 1e-4 * rng.uniform(-1.0, 1.0, (len(more), 2, 1, 1))
+    weak, ends = size * drive.potential[0, 0], size[..., 0] * drive.end_stiffness[0, 0]
+    error = 1e-8 * rng.normal(size=(len(more), 2))
+    return replace(
+        drive,
+        orders=np.concatenate([drive.orders, more]),
+        potential=np.concatenate([drive.potential, weak]),
+        end_stiffness=np.concatenate([drive.end_stiffness, ends]),
+        kinematic_error=np.concatenate([drive.kinematic_error, error]),
+    )
+
+
+@pytest.mark.parametrize("speed", [0.2, 3.0, 30.0])
+@pytest.mark.parametrize(
+    "orders",
+    [
+        [(p, q) for p in range(12) for q in range(-7, 8) if (p, q) > (0, 0)],
+        [(2 * p, 0) for p in range(1, 160)],
+    ],
+    ids=["both", "multiples"],
+)
+def test_scheme_force_of_weak_harmonics_equals_twin(bench, any_layout, orders, speed):
+    """More than 128 harmonics, processed in wide blocks, most of them from others."""
+    b = bench(with_many_harmonics(any_layout, orders), damping_ratio=0.05)
+    assert len(b.drive.drive.orders) - 1 > MANY
+    check_scheme(b, speed)
 
 
 LIMIT = {"joint": 'limited="true" range="-10 10"'}
