@@ -14,6 +14,7 @@ from swgjoint.fe.rings.losses import loss_model
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.friction_bending import without_friction
@@ -50,7 +51,8 @@ def solve_map(
     """
     check_level(design, model)
     if model == "3d":
-        hint = "takes 2 to 5 min; 2d and ring are faster"
+        minutes = "about 10 min" if has_errors(design) else "2 to 5 min"
+        hint = f"takes {minutes}; 2d and ring are faster"
         progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
     if model == "ring":
         samples = thin_ring.sample_thin_rings(

@@ -36,8 +36,11 @@ def with_angles(drive: DriveMap, orders, amplitudes) -> DriveMap:
     )
 
 
-def with_clearance(gap: float) -> DriveMap:
-    """Constant stiffness outside a gap in which the output is free."""
+def with_clearance(gap: float, held: float = 0.0) -> DriveMap:
+    """Constant stiffness outside a gap in which the output is free, or nearly so.
+
+    A torque ``held`` [N·m] holds it at the ends of the gap.
+    """
     knots = np.array([-0.02, -0.5 * gap, 0.5 * gap, 0.02])
     drive = DriveMap.linear(1e4)
     potential, ends = potential_of_stiffness(
@@ -45,8 +48,9 @@ def with_clearance(gap: float) -> DriveMap:
     )
     potential = np.zeros((1, 2, 3, 5))
     h = 0.02 - 0.5 * gap
-    potential[0, 0, 0, :3] = [0.5e4 * h**2, -1e4 * h, 0.5e4]
-    potential[0, 0, 2, 2] = 0.5e4
+    potential[0, 0, 0, :3] = [0.5e4 * h**2 + held * h, -1e4 * h - held, 0.5e4]
+    potential[0, 0, 1, 1:3] = [-held, held / gap]
+    potential[0, 0, 2, 1:3] = [held, 0.5e4]
     return replace(drive, torsion_knots=knots, potential=potential, end_stiffness=ends)
 
 
@@ -187,6 +191,17 @@ def test_clearance_shows_as_the_width_of_the_loop():
     assert sheet["lost_motion_arcmin"] == pytest.approx(lost / arcmin, rel=1e-6)
     assert sheet["K2_Nm_rad"] == pytest.approx(1e4, rel=1e-6)
     assert float(output_angle(drive, 0.0, 0.0)) == 0.0
+
+
+def test_a_held_clearance_is_named_as_no_part_of_the_loss():
+    """0.1 % of the rated torque holds the output, as in maps with errors of teeth."""
+    gap = 4e-4
+    sheet = with_clearance(gap, held=0.1).spec_sheet()
+    assert sheet["hysteresis_loss_arcmin"] is None
+    reason = sheet["missing"]["hysteresis_loss_arcmin"]
+    assert names(reason, f"{gap / arcmin:.2g} arcmin", "0.1 %", "--only")
+    stiff = DriveMap.linear(1e4).spec_sheet()["missing"]["hysteresis_loss_arcmin"]
+    assert not names(stiff, "clearance")
 
 
 def test_loop_with_hysteresis():

@@ -25,6 +25,7 @@ from swgjoint.maps.sheet.friction_running import (
 )
 from swgjoint.maps.sheet.loop import NO_WIDTH, TorqueLoop, largest_torque, torque_loop
 from swgjoint.maps.sheet.map_validity import Difference, validation_json
+from swgjoint.maps.sheet.no_width import held_clearance_text, why_no_width
 from swgjoint.maps.sheet.spec_validity import judge_figures
 from swgjoint.maps.sheet.turn import Turn, measure_turns, strongest_orders
 from swgjoint.progress import Progress, silent
@@ -212,6 +213,8 @@ def measure_spec(
         stated = drive.info.get("missing")
         if isinstance(stated, dict):
             missing |= {k: str(stated[k]) for k in missing if k in stated}
+        if loop is not None and "hysteresis_loss_arcmin" in missing:
+            missing["hysteresis_loss_arcmin"] += held_clearance_text(drive, loop)
         uncertain = judge_figures(drive, values, missing)
     missing |= dict(unknown or {})
     return SpecSheet(
@@ -246,12 +249,7 @@ def _loop_figures(
     if abs(width) > NO_WIDTH * travel:
         values["hysteresis_loss_arcmin"] = width / arcmin
     else:
-        missing["hysteresis_loss_arcmin"] = (
-            "the torque loop is conservative: the map has no hysteresis"
-            if not drive.hysteresis
-            else "the loop of the map has no width at zero torque: its hysteresis"
-            " elements do not slip there"
-        )
+        missing["hysteresis_loss_arcmin"] = why_no_width(drive)
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 
 
