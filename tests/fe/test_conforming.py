@@ -54,29 +54,6 @@ def test_equilibria_of_conforming_flanks_are_converged():
 
 
 @pytest.mark.fe
-@pytest.mark.parametrize(
-    "name", ["dca-80-to-1", "reference-2d", "reference-2d-flexspline-fixed"]
-)
-def test_a_kept_linearisation_leaves_the_equilibria_unchanged(name):
-    """Equilibria are those of a ring that is linearised anew in every iteration."""
-    design = Design.load(name)
-    theta = 2.0 * pi / design.periodicity * PLACES[:3]
-    torques = [PART * ratings_of(design).repeated_peak]
-    finer = dict(step_tolerance=2e-12, conforming_tolerance=2e-12)
-    found, exact = (
-        followed(replace(follower_in_plane(design), solver=solver), torques, theta)
-        for solver in (
-            replace(MAP_SOLVER, **finer),
-            NewtonSolver(),
-        )
-    )
-    output, moment = np.abs(found - exact).max(axis=0)
-    # a third of the tolerance of the solver
-    assert output < 5e-10
-    assert moment < 1e-6
-
-
-@pytest.mark.fe
 @pytest.mark.parametrize("name", ["dca-80-to-1", "reference-2d-simplified"])
 def test_a_short_reach_after_small_steps_omits_no_contact(name, monkeypatch):
     """Equilibria are those of a search with the long reach at every step."""

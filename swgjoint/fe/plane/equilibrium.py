@@ -68,10 +68,6 @@ class NewtonSolver:
     bore contact changes."""
     exchange_below: float = 1e-5
     """Increment below which a linearisation is accurate enough for such updates [m]."""
-    keep_below: float = 0.0
-    """Distance from the last linearisation below which the ring is not linearised again
-    but only the gaps of the teeth [m]. The displacements then have an error of up to
-    5e-4 of this distance."""
     stride: float = 0.1
     """Largest increment that is applied in one iteration, in lobe heights [-]; the
     contacts would change within a larger one."""
@@ -95,22 +91,17 @@ class NewtonSolver:
         """
         state, history = start, list[float]()
         settled = False
-        kept: tuple[NewtonProblem, NewtonStep] | None = None
         tried: set[bytes] = set()
         near, searched_reach = np.ones((model.sectors, 2), dtype=bool), 0.0
         try:
             for iteration in range(self.max_iterations):
-                if kept is None:
-                    linear = linearise(model, state, load.on_flexspline)
-                else:
-                    linear = kept[0].linear.with_flanks_at(model, state)
+                linear = linearise(model, state, load.on_flexspline)
                 thorough = bool(history) and history[-1] < self.thorough_below
                 # after three iterations or a small step only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
                 if thorough:
-                    least = max(history[-1], self.step_tolerance)
-                    reach = min(reach, FOLLOWED * least)
+                    reach = min(reach, FOLLOWED * history[-1])
                 contacts = linear.no_contacts
                 if load.teeth:
                     # flanks beyond the last reach cannot have come within a smaller one
@@ -125,12 +116,9 @@ class NewtonSolver:
                     )
                     near[:], searched_reach = False, reach
                     near[contacts.sector, contacts.side] = True
-                if kept is None:
-                    problem = NewtonProblem.from_candidates(
-                        model, state, linear, load, contacts
-                    )
-                else:
-                    problem = kept[0].follow(kept[1], state, linear, contacts)
+                problem = NewtonProblem.from_candidates(
+                    model, state, linear, load, contacts
+                )
                 step = problem.solve()
                 for _ in range(self.exchanges):
                     wrong = _stations_to_exchange(problem, step, self.exchange_below)
@@ -144,8 +132,7 @@ class NewtonSolver:
                     return replace(
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
-                longest = self.stride * model.lobe_height
-                damping = longest / max(step.largest, longest)
+                damping = min(1.0, self.stride * model.lobe_height / step.largest)
                 # a contact state that returns would return forever: then
                 # switch only one station at a time
                 repeats = state.touching.tobytes() in tried
@@ -161,10 +148,6 @@ class NewtonSolver:
                 tolerance = self.step_tolerance
                 if state.contacts is not None and touch_twice(state.contacts):
                     tolerance = min(tolerance, self.conforming_tolerance)
-                # friction depends on the state in more than the gaps
-                keep = settled and damping == 1.0 and model.friction is None
-                keep = keep and float(np.abs(step.increment).max()) < self.keep_below
-                kept = (problem, step) if keep else None
                 small = step.largest < tolerance and damping == 1.0
                 if settled and small and thorough:
                     # without tooth contact nothing determines the output angle
@@ -183,10 +166,7 @@ class NewtonSolver:
 
 
 MAP_SOLVER = NewtonSolver(
-    step_tolerance=1e-9,
-    conforming_tolerance=1e-10,
-    thorough_below=1e-6,
-    keep_below=2e-8,
+    step_tolerance=1e-9, conforming_tolerance=1e-10, thorough_below=1e-6
 )
 """Solver of 2D maps. Compared with the default tolerances, its tolerances change the
 output error by less than 1.5e-9 rad and the input torque by about 3e-6 N·m and save

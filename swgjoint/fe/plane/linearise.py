@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -133,18 +132,6 @@ class Linearised:
         skeleton = (increment * self.sign)[:, self.dofs]
         return np.asarray(skeleton.reshape(len(skeleton), -1, 2))
 
-    def with_flanks_at(self, model: SectorModel, state: State) -> Linearised:
-        """The same linear ring, with its flanks in another state.
-
-        Args:
-            model: The 2D model.
-            state: State after a small step.
-        """
-        frames = model.frames(state)
-        flank = frames.displacement @ self.element.flank_from_skeleton.T
-        flank += state.flank_force @ self.element.flank_compliance
-        return replace(self, **_flanks(model, state, frames, flank))
-
     def gap_after(self, increment: Array) -> Array:
         """Gaps of the stations (N, q) [m] after an increment (N, n) [m]."""
         seen = increment * self.sign
@@ -246,6 +233,9 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     hessian[-1] *= np.outer(sign[-1], sign[-1])
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
+    centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
+    angle = frames.angle - state.circular_spline_rotation
+    circular_spline_elastic = model.circular_spline_displacement(state)
     return Linearised(
         element=model.element,
         frames=frames,
@@ -264,28 +254,19 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         rotation_gradient=sign * rotation_gradient,
         anchor=anchor,
         anchor_stiffness=float(np.mean(np.diag(model.element.stiffness))),
-        **_flanks(model, state, frames, flank),
+        flank=model.shift_flank(flank, model.tooth_shift),
+        circular_spline_elastic=circular_spline_elastic,
+        search=ToothContact(
+            rubs=model.friction is not None,
+            element=model.element,
+            circular_spline=model.circular_spline,
+            circular_spline_flank=model.shift_flank(
+                circular_spline_elastic, model.circular_spline_tooth_shift
+            ),
+            angle=angle,
+            bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
+        ),
     )
-
-
-def _flanks(
-    model: SectorModel, state: State, frames: Frames, flank: Array
-) -> dict[str, Any]:
-    """Fields of :class:`Linearised` from flank displacements without errors."""
-    centre = frames.position.reshape(model.sectors, -1, 2).mean(axis=1)
-    angle = frames.angle - state.circular_spline_rotation
-    elastic = model.circular_spline_displacement(state)
-    shift = model.circular_spline_tooth_shift
-    search = ToothContact(
-        rubs=model.friction is not None,
-        element=model.element,
-        circular_spline=model.circular_spline,
-        circular_spline_flank=model.shift_flank(elastic, shift),
-        angle=angle,
-        bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
-    )
-    shifted = model.shift_flank(flank, model.tooth_shift)
-    return dict(flank=shifted, circular_spline_elastic=elastic, search=search)
 
 
 def _add_sectors(

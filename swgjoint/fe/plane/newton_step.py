@@ -73,9 +73,7 @@ class NewtonStep:
     circular_spline_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
-    """Increment of every sector since the linearisation (N, n_dofs) [m]."""
-    turned: float
-    """Increment of the circular spline's rotation since the linearisation [rad]."""
+    """Increment of the degrees of freedom of every sector (N, n_dofs) [m]."""
     shift: Array
     """Shift of the skeleton nodes in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
@@ -132,11 +130,6 @@ class NewtonProblem:
     """Lines of force of the candidates."""
     factor: RingFactor
     """Factorised tangent with the anchor spring."""
-    moved: Array | None = None
-    """Increment of the degrees of freedom from the linearisation to :attr:`state` (N,
-    n_dofs) [m]; None for no increment."""
-    turned: float = 0.0
-    """The same for the rotation of the circular spline [rad]."""
 
     @classmethod
     def from_candidates(
@@ -186,31 +179,6 @@ class NewtonProblem:
         changed = self.linear.exchange(stations, touching)
         self.factor.update(self.linear.anchor_tangent(changed), changed)
         return replace(self, state=replace(self.state, touching=touching ^ stations))
-
-    def follow(
-        self, step: NewtonStep, state: State, here: Linearised, contacts: Contacts
-    ) -> NewtonProblem:
-        """The problem in the next state, with the ring linearised where it was.
-
-        The gaps of the candidates are extrapolated back to the state of the
-        linearisation.
-
-        Args:
-            step: Solution of this problem, which was applied in full.
-            state: State after this step, with the same contact of the bore.
-            here: The linear ring with the flanks of this state.
-            contacts: Candidates for tooth contact in this state.
-        """
-        lines = ForceLines.from_candidates(self.model, state, here, contacts)
-        way = np.einsum("kn,kn->k", lines.rows, step.increment[lines.force.sector])
-        way -= _lever_arms(lines.force) * step.turned
-        return replace(
-            self,
-            state=state,
-            lines=replace(lines, gap=lines.gap - way),
-            moved=step.increment,
-            turned=step.turned,
-        )
 
     def solve(self, pressing: Index | None = None) -> NewtonStep:
         """Solution for the contact forces and the increment of the nodes.
@@ -267,7 +235,7 @@ class NewtonProblem:
             loads,
             lines.force.sector,
             lines.rows,
-            (lines.gap, _lever_arms(lines.force), lines.compliance, np.array(numbers)),
+            (lines.gap, self._arm, lines.compliance, np.array(numbers)),
             turns=self._turns,
             held=self._held,
             active=active,
@@ -298,6 +266,16 @@ class NewtonProblem:
         return self.load.rotation is not None
 
     @property
+    def _arm(self) -> Array:
+        """Lever arms of the lines, by which turning the circular spline closes them.
+
+        Shape (n,) [m].
+        """
+        lines = self.lines.force
+        turned = rotate_right_angle(lines.point)
+        return np.asarray(np.einsum("ki,ki->k", turned, lines.normal))
+
+    @property
     def _moment_and_rotation(self) -> tuple[float, float]:
         """Moment on the circular spline [N·m] and rotation of the flexspline.
 
@@ -324,7 +302,7 @@ class NewtonProblem:
         matrix[np.ix_(constrained, constrained)] = products[1:3, 1:3]
         matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
         # turning the circular spline towards the teeth closes the gap by the lever arm
-        matrix[:n, n + 1] = matrix[n + 1, :n] = -_lever_arms(lines)
+        matrix[:n, n + 1] = matrix[n + 1, :n] = -self._arm
         return matrix
 
     def _offset(self, products: Array) -> Array:
@@ -353,8 +331,7 @@ class NewtonProblem:
         """
         model, linear, load, lines = self.model, self.linear, self.load, self.lines
         force, strips = solution.force, lines.strips
-        own = increment if self.moved is None else increment - self.moved
-        race_shift = own[:, model.race_dofs[:-NODE]]
+        race_shift = increment[:, model.race_dofs[:-NODE]]
         gap = linear.gap_after(increment)
         push = -model.stations.stiffness * gap
         holding = model.copies * solution.multiplier
@@ -367,10 +344,9 @@ class NewtonProblem:
             torque=-holding if load.torque is None else load.torque,
             holding_torque=holding if on_flexspline is None else -on_flexspline,
             compliance=solution.compliance / model.copies,
-            circular_spline_turn=solution.circular_spline_turn - self.turned,
+            circular_spline_turn=solution.circular_spline_turn,
             increment=increment,
-            turned=solution.circular_spline_turn,
-            shift=linear.rotate_to_global(own),
+            shift=linear.rotate_to_global(increment),
             race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
             gap=gap,
             pressure=np.where(self.state.touching, push, 0.0),
@@ -378,12 +354,6 @@ class NewtonProblem:
             if strips is None
             else strips.error(force[: len(lines.contacts)]),
         )
-
-
-def _lever_arms(lines: Contacts) -> Array:
-    """Arms by which turning the circular spline closes the gaps of lines (n,) [m]."""
-    turned = rotate_right_angle(lines.point)
-    return np.asarray(np.einsum("ki,ki->k", turned, lines.normal))
 
 
 def _first_guess(
