@@ -47,7 +47,7 @@ def test_positions_are_at_the_corner(place):
     found = {torque for (torque, _), at in zip(positions, near, strict=True) if at}
     assert set(UNSEEN.torque[UNSEEN.torque != 0.0]) <= found
     assert near.sum() > 12
-    assert near.mean() > 0.2
+    assert near.mean() > 0.15
     # without the corner other places are worst
     smooth = replace(samples_of(n_angles=ANGLES), unseen=UNSEEN)
     others = worst_positions(fit_map(smooth), smooth)

@@ -26,7 +26,7 @@ from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import MapSamples
 from swgjoint.typing import Array
 
-EXTRA = 16
+EXTRA = 32
 """Number of additional positions of one sign for each of the two quantities."""
 APART = (0.03, 0.1)
 """Smallest distance of torques that are not about the same, relative to the repeated
