@@ -130,8 +130,7 @@ class ToothContact:
             sector, side, station = held.add_places(
                 sector, side, station, MERGE * (high - low)
             )
-        contacts = self.gather(sector, side, station, flank)
-        return contacts.chosen(np.flatnonzero(contacts.gap < reach))
+        return self._gather(sector, side, station, flank, reach)
 
     def _minima(
         self, flank: Array, searched: Mask, limit: float, thorough: bool
@@ -333,23 +332,27 @@ class ToothContact:
                 break
         return s
 
-    def gather(
-        self, sector: Index, side: Index, station: Array, flank: Array
+    def _gather(
+        self,
+        sector: Index,
+        side: Index,
+        station: Array,
+        flank: Array,
+        reach: float,
     ) -> Contacts:
-        """Contacts with all their derivatives at given points of the flanks.
+        """Candidates with all their derivatives at given points of the flanks.
 
         Args:
             sector: Sector of each point (n,).
             side: Side of each point (n,).
             station: Arc length of each point (n,) [m].
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
-
-        Returns:
-            The contacts; an infinite gap where a point faces no flank.
+            reach: Largest gap of a candidate [m].
         """
         if self._compiled is not None:
             places = sector, side, station
-            return self._compiled.gather(*places, flank, rubs=self.rubs)
+            contacts = self._compiled.gather(*places, flank, rubs=self.rubs)
+            return contacts.chosen(np.flatnonzero(contacts.gap < reach))
         element = self.element
         size = element.flank_size
         n = len(sector)
@@ -372,7 +375,7 @@ class ToothContact:
         if seen.feet.station is not None:
             circular_spline_shapes = self.circular_spline.spline(seen.feet.station)
             slip = station + seen.feet.station
-        return Contacts(
+        contacts = Contacts(
             sector=sector,
             side=side,
             station=station,
@@ -393,3 +396,4 @@ class ToothContact:
             else none,
             slip=slip,
         )
+        return contacts.chosen(np.flatnonzero(contacts.gap < reach))

@@ -27,7 +27,7 @@ from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent
-from swgjoint.fe.solid.tooth_rows import ToothRows
+from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
 
@@ -229,34 +229,32 @@ def _solve_linear(
             state.held,
             thorough=thorough,
             circular_spline_rotation=state.circular_spline_rotation,
-            held_force=state.tooth_force,
         )
     condensed = condense(model, state, linear, tangent, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
-    # unknowns: forces of contacts, output rotation under a torque, forces of slopes
-    n, slopes = (0, 0) if candidates is None else (len(candidates), candidates.slopes)
-    contacts, output = n - slopes, n if load.rotation is None else n + 1
-    unsigned = np.arange(contacts, n)
+    # unknowns: forces of the candidates and, under a torque, the output rotation
+    n = 0 if candidates is None else len(candidates)
+    used, output = np.arange(n), n if load.rotation is None else n + 1
     if load.torque is not None:
         offset[output] -= load.torque / model.copies
-        unsigned = np.append(output, unsigned)
-    used = np.append(np.arange(contacts), unsigned)
+        used = np.append(used, output)
     unknown, compliance = np.zeros(n + 2), float("nan")
-    active = np.zeros(contacts, bool)
+    active = np.zeros(n, dtype=bool)
     if len(used):
-        guess = offset[:contacts] < 0.0
+        guess = offset[:n] < 0.0
         if state.held is not None and candidates is not None and len(state.held):
-            guess = candidates.contacts.share_flank_with(state.held.contacts)[:contacts]
+            guess = candidates.contacts.share_flank_with(state.held.contacts)
         elif load.torque is not None:
-            guess |= first_to_close(system, offset, contacts, output)
+            guess |= first_to_close(system, offset, n, output)
         unknown[used], active = solve_mixed(
-            system[np.ix_(used, used)], offset[used], contacts, slopes, guess
+            system[np.ix_(used, used)], offset[used], n, 0, guess
         )
         if load.torque is not None:
-            acting = np.append(np.flatnonzero(active), unsigned)
-            unit = np.where(acting == output, -1.0 / model.copies, 0.0)
+            acting = np.append(np.flatnonzero(active), output)
+            unit = np.zeros(len(acting))
+            unit[-1] = -1.0 / model.copies
             answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
-            compliance = float(answer[acting == output][0])
+            compliance = float(answer[-1])
     # increments of the ring, and contact forces and gaps of the bore after the step
     force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
     increment = condensed.increment(unknown)

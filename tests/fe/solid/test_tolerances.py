@@ -365,10 +365,8 @@ def test_map_of_a_flawed_drive_with_play(
 ):
     """The map meets full solves that it has not seen; low orders are even.
 
-    Two linearised positions in a pitch leave 0.05 of the turn of the output. Crowned
-    teeth ripple little: the map misses 2.4e-3 of the input torque T/i, when teeth
-    touched in the planes of the mesh alone and the ripple was 14 times as large it
-    missed 1.2e-3; a wrong sign leaves as much as there is.
+    Two linearised positions in a pitch leave 0.06 of the turn of the output and 0.08 of
+    its energy, four of them 0.04; a wrong sign leaves as much as there is.
     """
     monkeypatch.setattr(tolerance_sampling, "influences", lambda *a, **k: at_both_ends)
     monkeypatch.setitem(tolerance_sampling.PHASES, "3d", 2)
@@ -377,8 +375,7 @@ def test_map_of_a_flawed_drive_with_play(
     # four angles alias: teeth come into contact one after the other on coarse flanks
     drive = fit_map(small_pattern(design))
     assert drive.info["residual"]["relative_to_turn"] < 0.1
-    missed = drive.info["energy_check"]["input_torque_error_Nm"]
-    assert missed < 3e-3 * drive.ratings.rated_torque / 20
+    assert drive.info["energy_check"]["relative"] < 0.1
     assert drive.info["tolerances"]["free_positions"] == 42 * 2
     assert drive.info["label"]["tolerances"]["misalignment_arcmin"] == 1.0
     sizes = np.hypot(*drive.kinematic_error.T)
