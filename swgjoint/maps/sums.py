@@ -131,7 +131,7 @@ def law_sums(
         _compiled(drive).evaluate(*flat, rows)
         return LawSums(*rows.reshape(7, *theta.shape))
     cos, sin, (e0, e_theta, e_psi) = error_sums_at(drive, theta, psi)
-    x = np.asarray(theta, float) / drive.ratio - np.asarray(psi, float) + e0
+    x = np.asarray(theta, float) / drive.ratio + e0 - np.asarray(psi, float)
     wanted = ["torque"] + stiffness * ["stiffness"] + by_phase * ["by_phase"]
     torque, *others = potential_sums(drive, x, cos, sin, *wanted)
     k = others.pop(0) if stiffness else np.empty(0)
