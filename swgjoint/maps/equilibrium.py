@@ -119,7 +119,9 @@ def _torque(
     Without ``tangent`` the second array is empty.
     """
     turns = bool(drive.angle_orders[:, 1].any())
-    found = law_sums(drive, theta, psi, stiffness=tangent, by_phase=turns)
+    found = law_sums(
+        drive, theta, psi, stiffness=tangent, by_phase=turns, error_first=True
+    )
     x, torque, stiffness = found.torsion, found.torque, found.stiffness
     if sliders is not None and tangent:
         slip, slope = sliders.torque_and_tangent(x, torque, stiffness)

@@ -114,6 +114,7 @@ def law_sums(
     *,
     stiffness: bool = False,
     by_phase: bool = True,
+    error_first: bool = False,
 ) -> LawSums:
     """Torsion and derivatives of the potential at given angles.
 
@@ -123,6 +124,9 @@ def law_sums(
         psi: Output angle [rad], of a shape that broadcasts with theta.
         stiffness: Whether the stiffness is needed; otherwise it may be empty.
         by_phase: Whether the derivatives by the angles are needed, similarly.
+        error_first: Whether the kinematic error of few harmonics is added before the
+            output angle is subtracted. The last bit of the torsion decides which
+            equilibrium is found where a map is not monotonic.
     """
     if len(drive.orders) - 1 > MANY and kernels() is not None:
         theta, psi = np.broadcast_arrays(theta, psi)
@@ -131,7 +135,8 @@ def law_sums(
         _compiled(drive).evaluate(*flat, rows)
         return LawSums(*rows.reshape(7, *theta.shape))
     cos, sin, (e0, e_theta, e_psi) = error_sums_at(drive, theta, psi)
-    x = np.asarray(theta, float) / drive.ratio + e0 - np.asarray(psi, float)
+    ideal, output = np.asarray(theta, float) / drive.ratio, np.asarray(psi, float)
+    x = ideal + e0 - output if error_first else ideal - output + e0
     wanted = ["torque"] + stiffness * ["stiffness"] + by_phase * ["by_phase"]
     torque, *others = potential_sums(drive, x, cos, sin, *wanted)
     k = others.pop(0) if stiffness else np.empty(0)
