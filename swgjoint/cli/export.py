@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from swgjoint.cli.shared.drive_option import add_drive_option, drives_of
+from swgjoint.cli.shared.model_text import rotor_lines
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 
@@ -224,10 +225,7 @@ def _mjcf_text(result: dict[str, Any]) -> str:
         for note in joint["notes"]:
             notes.setdefault(note, []).append(name)
     count = len(result["joints"])
-    inertias = {
-        f"{joint['rotor_inertia_kgm2']:g} kg·m²": None
-        for joint in result["joints"].values()
-    }
+    assumed = result["joints"] if result["rotors_assumed"] else ()
     by_rule = (
         "drives selected as by swgjoint run; to select others: --drive [JOINT=]NAME"
     )
@@ -237,14 +235,7 @@ def _mjcf_text(result: dict[str, Any]) -> str:
         " angle and torque, and resonance without load at the time step of"
         f" {1e3 * result['step_s']:g} ms:",
         table(rows, header=header),
-        *(
-            [
-                f"rotor inertia: {', '.join(inertias)}; assumed for the drive of the"
-                " joint; another: --rotor-inertia VALUE"
-            ]
-            if result["rotors_assumed"]
-            else []
-        ),
+        *rotor_lines(result["joints"], assumed, "--rotor-inertia VALUE"),
         *(
             note + ("" if len(names) == count else f" ({', '.join(names)})")
             for note, names in notes.items()

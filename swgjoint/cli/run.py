@@ -209,7 +209,11 @@ def report(result: dict[str, Any]) -> str:
         f" integrator {contains['integrator']}, step {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
-        *rotor_lines(contains, result.get("assumed_rotors", ())),
+        *rotor_lines(
+            contains["joints"],
+            result.get("assumed_rotors", ()),
+            "--set joints.JOINT.rotor_inertia_kgm2=VALUE",
+        ),
         *assumed_lines(contains),
         *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],

@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from swgjoint.view.words import above_noise
 
 
-def rotor_lines(contains: dict[str, Any], assumed: Collection[str]) -> list[str]:
+def rotor_lines(
+    joints: Mapping[str, dict[str, Any]], assumed: Collection[str], option: str
+) -> list[str]:
     """Format the assumed rotor inertias, grouped by joints that share them.
 
     Args:
-        contains: Contents of the model of a run.
+        joints: Values of the joints by name, with ``rotor_inertia_kgm2``.
         assumed: Names of the joints whose rotor inertia is assumed.
+        option: Option that states another one.
     """
     names_by_inertia: dict[float, list[str]] = {}
-    for name, joint in contains["joints"].items():
+    for name, joint in joints.items():
         if name not in assumed:
             continue
         names_by_inertia.setdefault(joint["rotor_inertia_kgm2"], []).append(name)
     if not names_by_inertia:
         return []
-    every = len(names_by_inertia) == 1 and len(assumed) == len(contains["joints"])
+    every = len(names_by_inertia) == 1 and len(assumed) == len(joints)
     values = "; ".join(
         f"{inertia:g} kg·m²" + ("" if every else f" ({', '.join(names)})")
         for inertia, names in names_by_inertia.items()
     )
     return [
         f"rotor inertia: {values}; assumed for the drive of the joint; another:"
-        " --set joints.JOINT.rotor_inertia_kgm2=VALUE"
+        f" {option}"
     ]
 
 
