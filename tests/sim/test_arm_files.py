@@ -15,6 +15,7 @@ from messages import names, naming
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.gentle_sweep import MARGIN, SWEEP, gentle_sweep
+from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import assumed_rotor_inertia, is_arm, scene_of_arm
 from swgjoint.sim.scene.scene import Scene
@@ -187,6 +188,30 @@ def test_inertias_that_no_body_has_are_repaired_when_asked(moments, tmp_path, ca
     np.testing.assert_allclose(inertia, inertia.mean())
     expected = {"0.5": 0.56, "0.06": 0.12}[moments.split('"')[5]]
     assert inertia.sum() == pytest.approx(expected)
+
+
+@pytest.mark.filterwarnings("ignore:.*two.urdf")
+@pytest.mark.parametrize("kind", ["urdf", "mjcf"])
+def test_a_body_with_a_mass_alone_becomes_a_sphere_when_asked(kind, tmp_path):
+    """Zero moments are refused with a hint; the repair gives 2/5 m r² of water."""
+    if kind == "urdf":
+        path = Path(urdf(tmp_path))
+        good = 'ixx="0.01" iyy="0.05" izz="0.06" ixy="0" ixz="0" iyz="0"'
+        text = path.read_text().replace(good, re.sub(r"0\.\d+", "0", good), 1)
+    else:
+        path = tmp_path / "one.xml"
+        text = (
+            '<mujoco><worldbody><body name="upper"><joint name="hinge" axis="0 1 0"/>'
+            '<inertial pos="0 0 .1" mass="2" diaginertia="0 0 0"/>'
+            '<geom size=".01"/></body></worldbody></mujoco>'
+        )
+    path.write_text(text)
+    with pytest.raises(InputError, match=naming("mjMINVAL", "--balance-inertia")):
+        RigidArm(str(path))
+    arm = RigidArm(str(path), reading=ArmReading(balance_inertia=True))
+    body = arm.model.body("upper")
+    radius = (3.0 * body.mass[0] / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
+    np.testing.assert_allclose(body.inertia, 0.4 * body.mass[0] * radius**2)
 
 
 @pytest.mark.filterwarnings("ignore:.*two.urdf")

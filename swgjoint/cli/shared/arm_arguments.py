@@ -53,7 +53,8 @@ def add_arm_arguments(parser: argparse.ArgumentParser) -> None:
         "--balance-inertia",
         action="store_true",
         help="set all three principal moments of a physically impossible inertia in the"
-        " file to their mean",
+        " file to their mean, and those of a body that has a mass alone to those of a"
+        " sphere of water",
     )
 
 

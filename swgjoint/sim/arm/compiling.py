@@ -10,13 +10,15 @@ _BALANCE = (
     "; accepted: moments of inertia that a rigid body can have, or the option"
     " --balance-inertia (scene key balance_inertia), which sets all three to their mean"
 )
+_MASS_ALONE = (
+    "; accepted: a mass and moments of inertia for every body that moves (<inertial> in"
+    " its link or body), or the option --balance-inertia (scene key balance_inertia),"
+    " which gives a body with a mass alone the moments of a sphere of water"
+)
 _REMEDIES = {
     "balanceinertia": _BALANCE,
     "positive eigenvalues": _BALANCE,
-    "larger than mjMINVAL": (
-        "; accepted: a mass and moments of inertia for every body that moves"
-        " (<inertial> in its link or body)"
-    ),
+    "larger than mjMINVAL": _MASS_ALONE,
     "Error opening file": (
         "; accepted: the meshes of an MJCF file in their places, or a copy of the file"
         " without these shapes whose bodies have an <inertial>"

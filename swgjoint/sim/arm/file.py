@@ -177,18 +177,32 @@ def _forget_actuators(spec: mujoco.MjSpec) -> None:
 
 
 def _balance_inertia(spec: mujoco.MjSpec) -> None:
-    """Replace the moments of inertia of impossible rigid bodies by their mean."""
+    """Replace the moments of inertia of impossible rigid bodies.
+
+    Their mean replaces the moments; a body that has a mass alone becomes a solid sphere
+    with the density of water.
+    """
     # the compiler replaces moments that violate the triangle inequality; the loop
-    # replaces inertia tensors that are not positive definite
+    # replaces inertia tensors that are zero or not positive definite
     spec.compiler.balanceinertia = True
     for body in spec.bodies:
         full = np.array(body.fullinertia)
-        if not np.isfinite(full).all():
+        if not np.isfinite(full).all():  # the file states principal moments, or none
+            if body.explicitinertial and not np.any(body.inertia):
+                body.inertia = 3 * [_sphere_inertia(body.mass)]
             continue
         xx, yy, zz, xy, xz, yz = full
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if (xx + yy + zz) > 0.0 and np.linalg.eigvalsh(tensor)[0] <= 0.0:
+        if not full.any():
+            body.fullinertia = [*3 * [_sphere_inertia(body.mass)], 0.0, 0.0, 0.0]
+        elif (xx + yy + zz) > 0.0 and np.linalg.eigvalsh(tensor)[0] <= 0.0:
             body.fullinertia = [*3 * [(xx + yy + zz) / 3.0], 0.0, 0.0, 0.0]
+
+
+def _sphere_inertia(mass: float) -> float:
+    """Moment of inertia of a solid sphere with the density of water [kg·m²]."""
+    radius = (max(mass, 0.0) / (4.0 / 3.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
+    return float(0.4 * mass * radius**2)
 
 
 def _keyframes(model: mujoco.MjModel) -> dict[str, dict[str, float]]:

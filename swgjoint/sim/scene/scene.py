@@ -62,7 +62,8 @@ class Scene(Section):
     they are held at the reference position."""
     balance_inertia: bool = False
     """Whether to repair inertias that no rigid body can have: their mean replaces the
-    three principal moments."""
+    three principal moments. A body that has a mass alone becomes a solid sphere with
+    the density of water."""
     defaults: JointSection = JointSection()
     """Settings of all joints, which ``joints`` overrides."""
     joints: dict[str, JointSection] = Field(default_factory=dict)
