@@ -147,15 +147,18 @@ class Page:
         self.command("Input.insertText", text=text)
 
     def click(self, key):
-        """Click the middle of the element with a data-key."""
+        """Click the middle of the element with a data-key once it is at rest."""
         where = f"document.querySelector('[data-key=\"{key}\"]')"
         self.wait(where)
         place = (
-            f"(e => {{ e.scrollIntoView({{block: 'center'}});"
+            f"(e => {{ e.scrollIntoView({{block: 'center', behavior: 'instant'}});"
             " const r = e.getBoundingClientRect();"
             f" return [r.x + r.width / 2, r.y + r.height / 2]; }})({where})"
         )
-        x, y = self.value(place)
+        before, (x, y) = None, self.value(place)
+        while (x, y) != before:  # the layout may still move
+            time.sleep(0.1)
+            before, (x, y) = (x, y), self.value(place)
         for kind in ("mousePressed", "mouseReleased"):
             self.command(
                 "Input.dispatchMouseEvent",
@@ -164,15 +167,20 @@ class Page:
 
     def choose(self, key, option):
         """Select an option by its text, which is typed if that filters the list."""
-        self.click(key)
-        if self.value("document.activeElement.matches('input:not([readonly])')"):
-            self.value("document.activeElement.select()")
-            self.command("Input.insertText", text=option)
         item = (
             "[...document.querySelectorAll('.q-menu .q-item')]"
             f".find(e => e.innerText.trim() == {json.dumps(option)})"
         )
-        self.wait(item)
+        self.command("Page.bringToFront")  # a page in the back has slow timers
+        begin = time.monotonic()
+        while not self.value(f"!!({item})"):
+            assert time.monotonic() - begin < 60.0, f"{key} does not offer {option}"
+            if not self.value("!!document.querySelector('.q-menu')"):
+                self.click(key)  # the menu closes where the page is drawn anew
+            elif self.value("document.activeElement.matches('input:not([readonly])')"):
+                self.value("document.activeElement.select()")
+                self.command("Input.insertText", text=option)
+            time.sleep(0.5)
         self.value(f"{item}.click(), 1")
 
     def upload(self, selector, path):
