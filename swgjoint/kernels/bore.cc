@@ -32,7 +32,7 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
         const Vec at = station_of(stations, i, window);
         const Vec seen{cos * at.x + sin * at.y - support.offset.x,
                        cos * at.y - sin * at.x - support.offset.y};
-        const Nearest foot = nearest(support.outline, seen);
+        const Nearest foot = support.outline.nearest(seen);
         gap[i] = foot.gap;
         normal[2 * i] = cos * foot.normal.x - sin * foot.normal.y;
         normal[2 * i + 1] = sin * foot.normal.x + cos * foot.normal.y;

@@ -26,7 +26,7 @@ struct Stations {
 // A turned and shifted outline. Where an interval neither touches nor has a gap below
 // far in its middle, all its stations share the values of the middle.
 struct Support {
-  Outline outline;
+  const Outline& outline;
   double angle;
   Vec offset;
   double far;

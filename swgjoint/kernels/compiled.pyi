@@ -86,9 +86,7 @@ class Bore:
         self,
         nodes: Array,
         touching: Mask,
-        elliptical: bool,
-        major: float,
-        minor: float,
+        outline: Array,
         angle: float,
         offset: Array,
         far: float,
@@ -190,9 +188,7 @@ class RingFactor:
     ) -> float: ...
 
 def nearest_tree(distance: Array, order: Index, before: Index) -> None: ...
-def ellipse_distance(
-    points: Array, major: float, minor: float, result: Array
-) -> None: ...
+def outline_distance(points: Array, outline: Array, result: Array) -> None: ...
 def grow_oscillation(
     sin: Array,
     cos: Array,

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <stdexcept>
 
+#include "chain.h"
 #include "flank.h"
 
 namespace nb = nanobind;
@@ -26,6 +27,18 @@ using MasksOut = nb::ndarray<bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 inline void require(bool fits, const char* what) {
   if (!fits) throw std::invalid_argument(what);
+}
+
+// Check rows of an outline: one whole outline, or pieces of a chain
+inline void check_outline(const In<2>& rows) {
+  const std::size_t n = rows.shape(0);
+  require(n > 0 && rows.shape(1) == swgjoint::kColumns, "outline: (n, 7)");
+  const auto whole = static_cast<double>(swgjoint::Kind::kSimplified);
+  const auto last = static_cast<double>(swgjoint::Kind::kParabola);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double kind = rows.data()[swgjoint::kColumns * k];
+    require(kind >= 0.0 && kind <= last && (n == 1 || kind > whole), "outline: kind");
+  }
 }
 
 // A tooth profile.

@@ -20,12 +20,14 @@
 
 namespace {
 
-void ellipse_distance(In<2> points, double major, double minor, Out<2> result) {
+void outline_distance(In<2> points, In<2> outline, Out<2> result) {
   const std::size_t n = points.shape(0);
   require(points.shape(1) == 2 && result.shape(0) == n && result.shape(1) == 4,
           "points: (n, 2), result: (n, 4)");
+  check_outline(outline);
   const nb::gil_scoped_release release;
-  swgjoint::outline_distance(points.data(), n, {true, major, minor}, result.data());
+  swgjoint::outline_distance(points.data(), n, {outline.data(), outline.shape(0)},
+                             result.data());
 }
 
 void nearest_tree(In<2> distance, IndexOut order, IndexOut before) {
@@ -344,8 +346,8 @@ NB_MODULE(compiled, m) {
         nb::arg("by_value").noconvert(), nb::arg("reach"), nb::arg("most"));
   m.def("nearest_tree", &nearest_tree, nb::arg("distance").noconvert(),
         nb::arg("order").noconvert(), nb::arg("before").noconvert());
-  m.def("ellipse_distance", &ellipse_distance, nb::arg("points").noconvert(),
-        nb::arg("major"), nb::arg("minor"), nb::arg("result").noconvert());
+  m.def("outline_distance", &outline_distance, nb::arg("points").noconvert(),
+        nb::arg("outline").noconvert(), nb::arg("result").noconvert());
   m.def("grow_oscillation", &grow_oscillation, nb::arg("sin").noconvert(),
         nb::arg("cos").noconvert(), nb::arg("weight").noconvert(),
         nb::arg("omega").noconvert(), nb::arg("offset"), nb::arg("ramp").noconvert(),

@@ -72,15 +72,22 @@ Nearest nearest_of_simplified(double major, double radius, Vec point) {
 
 }  // namespace
 
-Nearest nearest(const Outline& outline, Vec point) {
-  return outline.elliptical ? nearest_of_ellipse(outline.major, outline.minor, point)
-                            : nearest_of_simplified(outline.major, outline.minor, point);
+Outline::Outline(const double* rows, std::size_t n)
+    : kind_(static_cast<Kind>(static_cast<int>(rows[0]))), major_(rows[1]),
+      minor_(rows[2]) {
+  if (kind_ != Kind::kEllipse && kind_ != Kind::kSimplified) chain_.emplace(rows, n);
+}
+
+Nearest Outline::nearest(Vec point) const {
+  if (chain_) return chain_->nearest(point);
+  return kind_ == Kind::kEllipse ? nearest_of_ellipse(major_, minor_, point)
+                                 : nearest_of_simplified(major_, minor_, point);
 }
 
 void outline_distance(const double* points, std::size_t n, const Outline& outline,
                       double* result) {
   for (std::size_t i = 0; i < n; ++i, points += 2, result += 4) {
-    const Nearest foot = nearest(outline, {points[0], points[1]});
+    const Nearest foot = outline.nearest({points[0], points[1]});
     result[0] = foot.gap;
     result[1] = foot.normal.x;
     result[2] = foot.normal.y;

@@ -1,32 +1,34 @@
 // Distance of points from the outline of a wave generator.
 //
-// Compiled twins of signed_distance in swgjoint/gear/wave_generators/ellipse.py and
-// simplified.py, which explain the methods.
+// Compiled twins of signed_distance in swgjoint/gear/wave_generators/ellipse.py,
+// simplified.py and chain.py, which explain the methods.
 
 #ifndef SWGJOINT_KERNELS_OUTLINE_H_
 #define SWGJOINT_KERNELS_OUTLINE_H_
 
 #include <cstddef>
+#include <optional>
 
+#include "chain.h"
 #include "vec.h"
 
 namespace swgjoint {
 
-// An ellipse, or two semicircles joined by straight lines. The major axis is the y axis.
-struct Outline {
-  bool elliptical;
-  double major;  // semi-major axis
-  double minor;  // semi-minor axis of the ellipse, radius of the semicircles
-};
+// An ellipse, two semicircles joined by straight lines, or a chain of pieces. The major
+// axis is the y axis.
+class Outline {
+ public:
+  // rows: (n, kColumns), see ClosedCurve.rows; n > 0
+  Outline(const double* rows, std::size_t n);
 
-// Distance of a point, positive outside, with normal and curvature at its foot.
-struct Nearest {
-  double gap;
-  Vec normal;
-  double curvature;
-};
+  Nearest nearest(Vec point) const;
 
-Nearest nearest(const Outline& outline, Vec point);
+ private:
+  Kind kind_;
+  double major_;  // semi-major axis
+  double minor_;  // semi-minor axis of the ellipse, radius of the semicircles
+  std::optional<Chain> chain_;
+};
 
 // points: (n, 2); result: (n, 4) of distance, normal x, y, curvature at the foot.
 void outline_distance(const double* points, std::size_t n, const Outline& outline,

@@ -25,9 +25,8 @@ class Bore {
     stations_ = {weights.data(), p, width, stiffness.shape(0) / p};
   }
 
-  void gaps(In<3> nodes, Masks touching, bool elliptical, double major, double minor,
-            double angle, In<1> offset, double far, Out<2> gap, Out<3> normal,
-            Out<2> curvature) const {
+  void gaps(In<3> nodes, Masks touching, In<2> outline, double angle, In<1> offset,
+            double far, Out<2> gap, Out<3> normal, Out<2> curvature) const {
     const std::size_t count = nodes.shape(0);
     require(nodes.shape(1) == stations_.nodes() && nodes.shape(2) == 2,
             "nodes: (n, m, 2)");
@@ -36,9 +35,11 @@ class Bore {
     require(offset.shape(0) == 2, "offset: (2,)");
     check(count, gap, normal);
     check(count, curvature, normal);
-    const swgjoint::Support support{
-        {elliptical, major, minor}, angle, {offset.data()[0], offset.data()[1]}, far};
+    check_outline(outline);
     const nb::gil_scoped_release release;
+    const swgjoint::Outline curve(outline.data(), outline.shape(0));
+    const swgjoint::Support support{
+        curve, angle, {offset.data()[0], offset.data()[1]}, far};
     swgjoint::bore_gaps(stations_, support, nodes.data(), touching.data(), count,
                         gap.data(), normal.data(), curvature.data());
   }
@@ -204,9 +205,9 @@ void bind_plane(nb::module_& m) {
       .def(nb::init<In<3>, In<1>>(), nb::arg("weights").noconvert(),
            nb::arg("stiffness").noconvert())
       .def("gaps", &Bore::gaps, nb::arg("nodes").noconvert(),
-           nb::arg("touching").noconvert(), nb::arg("elliptical"), nb::arg("major"),
-           nb::arg("minor"), nb::arg("angle"), nb::arg("offset").noconvert(),
-           nb::arg("far"), nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
+           nb::arg("touching").noconvert(), nb::arg("outline").noconvert(),
+           nb::arg("angle"), nb::arg("offset").noconvert(), nb::arg("far"),
+           nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
            nb::arg("curvature").noconvert())
       .def("forces", &Bore::forces, nb::arg("touching").noconvert(),
            nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),

@@ -11,6 +11,7 @@ from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.curve import Kind
 from swgjoint.kernels import kernels
 
 pytestmark = pytest.mark.skipif(
@@ -142,9 +143,7 @@ def test_shapes_that_do_not_fit_are_refused():
     gaps = dict(
         nodes=np.ones((5, 3, 2)),
         touching=good["touching"],
-        elliptical=True,
-        major=0.03,
-        minor=0.02,
+        outline=np.array([[Kind.ELLIPSE, 0.03, 0.02, 0.0, 0.0, 0.0, 0.0]]),
         angle=0.1,
         offset=np.zeros(2),
         far=1e-3,
@@ -157,6 +156,10 @@ def test_shapes_that_do_not_fit_are_refused():
         ("nodes", np.ones((5, 4, 2))),
         ("touching", np.zeros((4, 4), bool)),
         ("offset", np.zeros(1)),
+        ("outline", np.zeros((1, 6))),
+        ("outline", np.zeros((0, 7))),
+        ("outline", np.full((1, 7), 5.0)),
+        ("outline", np.zeros((2, 7))),
         ("gap", np.zeros((5, 5))),
         ("normal", np.zeros((4, 4, 2))),
     ):

@@ -1,11 +1,15 @@
-"""Compiled distance from an ellipse against the numpy code and a closed form."""
+"""Compiled distances from outlines against the numpy code and closed forms."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.ellipse import Elliptical
+from swgjoint.gear.wave_generators.pieces import Arc, Line
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.kernels import kernels
 
 pytestmark = pytest.mark.skipif(
@@ -47,3 +51,64 @@ def test_distance_from_a_circle():
     np.testing.assert_allclose(distance, radius - 0.03, rtol=0.0, atol=1e-16)
     np.testing.assert_allclose(normal, points / radius[:, None], atol=1e-14)
     np.testing.assert_allclose(curvature, 1.0 / 0.03, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        wave_generator(Design.load("reference-2d-parabolic")),
+        wave_generator(Design.load("reference-2d-asymmetric")),
+        wave_generator(Design.load("reference-2d-four-roller")).band,
+    ],
+    ids=["parabolic", "asymmetric", "band"],
+)
+def test_distances_from_chains_are_those_of_numpy(monkeypatch, outline):
+    """Outside, inside as far as contact reaches, on the outline, at the junctions."""
+    rng = np.random.default_rng(4)
+    along = rng.uniform(0.0, outline.perimeter, 4000)
+    foot, normal, curvature = outline.evaluate(np.append(along, outline.stations))
+    depth = rng.uniform(-0.3, 1.0, len(foot)) / np.maximum(curvature, 50.0)
+    points = np.concatenate([foot, foot + depth[:, None] * normal])
+    found = outline.signed_distance(points)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    wanted = outline.signed_distance(points)
+    np.testing.assert_allclose(found[0], wanted[0], rtol=0.0, atol=2e-16)
+    np.testing.assert_allclose(found[1], wanted[1], rtol=0.0, atol=1e-12)
+    # at a junction, the foot may be on either piece; its curvature jumps there
+    jump = np.abs(found[2] - wanted[2]) > 1e-9 * np.abs(wanted[2])
+    at = np.abs(np.append(along, outline.stations)[:, None] - outline.stations)
+    assert (np.tile(at.min(axis=1), 2)[jump] < 1e-12).all()
+
+
+def test_far_inside_all_pieces_are_searched(monkeypatch):
+    """Distances where no end normals enclose the point, and at the centre of an arc."""
+    outline = wave_generator(Design.load("reference-2d-asymmetric"))
+    points = np.random.default_rng(6).uniform(-0.02, 0.02, (2000, 2))
+    found = outline.signed_distance(points)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    np.testing.assert_allclose(
+        found[0], outline.signed_distance(points)[0], rtol=0.0, atol=1e-15
+    )
+
+
+def test_distance_from_a_rounded_square():
+    """Arcs and lines against the closed form of a square enlarged by a radius."""
+    half, r = 0.02, 0.005
+    corners = [(-half, half), (-half, -half), (half, -half), (half, half)]
+    pieces = [Line(start=(0.0, half + r), end=(-half, half + r))]
+    for k, (centre, after) in enumerate(
+        zip(corners, [*corners[1:], corners[0]], strict=True)
+    ):
+        start = 0.5 * np.pi * (k + 1)
+        pieces.append(Arc(centre=centre, radius=r, start=start, end=start + np.pi / 2))
+        out = np.array([np.cos(start + np.pi / 2), np.sin(start + np.pi / 2)]) * r
+        end = np.add(after, out) if k < 3 else np.array([0.0, half + r])
+        pieces.append(Line(start=tuple(np.add(centre, out)), end=tuple(end)))
+    outline = Chain(pieces=tuple(pieces))
+    assert np.abs(outline.gaps()).max() < 1e-17
+    points = np.random.default_rng(7).uniform(-0.05, 0.05, (3000, 2))
+    beyond = np.abs(points) - half
+    wanted = (
+        np.hypot(*np.maximum(beyond, 0.0).T) + np.minimum(beyond.max(axis=1), 0.0) - r
+    )
+    np.testing.assert_allclose(outline.signed_distance(points)[0], wanted, atol=1e-16)

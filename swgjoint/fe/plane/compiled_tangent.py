@@ -10,8 +10,6 @@ import numpy as np
 from swgjoint.fe.plane.bore_contact import BoreStations
 from swgjoint.fe.plane.corotation import Frames
 from swgjoint.fe.plane.superelement import Superelement
-from swgjoint.gear.wave_generators.ellipse import Elliptical
-from swgjoint.gear.wave_generators.simplified import Simplified
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
@@ -37,7 +35,7 @@ class CompiledBore:
         self,
         nodes: Array,
         touching: Mask,
-        outline: Elliptical | Simplified,
+        outline: Array,
         angle: float,
         centre: Array | None,
         far: float,
@@ -47,20 +45,17 @@ class CompiledBore:
         Args:
             nodes: Nodes that the stations follow (N, m, 2) [m].
             touching: Whether each station is in contact (N, q).
-            outline: Outline of the wave generator.
+            outline: Rows of the outline (n, 7), see ``ClosedCurve.rows``.
             angle: Rotation of the outline [rad].
             centre: Centre of the outline in its frame (2,) [m]; None for zero.
             far: Gap above which an interval has one value for all its stations [m].
         """
-        elliptical = isinstance(outline, Elliptical)
         gap, normal = np.empty(touching.shape), np.empty((*touching.shape, 2))
         curvature = np.empty(touching.shape)
         self.bore.gaps(
             np.ascontiguousarray(nodes),
             np.ascontiguousarray(touching),
-            elliptical,
-            outline.major,
-            outline.minor if isinstance(outline, Elliptical) else outline.pin_radius,
+            outline,
             angle,
             np.zeros(2) if centre is None else np.ascontiguousarray(centre),
             far,

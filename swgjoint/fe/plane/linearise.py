@@ -21,8 +21,6 @@ from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.plane.tooth_contact import ToothContact
-from swgjoint.gear.wave_generators.ellipse import Elliptical
-from swgjoint.gear.wave_generators.simplified import Simplified
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
@@ -346,8 +344,8 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
     stations, alpha = model.stations, state.wave_generator_angle
     nodes = model.station_nodes(model.skeleton(state))
     far = FAR * model.lobe_height
-    bore, outline = CompiledBore.for_stations(stations), model.wave_generator
-    if bore is not None and isinstance(outline, Elliptical | Simplified):
+    bore, outline = CompiledBore.for_stations(stations), model.wave_generator.rows
+    if bore is not None and outline is not None:
         centre = model.wave_generator_offset
         return bore.gaps(nodes, state.touching, outline, alpha, centre, far)
     points = stations.positions(nodes)

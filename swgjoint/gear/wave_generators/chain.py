@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.gear.wave_generators.pieces import OutlinePiece
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 
@@ -36,6 +37,11 @@ class Chain(ClosedCurve):
     def perimeter(self) -> float:
         """Length of the closed outline [m]."""
         return float(self.stations[-1])
+
+    @cached_property
+    def rows(self) -> Array:
+        """Description for compiled loops; see :attr:`ClosedCurve.rows`."""
+        return np.array([piece.row for piece in self.pieces])
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
@@ -70,6 +76,10 @@ class Chain(ClosedCurve):
         For each point, the foot is sought on the pieces whose end normals enclose the
         point.
         """
+        if (native := kernels()) is not None:
+            found = np.empty((len(points), 4))
+            native.outline_distance(np.ascontiguousarray(points), self.rows, found)
+            return found[:, 0], found[:, 1:3], found[:, 3]
         starts, tangents = self._starts
         # whether a point is after the normal at the start of a piece, (n_pieces, n)
         after = np.einsum("kj,nj->kn", tangents, points)

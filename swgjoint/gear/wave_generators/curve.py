@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.typing import Array
+
+
+class Kind(IntEnum):
+    """Kinds of rows that describe an outline to compiled loops, see chain.h."""
+
+    ELLIPSE = 0
+    SIMPLIFIED = 1
+    ARC = 2
+    LINE = 3
+    PARABOLA = 4
 
 
 class ClosedCurve(ABC):
@@ -28,6 +39,17 @@ class ClosedCurve(ABC):
     def folds(self) -> int:
         """Order n of rotational symmetry: a turn by 2 pi/n leaves the outline as is."""
         return 2
+
+    @property
+    def rows(self) -> Array | None:
+        """Description for compiled loops (n, 7); None if they cannot evaluate it.
+
+        A row starts with its :class:`Kind` and continues with lengths [m], curvatures
+        [1/m] and angles [rad]: semi-axes a and b of an ellipse, semi-major axis and
+        radius of the simplified outline, or the fields of a piece of a chain. The rest
+        of the row is zero.
+        """
+        return None
 
     @abstractmethod
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:

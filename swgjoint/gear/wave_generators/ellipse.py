@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve, Kind
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
@@ -37,6 +37,11 @@ class Elliptical(ClosedCurve):
     def _parameter(self) -> float:
         """Parameter m of the elliptic integral, ds = b sqrt(1 - m sin^2 t) dt [-]."""
         return 1.0 - (self.major / self.minor) ** 2
+
+    @cached_property
+    def rows(self) -> Array:
+        """Description for compiled loops; see :attr:`ClosedCurve.rows`."""
+        return np.array([[Kind.ELLIPSE, self.major, self.minor, 0.0, 0.0, 0.0, 0.0]])
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
@@ -70,7 +75,7 @@ class Elliptical(ClosedCurve):
         a, b = self.major, self.minor
         if (native := kernels()) is not None:
             found = np.empty((len(points), 4))
-            native.ellipse_distance(np.ascontiguousarray(points), a, b, found)
+            native.outline_distance(np.ascontiguousarray(points), self.rows, found)
             return found[:, 0], found[:, 1:3], found[:, 3]
         x, y = np.abs(points[:, 0]), np.abs(points[:, 1])  # x = b sin t, y = a cos t
         t = np.arctan2(a * x, b * y)

@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from swgjoint.gear.wave_generators.curve import Kind
 from swgjoint.typing import Array
 
 Point = tuple[float, float]
@@ -24,6 +25,11 @@ class OutlinePiece(Protocol):
     @property
     def length(self) -> float:
         """Arc length [m]."""
+        ...
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Row of seven values, see :attr:`ClosedCurve.rows`."""
         ...
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
@@ -66,6 +72,11 @@ class Arc:
         """Arc length [m]."""
         return self.radius * (self.end - self.start)
 
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Row of seven values; see :attr:`OutlinePiece.row`."""
+        return Kind.ARC, *self.centre, self.radius, self.start, self.end, 0.0
+
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
         """Points, normals and curvatures; see :meth:`OutlinePiece.evaluate_at`."""
         angle = self.start + s / self.radius
@@ -106,6 +117,11 @@ class Line:
     def length(self) -> float:
         """Arc length [m]."""
         return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Row of seven values; see :attr:`OutlinePiece.row`."""
+        return Kind.LINE, *self.start, *self.end, 0.0, 0.0
 
     @cached_property
     def _direction(self) -> Array:
@@ -157,6 +173,12 @@ class Parabola:
     def length(self) -> float:
         """Arc length [m]."""
         return self._from_apex(self.start) - self._from_apex(self.end)
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Row of seven values; see :attr:`OutlinePiece.row`."""
+        limits = self.start, self.end
+        return Kind.PARABOLA, *self.apex, self.coefficient, *limits, self.turn
 
     @cached_property
     def _rotation(self) -> Array:

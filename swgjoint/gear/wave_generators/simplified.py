@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve, Kind
 from swgjoint.typing import Array
 
 
@@ -25,6 +26,13 @@ class Simplified(ClosedCurve):
         """Length of two semicircles and two straight lines [m]."""
         straight = 2.0 * (self.major - self.pin_radius)
         return 2.0 * (np.pi * self.pin_radius + straight)
+
+    @cached_property
+    def rows(self) -> Array:
+        """Description for compiled loops; see :attr:`ClosedCurve.rows`."""
+        return np.array(
+            [[Kind.SIMPLIFIED, self.major, self.pin_radius, 0.0, 0.0, 0.0, 0.0]]
+        )
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Points, normals and curvatures; see :meth:`ClosedCurve.evaluate`.
