@@ -35,6 +35,9 @@ ANGLES = 12
 MANY_PARTS = tuple(float(part) for part in np.linspace(0.02, 0.98, 36))
 MANY_ANGLES = 40
 """Of the comparison that shows how much of the largest difference a record states."""
+BESIDE = (0.99, 0.997, 1.003, 1.01)
+BESIDE_ANGLES = 180
+"""Of the comparison beside the torque that a record names, in parts of that torque."""
 DESIGNS = (
     "reference-2d",
     "reference-2d-dca",
@@ -140,7 +143,20 @@ def differences(
     parts: Sequence[float] = PARTS,
     angles: int = ANGLES,
 ) -> Array:
-    """Differences of a map at unseen torques and angles.
+    """Differences of a map at unseen torques of both signs, see :func:`at_torques`."""
+    peak = ratings_of(design).repeated_peak
+    signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
+    rows = [
+        at_torques(found, design, sign * peak * np.array(parts), angles)
+        for sign in signs
+    ]
+    return np.concatenate(rows)
+
+
+def at_torques(
+    found: Compared, design: Design, torques: Sequence[float] | Array, angles: int
+) -> Array:
+    """Differences of a map at unseen torques [N·m] and angles.
 
     Returns:
         Rows of torque [N·m], then largest and rms difference of the loaded error and of
@@ -149,22 +165,18 @@ def differences(
     """
     rows = []
     theta = 2.0 * pi / design.periodicity * (np.arange(angles) + 0.37) / angles
-    peak = ratings_of(design).repeated_peak
-    signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
-    for sign in signs:
-        state = found.rest
-        for part in parts:
-            torque = sign * part * peak
-            state = found.follow.to_torque(state, torque)
-            error, apart, moment, missed = found.at(state, theta)
-            # a constant angle has no meaning: each code counts from its own zero
-            apart -= apart.mean()
-            row = [torque]
-            for values, wrong in ((error, apart), (moment, missed)):
-                height = np.ptp(values)
-                rms = np.sqrt(np.mean(wrong**2))
-                row += [np.abs(wrong).max() / height, rms / height]
-            rows.append(row)
+    state = found.rest
+    for torque in torques:
+        state = found.follow.to_torque(state, float(torque))
+        error, apart, moment, missed = found.at(state, theta)
+        # a constant angle has no meaning: each code counts from its own zero
+        apart -= apart.mean()
+        row = [float(torque)]
+        for values, wrong in ((error, apart), (moment, missed)):
+            height = np.ptp(values)
+            rms = np.sqrt(np.mean(wrong**2))
+            row += [np.abs(wrong).max() / height, rms / height]
+        rows.append(row)
     return np.array(rows)
 
 
@@ -189,6 +201,8 @@ def figures(name: str) -> dict[str, Any]:
     }
     for key, column in (("input_torque", 3), ("output_error", 1)):
         worst = int(many[:, column].argmax())
+        place = found.record[key]["at_Nm"]
+        beside = at_torques(found, design, place * np.array(BESIDE), BESIDE_ANGLES)
         result[key] = {
             "largest": float(few[:, column].max()),
             "rms": float(few[:, column + 1].max()),
@@ -196,6 +210,7 @@ def figures(name: str) -> dict[str, Any]:
             "record_at_Nm": found.record[key]["at_Nm"],
             "largest_of_many": float(many[worst, column]),
             "largest_of_many_at_Nm": float(many[worst, 0]),
+            "largest_beside_record": float(beside[:, column].max()),
         }
     return result
 
