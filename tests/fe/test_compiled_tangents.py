@@ -109,4 +109,5 @@ def test_shapes_that_do_not_fit_are_refused():
             index, index, np.zeros((2, 4, 4)), index, np.zeros((2, 4)), np.zeros((2, 2))
         )
     with pytest.raises(ValueError):
-        native.ellipse_distance(np.zeros((2, 3)), 1.0, 0.9, np.zeros((2, 4)))
+        ellipse = np.array([[0.0, 1.0, 0.9, 0.0, 0.0, 0.0, 0.0]])
+        native.outline_distance(np.zeros((2, 3)), ellipse, np.zeros((2, 4)))
