@@ -10,7 +10,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,10 +23,15 @@ from swgjoint.store import (
     keep,
     read_kept,
     split_arrays,
+    warn_ignored,
 )
 
 FORGOTTEN = 14 * 24 * 3600.0
 """Age after which the parts of an interrupted map are removed [s]."""
+
+SHARED = 1.0
+"""Results of this time share a file [s]. With one file for each result of some
+milliseconds, writing took a tenth of the time of a map."""
 
 Part = TypeVar("Part")
 
@@ -82,6 +87,78 @@ class Unfinished:
     def clear(self) -> None:
         """Remove all parts, once the map is complete."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+@dataclass(kw_only=True)
+class UnfinishedSeries:
+    """Results in the order in which they are computed, many to a part.
+
+    The same results are computed in the same order by the build that resumes, which
+    reads them by their numbers. A part is named by its first number.
+    """
+
+    keep: Unfinished
+    """Folder of the parts."""
+    name: str
+    """Format of the names of the parts, with a field for the number."""
+    number: int = 0
+    """Number of the next result."""
+    _stored: dict[int, dict[str, Any]] = field(default_factory=dict)
+    _pending: dict[int, dict[str, Any]] = field(default_factory=dict)
+    _written: float = field(default_factory=time.monotonic)
+
+    def read(self, take: Callable[[dict[str, Any]], Part]) -> Part | None:
+        """The next result, if it is stored; else None, and it must be written.
+
+        Args:
+            take: Builds the result from its arrays and raises an exception if they are
+                damaged.
+        """
+        name = self.name.format(self.number)
+        if self.number not in self._stored:
+            self._stored = self.keep.read(name, _by_number) or {}
+        if self.number not in self._stored:
+            return None
+        try:
+            part = take(self._stored.pop(self.number))
+        except Exception as error:
+            warn_ignored(name, error)
+            return None
+        self.number += 1
+        return part
+
+    def write(self, arrays: Mapping[str, Any]) -> None:
+        """Add the next result, with all others of the last second to one part.
+
+        Args:
+            arrays: Arrays of the result by name.
+        """
+        self._pending[self.number] = dict(arrays)
+        self.number += 1
+        if time.monotonic() - self._written >= SHARED:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the results that are not yet in a part."""
+        if self._pending:
+            first = min(self._pending)
+            arrays = {
+                f"{number} {key}": value
+                for number, one in self._pending.items()
+                for key, value in one.items()
+            }
+            self.keep.write(self.name.format(first), arrays)
+            self._pending.clear()
+        self._written = time.monotonic()
+
+
+def _by_number(arrays: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+    """Arrays of a part of a series, by the number of the result."""
+    found: dict[int, dict[str, Any]] = {}
+    for key, value in arrays.items():
+        number, _, own = key.partition(" ")
+        found.setdefault(int(number), {})[own] = value
+    return found
 
 
 def _remove_forgotten(folder: Path) -> None:

@@ -20,11 +20,12 @@ from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.sampling import sample_tolerances
 from swgjoint.gear.design.design import Design
+from swgjoint.maps import unfinished
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit.between_angles import with_mirrored_torques
 from swgjoint.maps.fit.fit import fit_map
-from swgjoint.maps.unfinished import Unfinished
+from swgjoint.maps.unfinished import Unfinished, UnfinishedSeries
 
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")
 ANGLES, COARSE_ANGLES = 14, 12
@@ -134,6 +135,7 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     """Every finished equilibrium is read, a damaged one alone solved again."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
+    monkeypatch.setattr(unfinished, "SHARED", 0.0)
     design = few_teeth()
     whole = sampling.sample_map(design, angles=4)
     # two positions of three solves, and one of the third
@@ -144,17 +146,15 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     if spoil:
         parts[1].write_bytes(parts[1].read_bytes()[:-200])
     written = []
-    write = Unfinished.write
+    write = UnfinishedSeries.write
 
-    def noted(keep, name, arrays):
-        written.append(name)
-        write(keep, name, arrays)
+    def noted(series, arrays):
+        written.append(series.number)
+        write(series, arrays)
 
-    monkeypatch.setattr(Unfinished, "write", noted)
+    monkeypatch.setattr(UnfinishedSeries, "write", noted)
     drive = build_map(design, angles=4)
-    assert written[:2] == (["solve-0001"] if spoil else []) + [
-        f"solve-{k:04d}" for k in range(7, 8 if spoil else 9)
-    ]
+    assert written[:2] == ([1] if spoil else []) + [*range(7, 8 if spoil else 9)]
     assert list(tmp_path.rglob("*.npz")) == []
     wanted = fit_map(whole)
     # all but the time that it took, and the reasons that build_map adds
@@ -164,19 +164,50 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     )
 
 
-def test_a_failed_solve_is_not_tried_again(tmp_path, caplog):
+@pytest.mark.fe
+def test_solves_of_a_second_share_a_file_and_all_are_kept(monkeypatch, tmp_path):
+    """An interruption writes what is pending; a damaged file is solved anew."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
+    monkeypatch.setattr(unfinished, "SHARED", 1e9)
+    solved = []
+    figures = ColumnGrid._recalled
+
+    def counted(grid, theta, torque, solve):
+        def noted():
+            solved.append((theta, torque))
+            return solve()
+
+        return figures(grid, theta, torque, noted)
+
+    monkeypatch.setattr(ColumnGrid, "_recalled", counted)
+    for _ in range(2):
+        with pytest.raises(Stop):
+            build_map(few_teeth(), angles=4, progress=stopping(6))
+        assert [part.stem for part in tmp_path.rglob("*.npz")] == ["solve-0000"]
+        assert len(solved) == 7  # the second time, all are read
+    (part,) = tmp_path.rglob("*.npz")
+    part.write_bytes(part.read_bytes()[:-200])
+    with pytest.raises(Stop):
+        build_map(few_teeth(), angles=4, progress=stopping(6))
+    assert solved == 2 * solved[:7]
+
+
+def test_a_failed_solve_is_not_tried_again(monkeypatch, tmp_path, caplog):
     """An interrupted run keeps failures, too, each for its own angle and torque."""
     tried = []
 
     def grid():
-        keep, nothing = Unfinished(folder=tmp_path), dict.fromkeys(("follow", "tick"))
+        series = UnfinishedSeries(keep=Unfinished(folder=tmp_path), name="solve-{}")
+        nothing = dict.fromkeys(("follow", "tick"))
         numbers = {"period": 1.0, "finest": 4, "levels": [], "small": 0.1}
-        return ColumnGrid(**nothing, **numbers, keep=keep)
+        return ColumnGrid(**nothing, **numbers, keep=series)
 
     def failing():
         tried.append(True)
         return SimpleNamespace(outcome=Outcome.DIVERGED)
 
+    monkeypatch.setattr(unfinished, "SHARED", 0.0)
     for _ in range(2):
         assert grid().solve_at(0.0, 1.0, failing) is None
     assert len(tried) == 1

@@ -5,10 +5,10 @@ A column contains the equilibria of a drive under several torques at one input a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Generic, TypeVar, cast
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 
@@ -16,14 +16,12 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState, Follower, Unloaded
 from swgjoint.fe.common.load_path import LoadPath
-from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
+from swgjoint.fe.common.state_arrays import copy_contiguous, pack_solve, unpack_solve
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.unfinished import Unfinished
+from swgjoint.maps.unfinished import UnfinishedSeries
 from swgjoint.typing import Array
 
 T = TypeVar("T")
-
-_SOLVE, _STATE = "solve-{:04d}", "state"
 
 
 @dataclass(kw_only=True, eq=False)
@@ -84,7 +82,7 @@ class SolvedColumns(Generic[AnyState]):
     """Torque that takes up the clearance of the teeth [N·m]."""
     tick: Callable[[], None]
     """Called after every solve."""
-    keep: Unfinished | None
+    keep: UnfinishedSeries | None
     """Store of solved equilibria; None stores none."""
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
     """Columns by their place on the finest grid."""
@@ -96,8 +94,6 @@ class SolvedColumns(Generic[AnyState]):
     """Places of the columns between equally spaced ones, increasing."""
     solves: int = 0
     """Number of solves that count against the budget."""
-    tried: int = 0
-    """Number of attempted solves; the stored results are numbered by it."""
     like: AnyState | None = None
     """First state; stored states of another type or shape are rejected."""
 
@@ -283,15 +279,18 @@ class SolvedColumns(Generic[AnyState]):
         """
         columns = [column for _, column in self.chosen(count)]
         rows = []
-        for torque, theta in positions:
-            # the last column is not the nearest one of the next pitch
-            nearest = min(round(theta / self.period * count), count - 1)
-            solve = partial(self._between, columns[nearest], torque, theta)
-            state = self.solve_at(theta, torque, solve)
-            self.count()
-            if state is not None:
-                error, _, _, moment = self.figures(state, theta)
-                rows.append((theta, torque, error, moment))
+        try:
+            for torque, theta in positions:
+                # the last column is not the nearest one of the next pitch
+                nearest = min(round(theta / self.period * count), count - 1)
+                solve = partial(self._between, columns[nearest], torque, theta)
+                state = self.solve_at(theta, torque, solve)
+                self.count()
+                if state is not None:
+                    error, _, _, moment = self.figures(state, theta)
+                    rows.append((theta, torque, error, moment))
+        finally:
+            self.flush()
         return FullSolves.from_rows(rows) if rows else None
 
     def _between(
@@ -328,37 +327,23 @@ class SolvedColumns(Generic[AnyState]):
 
         return self._recalled(theta, torque, sound)
 
+    def flush(self) -> None:
+        """Write the solves that are not yet in the store."""
+        if self.keep is not None:
+            self.keep.flush()
+
     def _recalled(self, theta: float, torque: float, solve: Callable[[], T]) -> T:
         """Result of a solve, read from the store if the store contains it."""
-        name, self.tried = _SOLVE.format(self.tried), self.tried + 1
         if self.keep is not None:
-            stored = self.keep.read(name, partial(self._taken, theta, torque))
+            stored = self.keep.read(
+                partial(unpack_solve, theta=theta, torque=torque, like=self.like)
+            )
             if stored is not None:
                 return cast(T, stored[0])
         result = copy_contiguous(solve())
         if self.keep is not None:
-            at = {"theta": theta, "torque": torque}
-            self.keep.write(name, at | pack(result, _STATE))
+            self.keep.write(pack_solve(result, theta=theta, torque=torque))
         return result
-
-    def _taken(
-        self, theta: float, torque: float, arrays: Mapping[str, Any]
-    ) -> tuple[Unloaded[AnyState] | AnyState | None]:
-        """Stored result from its arrays, as a tuple because None marks a failed solve.
-
-        Raises:
-            ValueError: If the result does not belong to this angle, torque and model.
-        """
-        if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
-            raise ValueError("stored equilibrium has another angle or torque")
-        stored: Any = unpack(arrays, _STATE)
-        if isinstance(stored, Unloaded) != (torque == 0.0):
-            raise ValueError("stored equilibrium has the wrong type for its torque")
-        states = [stored] if torque else [stored.state, *(stored.sides or ())]
-        for state in states:
-            if state is not None:
-                _check_like(state, self.like)
-        return (stored,)
 
     # -- values ------------------------------------------------------------------------
 
@@ -378,16 +363,6 @@ class SolvedColumns(Generic[AnyState]):
         return np.array(
             [error, state.energy, state.compliance, follow.input_torque(state)]
         )
-
-
-def _check_like(state: Any, like: Any) -> None:
-    """Reject a stored state that is not an equilibrium of the same model."""
-    if like is not None and (
-        type(state) is not type(like) or state.faces.shape != like.faces.shape
-    ):
-        raise ValueError("stored state belongs to another model")
-    if not np.isfinite(state.faces).all():
-        raise ValueError("stored state contains values that are not finite")
 
 
 def _no_rest(theta: float, state: AnyState) -> ComputationError:

@@ -19,7 +19,7 @@ from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
 from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.unfinished import Unfinished
+from swgjoint.maps.unfinished import UnfinishedSeries
 from swgjoint.typing import Array
 
 EVERY = 4
@@ -117,7 +117,7 @@ def solve_mesh_cycle(
     rated: float,
     symmetric: bool,
     tick: Callable[[], None],
-    keep: Unfinished | None = None,
+    keep: UnfinishedSeries | None = None,
     ripple: Callable[[float], Ripple] = lambda top: no_ripple,
 ) -> Pattern[AnyState]:
     """Pattern of a drive, sampled at as many angles and torques as it needs.

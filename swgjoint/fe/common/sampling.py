@@ -38,7 +38,7 @@ from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.worst_positions import worst_positions
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
-from swgjoint.maps.unfinished import Unfinished
+from swgjoint.maps.unfinished import Unfinished, UnfinishedSeries
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
@@ -240,12 +240,15 @@ def _solved(
     """
     ratings, period = ratings_of(design), 2.0 * pi / design.periodicity
     torques = _initial_torques(design)
+    series = None
+    if keep is not None:
+        series = UnfinishedSeries(keep=keep, name="solve-{:04d}")
     settings: dict[str, Any] = {
         "small": SMALL * ratings.rated_torque,
         "rated": ratings.rated_torque,
         "symmetric": design.wave_generator.kind in SYMMETRIC,
         "tick": tick,
-        "keep": keep,
+        "keep": series,
         **options,
     }
     try:
@@ -262,6 +265,9 @@ def _solved(
         return pattern, partial(plane_fields, plane.model, surface=surface), surface
     except ComputationError as failure:
         raise ComputationError(f"{design.drive.name}: {failure}") from failure
+    finally:
+        if series is not None:
+            series.flush()
 
 
 def _initial_torques(design: Design) -> list[float]:

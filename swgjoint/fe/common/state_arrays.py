@@ -90,6 +90,54 @@ def unpack(arrays: Mapping[str, Any], name: str) -> Any:
     return cls(**values)
 
 
+def pack_solve(result: Any, *, theta: float, torque: float) -> dict[str, Any]:
+    """Named arrays of a solve at an input angle [rad] under a torque [N·m].
+
+    Args:
+        result: A state, an :class:`Unloaded` drive without torque, or None if the solve
+            failed.
+        theta: Input angle [rad].
+        torque: Output torque [N·m].
+    """
+    return {"theta": theta, "torque": torque, **pack(result, "state")}
+
+
+def unpack_solve(
+    arrays: Mapping[str, Any], *, theta: float, torque: float, like: Any
+) -> tuple[Any]:
+    """Result of a solve from its arrays, as a tuple because None marks a failed solve.
+
+    Args:
+        arrays: Arrays that :func:`pack_solve` returned.
+        theta: Input angle of the solve [rad].
+        torque: Output torque of the solve [N·m].
+        like: State of the same model; None accepts any model.
+
+    Raises:
+        ValueError: If the result does not belong to this angle, torque and model.
+    """
+    if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
+        raise ValueError("stored equilibrium has another angle or torque")
+    stored: Any = unpack(arrays, "state")
+    if isinstance(stored, Unloaded) != (torque == 0.0):
+        raise ValueError("stored equilibrium has the wrong type for its torque")
+    states = [stored] if torque else [stored.state, *(stored.sides or ())]
+    for state in states:
+        if state is not None:
+            _check_like(state, like)
+    return (stored,)
+
+
+def _check_like(state: Any, like: Any) -> None:
+    """Reject a stored state that is not an equilibrium of the same model."""
+    if like is not None and (
+        type(state) is not type(like) or state.faces.shape != like.faces.shape
+    ):
+        raise ValueError("stored state belongs to another model")
+    if not np.isfinite(state.faces).all():
+        raise ValueError("stored state contains values that are not finite")
+
+
 def copy_contiguous(value: T) -> T:
     """Value whose arrays have the memory layout of arrays that were read from a file.
 

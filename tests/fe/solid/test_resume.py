@@ -12,7 +12,8 @@ from swgjoint.errors import InputError
 from swgjoint.fe.common.mesh_cycle import Effort, solve_mesh_cycle
 from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.fe.solid.checkpoint import Checkpoint
-from swgjoint.maps.unfinished import Unfinished
+from swgjoint.maps import unfinished
+from swgjoint.maps.unfinished import Unfinished, UnfinishedSeries
 from swgjoint.store import arrays_file
 
 pytestmark = pytest.mark.fe
@@ -89,7 +90,7 @@ class Stop(Exception):
 
 
 @pytest.mark.slow
-def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
+def test_a_pattern_in_space_goes_on_bit_for_bit(monkeypatch, small_drive, tmp_path):
     """Interrupted at the second equilibrium of the second position; none is lost."""
     period = 2.0 * np.pi / 42
     effort = Effort(angles=2, most_angles=2, solves=0, unseen=(1, 1), torques=4)
@@ -117,12 +118,13 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
             **options,
         )
 
+    monkeypatch.setattr(unfinished, "SHARED", 0.0)
     keep = Unfinished(folder=tmp_path)
     with pytest.raises(Stop):
-        solve(stop, keep=keep)
+        solve(stop, keep=UnfinishedSeries(keep=keep, name="solve-{}"))
     kept = len(list(tmp_path.iterdir()))
     solves = 0
-    found = solve(tick, keep=keep)
+    found = solve(tick, keep=UnfinishedSeries(keep=keep, name="solve-{}"))
     written = len(list(tmp_path.iterdir())) - kept
     # one of the next pitch, the mirror image that no progress counts, one to judge
     # with its torque and another one
