@@ -6,10 +6,10 @@ For every command one run that nothing stops, then runs that SIGKILL ends after 
 part of its time, each followed by the same command. Prints a table: how many second
 runs had the same result, how many units of work were kept at the kill (least, median,
 most), how many of these were done again, how many that were begun before the kill were
-begun once more (median, most: those in flight, one a process, or with ``sweep`` and
-``optimise`` a task of 2 s of designs), what was left behind. Work before the first unit
-and after the last one is repeated, too. Inputs are coarse, so that a run takes seconds.
-Linux.
+begun once more (median, most: those in flight, one a process, with ``map`` the
+equilibria of the last second, with ``sweep`` and ``optimise`` a task of 2 s of
+designs), what was left behind. Work before the first unit and after the last one is
+repeated, too. Inputs are coarse, so that a run takes seconds. Linux.
 """
 
 from __future__ import annotations
