@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,22 @@ from swgjoint.code_hash import code_hash
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.explore.lot import draw, summarise_lot
 from swgjoint.fe.plane.drive2d import in_plane, unmodelled_parts
-from swgjoint.fe.rings.lot import sample_turn, turn_superposition_error
+from swgjoint.fe.rings.lot import (
+    PerfectRings,
+    perfect_rings,
+    sample_turn,
+    turn_superposition_error,
+)
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
-from swgjoint.maps.cache import recall
+from swgjoint.maps.cache import entry_of, recall_kept
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE
 from swgjoint.maps.sheet.sampled_accuracy import accuracy_bracket
 from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
+from swgjoint.store import json_file, keep
 from swgjoint.units import arcmin
 
 FIGURES = ("transmission_accuracy_arcmin", "lost_motion_arcmin", "K1_Nm_rad")
@@ -64,6 +71,9 @@ class DriveOnBearing:
 @dataclass(frozen=True, kw_only=True)
 class _Task:
     design: Design
+    perfect: PerfectRings
+    path: Path | None
+    """File in which the drive is stored."""
     seed: int
     sizes: str
     clearance_um: tuple[float, float] | None
@@ -132,20 +142,50 @@ def run_bearing_lot(
             " misalignment_arcmin"
         )
     thin_ring(modelled)
-    tasks = [
-        _Task(
-            design=modelled,
-            seed=one,
-            sizes=sizes,
-            clearance_um=clearance_um,
-            compare=one == seed,
-        )
+    name = design.drive.name
+    parts = {
+        "bearing lot": _own_version(),
+        "design": modelled.content_hash(),
+        "sizes": sizes,
+        "clearance_um": clearance_um,
+    }
+    paths = {
+        one: entry_of("lots", {**parts, "seed": one, "compare": one == seed})
         for one in range(seed, seed + count)
-    ]
-    stage = f"{design.drive.name}: drives"
-    rows = run_all(_recalled, tasks, jobs=jobs, stage=stage, progress=progress)
+    }
+    found = {
+        one: row
+        for one, path in paths.items()
+        if (row := recall_kept(path, DriveOnBearing))
+    }
+    left = [one for one in paths if one not in found]
+    tasks = []
+    if left:
+        progress(f"{name}: drive without errors", 0, 1)
+        perfect = perfect_rings(modelled, _torques(modelled))
+        progress(f"{name}: drive without errors", 1, 1)
+        tasks = [
+            _Task(
+                design=modelled,
+                perfect=perfect,
+                path=paths[one],
+                seed=one,
+                sizes=sizes,
+                clearance_um=clearance_um,
+                compare=one == seed,
+            )
+            for one in left
+        ]
+
+    def report(stage: str, done: int, total: int) -> None:
+        progress(stage, len(found) + done, count)
+
+    solved = run_all(
+        _stored, tasks, jobs=jobs, stage=f"{name}: drives", progress=report
+    )
+    rows = sorted([*found.values(), *solved], key=lambda row: row.seed)
     return summarise_lot(rows, FIGURES, spec) | {
-        "design": design.drive.name,
+        "design": name,
         "sizes": sizes,
         "clearance_um": clearance_um,
         "validity": {
@@ -160,16 +200,12 @@ def run_bearing_lot(
     }
 
 
-def _recalled(task: _Task) -> DriveOnBearing:
-    parts = {
-        "bearing lot": _own_version(),
-        "design": task.design.content_hash(),
-        "seed": task.seed,
-        "sizes": task.sizes,
-        "clearance_um": task.clearance_um,
-        "compare": task.compare,
-    }
-    return recall("lots", parts, DriveOnBearing, lambda: _solved(task))
+def _stored(task: _Task) -> DriveOnBearing:
+    """Solve one drive and store it."""
+    found = _solved(task)
+    if task.path is not None:
+        keep(task.path, json_file(found))
+    return found
 
 
 @lru_cache
@@ -177,15 +213,20 @@ def _own_version() -> str:
     return code_hash("explore/bearing_lot.py", "explore/lot.py")
 
 
+def _torques(design: Design) -> tuple[float, float]:
+    """Torques of lost motion and of K1 [N·m]."""
+    ratings = ratings_of(design)
+    return LOST_MOTION_TORQUE * ratings.rated_torque, ratings.T1
+
+
 def _solved(task: _Task) -> DriveOnBearing:
     """Draw one drive and compute its figures."""
     drive = draw_on_bearing(task.design, task.seed, task.sizes, task.clearance_um)
     bearing = drive.wave_generator.bearing
     assert bearing is not None
-    ratings = ratings_of(drive)
-    lost = LOST_MOTION_TORQUE * ratings.rated_torque
+    lost, first = _torques(drive)
     try:
-        turn = sample_turn(drive, (lost, ratings.T1))
+        turn = sample_turn(drive, (lost, first), task.perfect)
     except ComputationError:
         turn = None
     if turn is None or not np.isfinite(turn.output_error).all():
@@ -205,7 +246,7 @@ def _solved(task: _Task) -> DriveOnBearing:
         clearance_um=bearing.clearance_um,
         transmission_accuracy_arcmin=0.5 * sum(accuracy_bracket(samples, drive)),
         lost_motion_arcmin=2.0 * float(turn.torsion(lost).mean()) / arcmin,
-        K1_Nm_rad=ratings.T1 / float(turn.torsion(ratings.T1).mean()),
+        K1_Nm_rad=first / float(turn.torsion(first).mean()),
         superposition_error=(
             turn_superposition_error(drive, turn) if task.compare else None
         ),

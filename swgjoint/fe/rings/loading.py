@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
@@ -133,6 +134,74 @@ def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRi
         if halved > HALVINGS:
             return tried
     return state
+
+
+def solve_over_torque(
+    model: ThinRing,
+    phase: float,
+    levels: Array,
+    nearby: Mapping[float, ThinRingState] | None = None,
+) -> dict[float, ThinRingState]:
+    """Equilibria under torques of both signs, wave generator at its initial angle.
+
+    Equilibria of similar rings, such as those of the same drive without errors, save
+    the search from undeformed rings. From one torque to the next, the rings then move
+    about as far as the similar ones. If no equilibrium is found in this way, the torque
+    is reached from the unloaded rings.
+
+    Args:
+        model: The rings.
+        phase: Angle of ball 0 from the major axis [rad].
+        levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
+        nearby: Equilibria of similar rings at the same angles, by torque [N·m].
+
+    Returns:
+        States by torque, that of zero torque only if it was needed; they end with the
+        first one that is not an equilibrium.
+    """
+    found: dict[float, ThinRingState] = {}
+    for sign in (1.0, -1.0):
+        before = 0.0
+        for torque in (sign * levels).tolist():
+            state = _moved_along(model, torque, before, found, nearby or {})
+            if state is None:
+                if before not in found:
+                    found[0.0] = solve_unloaded(model, 0.0, phase)
+                if found[before].outcome.ok:
+                    state = solve_loaded(model, found[before], torque)
+                else:
+                    return found
+            found[torque] = state
+            if not state.outcome.ok:
+                return found
+            before = torque
+    return found
+
+
+def _moved_along(
+    model: ThinRing,
+    torque: float,
+    before: float,
+    found: Mapping[float, ThinRingState],
+    nearby: Mapping[float, ThinRingState],
+) -> ThinRingState | None:
+    """Equilibrium whose search starts from that of similar rings; None without success.
+
+    Args:
+        model: The rings.
+        torque: Torque T [N·m].
+        before: Torque that was solved before [N·m].
+        found: Equilibria of the rings by torque.
+        nearby: Equilibria of the similar rings by torque.
+    """
+    start = nearby.get(torque)
+    if start is None:
+        return None
+    if before in found and before in nearby:
+        moved = start.q - nearby[before].q
+        start = replace(start, q=found[before].q + moved)
+    state = ThinRingSolver()(model, start, torque=torque)
+    return state if state.outcome.ok else None
 
 
 def _turned_to_teeth(

@@ -21,7 +21,12 @@ from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.plane.drive2d import in_plane
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
-from swgjoint.fe.rings.loading import GOLDEN, solve_loaded, solve_unloaded
+from swgjoint.fe.rings.loading import (
+    GOLDEN,
+    solve_loaded,
+    solve_over_torque,
+    solve_unloaded,
+)
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage
 from swgjoint.fe.rings.state import ThinRingState
@@ -214,6 +219,7 @@ class RingErrors:
         phase: float,
         levels: Array,
         errors: tuple[Array, ...],
+        nearby: Mapping[float, ThinRingState] | None = None,
     ) -> Rest:
         """The rings at a position of the balls, linearised under torques of both signs.
 
@@ -223,18 +229,19 @@ class RingErrors:
             levels: Torques of both signs, increasing (n_levels,) [N·m].
             errors: Shifts of the teeth by pitch; the largest gap that they may close
                 limits the contacts.
+            nearby: Equilibria of the drive without errors at this position by torque
+                [N·m], see :func:`swgjoint.fe.rings.loading.solve_over_torque`.
 
         Raises:
             ComputationError: If an equilibrium cannot be found.
         """
         reach = _largest_change(errors)
-        rest = self._solved(solve_unloaded(model, 0.0, phase), 0.0, 0.0)
         loaded = {}
-        for sign in (1.0, -1.0):
-            state = rest
-            for torque in (sign * levels).tolist():
-                state = self._solved(solve_loaded(model, state, torque), torque, 0.0)
-                loaded[torque] = state, tooth_influence(model, state, reach)
+        found = solve_over_torque(model, phase, levels, nearby)
+        for torque, state in found.items():
+            solved = self._solved(state, torque, 0.0)
+            if torque:
+                loaded[torque] = solved, tooth_influence(model, solved, reach)
         up, down = loaded[self.small], loaded[-self.small]
         return Rest(state=up[0], at=up[1], opposite=down, loaded=loaded)
 

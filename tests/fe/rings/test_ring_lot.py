@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solved import hundred_elements
 
-from swgjoint.errors import ComputationError, DesignError
+from swgjoint.errors import ComputationError, DesignError, Outcome
 from swgjoint.explore import bearing_lot
 from swgjoint.explore.bearing_lot import FIGURES, draw_on_bearing, run_bearing_lot
 from swgjoint.fe.rings.accuracy import transmission_error
-from swgjoint.fe.rings.lot import sample_turn, turn_superposition_error
+from swgjoint.fe.rings.equilibrium import ThinRingSolver
+from swgjoint.fe.rings.lot import (
+    perfect_rings,
+    sample_turn,
+    turn_superposition_error,
+)
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -39,6 +46,72 @@ def few_elements():
 def turn():
     """Forty positions of one drive."""
     return sample_turn(DESIGN, (LOST, RATINGS.T1), positions=40)
+
+
+@pytest.fixture(scope="module")
+def perfect():
+    """Equilibria of the drive without errors."""
+    return perfect_rings(DESIGN, (LOST, RATINGS.T1))
+
+
+def test_start_without_errors_reaches_the_same_equilibria(turn, perfect, monkeypatch):
+    """Also with another clearance, with which one search starts anew."""
+    starts = []
+    solve = ThinRingSolver.__call__
+
+    def noted(self, model, start, **options):
+        starts.append(start.loaded_teeth)
+        return solve(self, model, start, **options)
+
+    wide = DESIGN.with_changes({"wave_generator.bearing.clearance_um": 20.0})
+    alone = sample_turn(wide, (LOST, RATINGS.T1), positions=40)
+    monkeypatch.setattr(ThinRingSolver, "__call__", noted)
+    for design, expected in ((DESIGN, turn), (wide, alone)):
+        starts.clear()
+        found = sample_turn(design, (LOST, RATINGS.T1), perfect, positions=40)
+        assert starts[0] > 0
+        # the tolerance of the solver on the rings, 3e-12 of the radius
+        assert found.output_error == pytest.approx(
+            expected.output_error, rel=0.0, abs=1e-11
+        )
+        assert np.ptp(expected.kinematic_error) > 1e-5
+        if design is DESIGN:  # three torques of both signs, none from unloaded rings
+            assert len(starts) == 6 and min(starts) > 0
+
+
+def test_drive_that_the_start_does_not_lead_to_is_solved_alone(
+    turn, perfect, monkeypatch
+):
+    """If all searches that start from the drive without errors fail."""
+    solve, failed = ThinRingSolver.__call__, []
+
+    def failing(self, model, start, **options):
+        found = solve(self, model, start, **options)
+        if any(start.ball_feet is one.ball_feet for one in known):
+            failed.append(options["torque"])
+            return replace(found, outcome=Outcome.DIVERGED)
+        return found
+
+    known = [one for by_torque in perfect.loaded.values() for one in by_torque.values()]
+    monkeypatch.setattr(ThinRingSolver, "__call__", failing)
+    found = sample_turn(DESIGN, (LOST, RATINGS.T1), perfect, positions=40)
+    assert len(failed) == 6
+    assert np.array_equal(found.output_error, turn.output_error)
+
+
+@pytest.mark.slow
+def test_drives_do_not_depend_on_the_number_of_processes(monkeypatch):
+    """Nor on the other drives of the lot."""
+    monkeypatch.setenv("SWGJOINT_CACHE", "")
+    options = {"seed": 5, "clearance_um": (6.0, 23.0)}
+    figures = [
+        [[row[key] for key in FIGURES] for row in lot["rows"]]
+        for lot in (
+            run_bearing_lot(DESIGN, count=3, jobs=2, **options),
+            run_bearing_lot(DESIGN, count=2, jobs=1, **options),
+        )
+    ]
+    assert figures[0][:2] == figures[1] and figures[0][0] != figures[0][1]
 
 
 @pytest.mark.slow
@@ -83,7 +156,7 @@ def test_a_lot_counts_and_keeps_its_drives(monkeypatch, tmp_path):
         def torsion(self, torque):
             return np.full(96, torque / 2.5e4)
 
-    def instant(design, torques):
+    def instant(design, torques, perfect):
         seen.append(design.tolerances.seed)
         if design.tolerances.seed == 2:
             raise ComputationError("no equilibrium")
