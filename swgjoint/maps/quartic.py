@@ -18,26 +18,31 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
 
     Args:
         knots: Increasing knots. Shape (n,).
-        values: V, V' and V'' at the knots. Shape (3, n).
+        values: V, V' and V'' at the knots, of any number of chains. Shape (..., 3, n).
 
     Returns:
         Breakpoints (2 n - 1,), and for each piece the coefficients in ascending powers
-        of the distance from its first breakpoint (2 n - 2, 5).
+        of the distance from its first breakpoint (..., 2 n - 2, 5).
     """
     known, condition = _at_end()
     half = 0.5 * np.diff(knots)
     scale = half ** np.arange(3)[:, None]
-    start, end = values[:, :-1] * scale, values[:, 1:] * scale
-    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
-    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
-    left = np.stack([*low, a3, a4])
-    right = np.stack(
-        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
-    )
-    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
-    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
+    start, end = values[..., :-1] * scale, values[..., 1:] * scale
+    # coefficients first: a0 to a4 on the left, b0 to b4 on the right of a midpoint
+    pieces = np.empty((5, *values.shape[:-2], half.size, 2))
+    low = start / np.array([[1.0], [1.0], [2.0]])
+    high = np.linalg.solve(condition, end - known @ low)
+    left, right = pieces[..., 0], pieces[..., 1]
+    left[:3], left[3:] = np.moveaxis(low, -2, 0), np.moveaxis(high, -2, 0)[:2]
+    for j in range(4):
+        right[j] = sum(comb(k, j) * left[k] for k in range(j, 5))
+    right[4] = high[..., 2, :]
+    powers = half ** np.arange(5)[:, None]
+    for k in range(1, 5):
+        pieces[k] /= powers[k, :, None]
     breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
-    return breaks, pieces.reshape(5, -1).T
+    chains = np.moveaxis(pieces.reshape(*pieces.shape[:-2], -1), 0, -1)
+    return breaks, np.ascontiguousarray(chains)
 
 
 @cache

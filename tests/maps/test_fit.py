@@ -81,6 +81,18 @@ def test_quartic_chain_meets_its_data():
         assert piece(0.4 * h) == pytest.approx(np.exp(breaks[k] + 0.4 * h), rel=1e-3)
 
 
+def test_many_quartic_chains_are_single_ones():
+    """Those of two harmonics with two amplitudes, to the last bit."""
+    knots = np.array([0.0, 0.3, 0.5, 1.1])
+    data = np.random.default_rng(0).standard_normal((2, 2, 3, 4))
+    breaks, chains = quartic_chain(knots, data)
+    for mode in range(2):
+        for part in range(2):
+            alone = quartic_chain(knots, data[mode, part])
+            assert np.array_equal(breaks, alone[0])
+            assert np.array_equal(chains[mode, part], alone[1])
+
+
 def test_fit_gives_a_map_that_round_trips(tmp_path):
     """The fitted map, its record included, survives its file."""
     drive = fit_map(samples_of())

@@ -116,7 +116,7 @@ def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
 def _map_of(samples: MapSamples, knots: Array, harmonics: Combined) -> DriveMap:
     """The map of these harmonics: chains of quartics with a stable continuation."""
     modes = harmonics.potential
-    chains = [[quartic_chain(knots, part) for part in mode] for mode in modes]
+    breaks, pieces = quartic_chain(knots, modes)
     ends = modes[:, :, 2][:, :, [0, -1]]
     _clip_ends(ends, knots, modes[0, 0, 1])
     return DriveMap(
@@ -125,9 +125,9 @@ def _map_of(samples: MapSamples, knots: Array, harmonics: Combined) -> DriveMap:
         layout=samples.layout,
         teeth_flexspline=samples.teeth_flexspline,
         teeth_circular_spline=samples.teeth_circular_spline,
-        torsion_knots=chains[0][0][0],
+        torsion_knots=breaks,
         orders=harmonics.orders,
-        potential=np.array([[pieces for _, pieces in pair] for pair in chains]),
+        potential=pieces,
         end_stiffness=ends,
         kinematic_error=harmonics.error,
         ratings=samples.ratings,
