@@ -13,10 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swgjoint.errors import ComputationError
-from swgjoint.fe.rings.accuracy import transmission_error
 from swgjoint.fe.rings.influence import with_shifting_teeth
-from swgjoint.fe.rings.loading import SMALL, solve_over_torque
+from swgjoint.fe.rings.loading import (
+    SMALL,
+    solve_loaded,
+    solve_over_torque,
+    solve_unloaded,
+)
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import ball_passage
 from swgjoint.fe.rings.race_on_balls import RaceOnBalls
@@ -185,17 +188,15 @@ def turn_superposition_error(design: Design, found: TurnOfDrive) -> float | None
     """
     small = SMALL * ratings_of(design).rated_torque
     count = found.input_angle.size
-    deviations = []
+    model, deviations = thin_ring(design), []
     for k in np.linspace(0, count - 1, min(CHECKS, count)).astype(int).tolist():
-        angle = found.input_angle[k : k + 1]
-        try:
-            solved = [
-                transmission_error(design, angle, torque=torque)
-                for torque in (small, -small)
-            ]
-        except ComputationError:
+        theta = float(found.input_angle[k])
+        rest = solve_unloaded(model, theta)
+        sides = [solve_loaded(model, rest, torque) for torque in (small, -small)]
+        if not all(side.outcome.ok for side in sides):
             continue
-        deviations.append(abs(np.mean(solved) - found.kinematic_error[k]))
+        error = np.mean([side.rotation for side in sides]) - theta / model.ratio
+        deviations.append(abs(error - found.kinematic_error[k]))
     if not deviations:
         return None
     return float(max(deviations) / np.ptp(found.kinematic_error))
