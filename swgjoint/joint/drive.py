@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -349,10 +350,18 @@ def input_orders(drive: DriveMap) -> Array:
     return np.asarray(np.abs(n_theta + n_psi / drive.ratio))
 
 
+Pruned = tuple[DriveMap, tuple[UnresolvedOrder, ...]]
+# the joints of an arm, and runs of them, share their maps
+_known: WeakKeyDictionary[DriveMap, dict[bytes, Pruned]] = WeakKeyDictionary()
+
+
 def prune(
     drive: DriveMap, *, timestep: float, max_input_speed: float, max_phase_step: float
-) -> tuple[DriveMap, tuple[UnresolvedOrder, ...]]:
+) -> Pruned:
     """Remove the harmonics whose phase advances too far in one step.
+
+    Joints at which the same harmonics remain get the same object, so that bounds and
+    sums are computed once.
 
     Args:
         drive: Map with all its harmonics.
@@ -368,6 +377,9 @@ def prune(
     keep = timestep * orders * abs(max_input_speed) <= max_phase_step
     if keep.all():
         return drive, ()
+    known = _known.setdefault(drive, {})
+    if (found := known.get(keep.tobytes())) is not None:
+        return found
     torsion = drive.mean_torsion(drive.ratings.rated_torque)
     torque = np.hypot(*drive.coefficients(torsion, 1).T)
     error = np.hypot(*drive.kinematic_error.T)
@@ -377,4 +389,6 @@ def prune(
         )
         for k in np.flatnonzero(~keep)
     ]
-    return drive.with_harmonics(keep), tuple(sorted(left, key=lambda u: u.order))
+    found = drive.with_harmonics(keep), tuple(sorted(left, key=lambda u: u.order))
+    known[keep.tobytes()] = found
+    return found

@@ -10,6 +10,7 @@ from messages import naming
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
+from swgjoint.joint.drive import prune
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import deg
 
@@ -330,6 +331,18 @@ def test_unresolved_harmonics_are_listed(spec, synthetic_map):
     alone = synthetic_map.coefficients(x, 1)[3] @ [np.cos(phase), np.sin(phase)]
     assert left.torque == pytest.approx(np.ptp(alone) / 2, rel=1e-4)
     assert len(got.drive.orders) == 4
+
+
+def test_equal_harmonics_make_one_map(synthetic_map):
+    """Two speeds that the same orders carry share a map; a third one does not."""
+    steps = {"timestep": 2e-3, "max_phase_step": 0.5}
+    first, second, third = (
+        prune(synthetic_map, max_input_speed=speed, **steps)
+        for speed in (60.0, 61.0, 120.0)
+    )
+    assert second[0] is first[0] and second[1] == first[1]
+    assert len(first[0].orders) == 4 and len(third[0].orders) == 2
+    assert [left.order for left in third[1]] == pytest.approx([4.0, 4 + 1 / 60, 122.0])
 
 
 TURNTABLE = """
