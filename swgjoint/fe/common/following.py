@@ -230,7 +230,8 @@ class Follower(ABC, Generic[AnyState]):
         """Equilibrium without torque at the same input angle.
 
         An output that is free in the clearance is placed midway between its positions
-        under the torques +-``small``.
+        under the torques +-``small``. Within a clearance that is much narrower than the
+        deflection under these torques, the contacts may alternate without end.
 
         Args:
             state: Equilibrium to start from.
@@ -238,7 +239,7 @@ class Follower(ABC, Generic[AnyState]):
         """
         if not is_free(state):
             unloaded = self.to_torque(state, 0.0)
-            if unloaded.outcome is not Outcome.SINGULAR:
+            if unloaded.outcome not in (Outcome.SINGULAR, Outcome.ACTIVE_SET_CYCLES):
                 return Unloaded(state=unloaded, small=small)
         sides = self.to_torque(state, small), self.to_torque(state, -small)
         return self._between(sides, small)

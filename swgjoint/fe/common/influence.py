@@ -344,7 +344,8 @@ def pivot_system(
     exchanged, forward = exchange(system, inside)
     start = forward @ offset
     matrix = exchanged[:m, :m]
-    matrix[closed, closed] += _stiffening(matrix[np.ix_(closed, closed)])
+    held = np.diag(system)[:m][closed]
+    matrix[closed, closed] += _stiffening(matrix[np.ix_(closed, closed)], held)
     return Influence(
         sector=gaps.sector,
         tooth=gaps.tooth,
@@ -364,16 +365,26 @@ def pivot_system(
     )
 
 
-def _stiffening(block: Array) -> Array:
+def _stiffening(block: Array, held: Array) -> Array:
     """Addition to the diagonal that makes the stiffness against openings positive (n,).
 
     If all contacts open, the flexspline moves freely. Under preload the relative
     stiffness of that motion may be negative by about a millionth. No equilibrium has
-    this contact state, but the search may pass through it.
+    this contact state, but the search may pass through it. The same motion opens the
+    contact of a tooth that alone holds the output. Its stiffness becomes
+    :data:`SOFTEST` times that of the contact with the output held.
+
+    Args:
+        block: Derivatives of the forces with respect to the openings (n, n).
+        held: Diagonal of the system with the output held: compliances of teeth [m/N],
+            stiffnesses of supports [N/m] (n,).
     """
-    size = np.diag(block)
-    if not (size > 0.0).all():
-        raise np.linalg.LinAlgError("no stiffness against an opening")
+    size = np.diag(block).copy()
+    alone = size < SOFTEST / held
+    added = np.zeros(size.size)
+    added[alone] = SOFTEST / held[alone] - size[alone]
+    size[alone] = 1.0 / held[alone]
     scale = np.sqrt(size)
-    lowest = float(np.linalg.eigvalsh(block / scale[:, None] / scale)[0])
-    return np.asarray(max(0.0, SOFTEST - lowest) * size)
+    scaled = (block + np.diag(added)) / scale[:, None] / scale
+    lowest = float(np.linalg.eigvalsh(scaled)[0])
+    return np.asarray(added + max(0.0, SOFTEST - lowest) * size)

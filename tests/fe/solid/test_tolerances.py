@@ -14,12 +14,10 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.tolerance_influence import influence
-from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import influences
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt
-from swgjoint.maps.fit.fit import fit_map
 
 pytestmark = [pytest.mark.fe, pytest.mark.usefixtures("few_masters_everywhere")]
 
@@ -310,76 +308,3 @@ def test_once_per_turn_needs_eccentricity_and_pitch_errors(design, reference):
     both, without = (orders(at, errors) for at in (found[0].at, reference[2]))
     assert both[1] > 10.0 * without[1]
     assert both[1] > 0.01 * both[2]
-
-
-def with_play(small_design):
-    """Crowned teeth with errors."""
-    return small_design.with_changes(
-        {
-            "tolerances.circular_spline_cumulative_pitch_um": 3.0,
-            "tolerances.circular_spline_ovality_um": 2.0,
-            "tolerances.misalignment_arcmin": 1.0,
-        }
-    )
-
-
-@pytest.fixture(scope="module")
-def at_both_ends(small_design, few_masters, few_masters_everywhere):
-    """That drive linearised at both ends of its clearance, at two positions."""
-    design = with_play(small_design)
-
-    def solve():
-        return influences(design, phases=2, model="3d")
-
-    return kept(f"influences with play {design.content_hash()} {few_masters}", solve)
-
-
-@pytest.mark.slow
-def test_play_of_a_flawed_drive(small_design, at_both_ends):
-    """Linearised at both ends of its clearance: where it ends, and beyond."""
-    design = with_play(small_design)
-    follow, (rest, _) = at_both_ends
-    assert rest.opposite is not None
-    # every sign of the torque has its own flanks
-    up, down = (state for state, _ in rest.sides)
-    assert up.rotation < down.rotation - 1e-3
-    (errors,) = zip(*gap_errors(design, np.array([5])), strict=True)
-    flawed, apart, moved = follow.with_errors(*errors), [], []
-    for sign, (state, at) in zip((1.0, -1.0), rest.sides, strict=True):
-        for torque in (abs(at.torque) * sign, 4.0 * TORQUE * sign):
-            none = at.respond(np.zeros((1, len(at.sector))), torque)
-            found = at.respond(at.gap_change(*errors)[None], torque)
-            perfect = follow.to_torque(state, torque)
-            full = flawed.to_torque(state, torque)
-            assert perfect.outcome.ok and full.outcome.ok
-            moved.append(full.rotation - perfect.rotation)
-            apart.append(found.output_angle[0] - none.output_angle[0] - moved[-1])
-    assert np.abs(moved).max() > 2e-5
-    # few teeth carry a small torque, on crowned flanks
-    assert np.abs(apart).max() < 0.05 * np.abs(moved).max()
-
-
-@pytest.mark.slow
-def test_map_of_a_flawed_drive_with_play(
-    small_design, at_both_ends, small_pattern, monkeypatch
-):
-    """The map meets full solves that it has not seen; low orders are even.
-
-    Two linearised positions in a pitch leave 0.06 of the turn of the output and 0.08 of
-    its energy, four of them 0.04; a wrong sign leaves as much as there is.
-    """
-    monkeypatch.setattr(tolerance_sampling, "influences", lambda *a, **k: at_both_ends)
-    monkeypatch.setitem(tolerance_sampling.PHASES, "3d", 2)
-    monkeypatch.setattr(tolerance_sampling, "CHECKS", {"3d": 2})
-    design = with_play(small_design)
-    # four angles alias: teeth come into contact one after the other on coarse flanks
-    drive = fit_map(small_pattern(design))
-    assert drive.info["residual"]["relative_to_turn"] < 0.1
-    assert drive.info["energy_check"]["relative"] < 0.1
-    assert drive.info["tolerances"]["free_positions"] == 42 * 2
-    assert drive.info["label"]["tolerances"]["misalignment_arcmin"] == 1.0
-    sizes = np.hypot(*drive.kinematic_error.T)
-    size = dict(zip(map(tuple, drive.orders.tolist()), sizes, strict=True))
-    odd = [found for (p, _), found in size.items() if p % 2]
-    assert min(size[2, 0], size[4, 0]) > 1e-5
-    assert max(odd, default=0.0) < 0.05 * size[4, 0]
