@@ -1,11 +1,16 @@
 // Python interface of the loops that linearise the 2D model, see module.cc.
 
+#include <algorithm>
+
+#include "banded.h"
 #include "bore.h"
 #include "corotation.h"
 #include "flank_arrays.h"
 #include "race.h"
 
 namespace {
+
+using Indices = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 
 void check_dofs(const Index& dofs, std::size_t n) {
@@ -192,6 +197,30 @@ void race_contact(In<1> places, In<1> press, double half_thickness,
                          hessian.data());
 }
 
+void add_banded(Indices rows, In<3> parts, Out<2> columns) {
+  const std::size_t n = rows.shape(0), m = rows.shape(1), size = columns.shape(0),
+                    width = columns.shape(1);
+  require(parts.shape(0) == n && parts.shape(1) == m && parts.shape(2) == m,
+          "parts: (n, m, m)");
+  for (std::size_t e = 0; e < n; ++e) {
+    const auto* own = rows.data() + e * m;
+    const auto ends = std::minmax_element(own, own + m);
+    require(m == 0 || (*ends.first >= 0 && *ends.second < static_cast<std::int64_t>(size) &&
+                       *ends.second - *ends.first < static_cast<std::int64_t>(width)),
+            "rows: within the band");
+  }
+  const nb::gil_scoped_release release;
+  swgjoint::add_banded(rows.data(), parts.data(), n, m, width, columns.data());
+}
+
+bool solve_banded(Out<2> columns, Out<2> loads) {
+  const std::size_t size = columns.shape(0), width = columns.shape(1);
+  require(width > 0 && loads.shape(0) == size, "columns, loads: (size, ...)");
+  const nb::gil_scoped_release release;
+  return swgjoint::solve_banded(columns.data(), size, width, loads.data(),
+                                loads.shape(1));
+}
+
 }  // namespace
 
 void bind_plane(nb::module_& m) {
@@ -229,4 +258,8 @@ void bind_plane(nb::module_& m) {
            nb::arg("gyration").noconvert(), nb::arg("kinematics").noconvert(),
            nb::arg("flank").noconvert(), nb::arg("gradient").noconvert(),
            nb::arg("tangent").noconvert());
+  m.def("add_banded", &add_banded, nb::arg("rows").noconvert(),
+        nb::arg("parts").noconvert(), nb::arg("columns").noconvert());
+  m.def("solve_banded", &solve_banded, nb::arg("columns").noconvert(),
+        nb::arg("loads").noconvert());
 }

@@ -83,7 +83,7 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
     files += sorted((tests / "envs").glob("test_compiled_*.py"))
     files += sorted((tests / "maps").glob("test_compiled_*.py"))
-    assert len(files) == 9
+    assert len(files) == 10
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import solve_banded
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index
 
 
@@ -62,6 +63,14 @@ class BandedAssembly:
         size = len(order)
         places = [order[dofs] for _, dofs, _ in self._parts]
         band = max(int(np.ptp(place, axis=1).max(initial=0)) for place in places)
+        shuffled = np.empty_like(right)
+        shuffled[order] = right
+        # a stable equilibrium has a positive definite matrix; on the way to it the
+        # matrix may be indefinite
+        if kernels() is not None:
+            loads = shuffled.copy()
+            if self._solve_definite(places, band, int(order[held]), loads, anchor):
+                return loads[order]
         # row i of column j is entry (band + i - j, j) of the banded matrix
         flat = np.concatenate(
             [
@@ -78,7 +87,30 @@ class BandedAssembly:
         matrix[band] += anchor * largest
         # a spring far stiffer than anything else
         matrix[band, order[held]] += 1e6 * largest
-        shuffled = np.empty_like(right)
-        shuffled[order] = right
         solved = solve_banded((band, band), matrix, shuffled, check_finite=False)
         return np.asarray(solved[order])
+
+    def _solve_definite(
+        self, places: list[Index], band: int, held: int, loads: Array, anchor: float
+    ) -> bool:
+        """Replace loads in the order of narrow bandwidth by the solutions.
+
+        Args:
+            places: Positions of the coordinates of all parts in this order.
+            band: Largest distance of two coordinates of a part.
+            held: Position of the fixed coordinate.
+            loads: Right-hand sides (size, n) [N], solutions on return [m].
+            anchor: Addition to the diagonal, relative to its largest entry [-].
+
+        Returns:
+            False if the matrix is not positive definite.
+        """
+        native = kernels()
+        assert native is not None
+        columns = np.zeros((len(loads), band + 1))
+        for place, (_, _, hessian) in zip(places, self._parts, strict=True):
+            native.add_banded(place, np.ascontiguousarray(hessian), columns)
+        largest = float(np.abs(columns[:, 0]).max())
+        columns[:, 0] += anchor * largest
+        columns[held, 0] += 1e6 * largest
+        return bool(native.solve_banded(columns, loads))
