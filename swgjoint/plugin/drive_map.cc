@@ -55,7 +55,13 @@ void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
 }
 
 void DriveMap::Begin(double theta, double psi) {
-  torsion_ = theta / ratio_ + error_scale_ * Rotate(theta, psi) - psi;
+  theta_ = theta;
+  psi_ = psi;
+  rotated_ = !local_.used();
+  const double error =
+      rotated_ ? Rotate(theta, psi)
+               : error_mean_ + local_.Begin(theta + shift_theta_, psi + shift_psi_);
+  torsion_ = theta / ratio_ + error_scale_ * error - psi;
   j0_ = SegmentNear(j0_, torsion_);
   d0_ = torsion_ - base_[j0_];
 }
@@ -284,9 +290,44 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
   }
 }
 
+void DriveMap::Add(int segment, Weighting by, double out[5]) {
+  if (!by_waves_) {
+    return Combine(segment, weight_.data() + 2 * static_cast<int>(by) * size_.lanes, out);
+  }
+  if (segment != totals_of_) {
+    const size_t row = static_cast<size_t>(segment) * blocks_ * size_.block();
+    local_.Sum(segment, table_.data() + row, &totals_);
+    totals_of_ = segment;
+  }
+  const double* sums = by == Weighting::kMean    ? totals_.mean
+                       : by == Weighting::kTheta ? totals_.theta
+                                                 : totals_.psi;
+  for (int p = 0; p < 5; ++p) out[p] += sums[p];
+}
+
+// Computes the same as Step from the waves of many harmonics. Returns false if the step
+// is too large for this.
+bool DriveMap::LocalStep(double dtheta, double dpsi, DriveValue* out) {
+  by_waves_ = local_.used() && local_.Step(dtheta, dpsi);
+  if (!by_waves_) return false;
+  totals_of_ = -1;
+  const double* mean = &mean_[static_cast<size_t>(j0_) * size_.mean()];
+  for (int p = 0; p < 5; ++p) {
+    w_[p] = mean[p * size_.lanes];
+    u_theta_[p] = u_psi_[p] = 0;
+  }
+  Add(j0_, Weighting::kMean, w_);
+  Add(j0_, Weighting::kTheta, u_theta_);
+  Add(j0_, Weighting::kPsi, u_psi_);
+  constexpr int e = LocalSums::kError;
+  out->g = Pair{inverse_ratio_, -1.0} +
+           Pair{totals_.theta[e], totals_.psi[e]} * error_scale_;
+  return true;
+}
+
 // Computes the mean torque of a step that crosses knots. The work is summed piece by
 // piece, which avoids the difference of two large energies.
-MeanTorque DriveMap::Work(int j1, double x1) const {
+MeanTorque DriveMap::Work(int j1, double x1) {
   double w[5], work = 0, begin = 0;
   const int step = j1 > j0_ ? 1 : -1;
   double from = torsion_;
@@ -296,7 +337,7 @@ MeanTorque DriveMap::Work(int j1, double x1) const {
     } else {
       const double* mean = &mean_[static_cast<size_t>(j) * size_.mean()];
       for (int p = 0; p < 5; ++p) w[p] = mean[p * size_.lanes];
-      Combine(j, weight_.data(), w);
+      Add(j, Weighting::kMean, w);
     }
     const double to = j == j1 ? x1 : knots_[step > 0 ? j : j - 1];
     const MeanTorque piece = Mean(w, Pair{from - base_[j], to - base_[j]});
@@ -341,10 +382,14 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   // the mean of its two end values is cos(eta) times its value at the midpoint.
   if (!many()) {
     Step<Lanes, kLanes>(dtheta, dpsi, out);
-  } else if (kHasWide) {
-    Step<Wide, kWideLanes>(dtheta, dpsi, out);
-  } else {
-    Step<Lanes, kWideLanes>(dtheta, dpsi, out);
+  } else if (!LocalStep(dtheta, dpsi, out)) {
+    if (!rotated_) Rotate(theta_, psi_);
+    rotated_ = true;
+    if (kHasWide) {
+      Step<Wide, kWideLanes>(dtheta, dpsi, out);
+    } else {
+      Step<Lanes, kWideLanes>(dtheta, dpsi, out);
+    }
   }
   const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
   const int j1 = SegmentNear(j0_, x1);
@@ -360,14 +405,14 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
   out->stiffness_end = scale_ * end;
 
   // secants of V for the angles: mean of their values at the two torsions
-  const auto angle = [&](const double u[5], int weights) {
+  const auto angle = [&](const double u[5], Weighting by) {
     if (j1 == j0_) return MeanValue(u, d);
     double other[5] = {0, 0, 0, 0, 0};
-    Combine(j1, weight_.data() + weights * size_.lanes, other);
+    Add(j1, by, other);
     return 0.5 * (Value(u, d[0]) + Value(other, d[1]));
   };
-  const double e_theta = scale_ * angle(u_theta_, 2);
-  out->e = Pair{e_theta, moves_psi_ ? scale_ * angle(u_psi_, 4) : 0.0};
+  const double e_theta = scale_ * angle(u_theta_, Weighting::kTheta);
+  out->e = Pair{e_theta, moves_psi_ ? scale_ * angle(u_psi_, Weighting::kPsi) : 0.0};
 }
 
 }  // namespace swgjoint

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lanes.h"
+#include "local_sums.h"
 
 namespace swgjoint {
 
@@ -108,6 +109,8 @@ class DriveMap {
     int shift = 0;  // place of the earlier harmonic with the difference as order
   };
 
+  enum class Weighting { kMean, kTheta, kPsi };  // in the order of the weights
+
   void FindRecipes(const std::vector<double>& orders);
   int Segment(double torsion) const;
   // The same, but tests a guess first, because the torsion rarely leaves its segment
@@ -127,9 +130,12 @@ class DriveMap {
   double RotateBlocks(double theta, double psi);
   template <class V, int kSize>
   void CombineBlocks(int segment, const double* weight, double out[5]) const;
-  MeanTorque Work(int j1, double x1) const;
+  MeanTorque Work(int j1, double x1);
   double Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;
+  bool LocalStep(double dtheta, double dpsi, DriveValue* out);
+  // Adds a weighted sum over the harmonics in one segment, as Combine does.
+  void Add(int segment, Weighting by, double out[5]);
 
   int n_ = 0;         // number of harmonics, including the mean
   BlockSizes size_ = {kLanes};
@@ -149,12 +155,19 @@ class DriveMap {
   double error_mean_ = 0;
   std::vector<Recipe> recipe_;  // one per block
 
+  LocalSums local_;  // of many harmonics with few different orders in theta
+
   // start state
+  double theta_ = 0, psi_ = 0;
+  bool rotated_ = false;  // whether harmonics_ has its phases
   double torsion_ = 0, d0_ = 0;
   int j0_ = 0;  // segment; between steps an initial guess that does not affect results
 
   // data of a step, sized in Parse, so that no step allocates memory
   LaneVector weight_;  // (blocks, weights)
+  bool by_waves_ = false;  // whether local_ has the weights, not weight_
+  LocalSums::Totals totals_ = {};
+  int totals_of_ = -1;  // segment of totals_
   double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0_
 };
 

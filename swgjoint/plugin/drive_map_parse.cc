@@ -14,19 +14,6 @@
 
 namespace swgjoint {
 
-#define SWGJOINT_FILL(x) {x, x, x, x, x, x, x, x}
-alignas(64) static const double kTable[kSincTerms + kCosTerms][kWideLanes] = {
-    // sin(x)/x
-    SWGJOINT_FILL(1), SWGJOINT_FILL(-1. / 6), SWGJOINT_FILL(1. / 120),
-    SWGJOINT_FILL(-1. / 5040), SWGJOINT_FILL(1. / 362880),
-    SWGJOINT_FILL(-1. / 39916800), SWGJOINT_FILL(1. / 6227020800),
-    // cos(x)
-    SWGJOINT_FILL(1), SWGJOINT_FILL(-1. / 2), SWGJOINT_FILL(1. / 24),
-    SWGJOINT_FILL(-1. / 720), SWGJOINT_FILL(1. / 40320),
-    SWGJOINT_FILL(-1. / 3628800), SWGJOINT_FILL(1. / 479001600),
-    SWGJOINT_FILL(-1. / 87178291200)};
-const double* const kSeries = kTable[0];
-
 namespace {
 
 // Sets an error message about an attribute, and returns false.
@@ -168,6 +155,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     to[3 * lanes] = list[2 * k + 1];
   }
   error_mean_ = list[0];
+  if (many()) local_.Set(&orders[2], &list[2], n_ - 1, m + 2);
 
   // one table for the intervals and for the parabolas beyond the first and last knot
   segments_ = m + 2;

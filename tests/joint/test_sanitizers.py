@@ -21,7 +21,8 @@ from solved import kept
 ROOT = Path(__file__).parents[2]
 SOURCES = ("drive.cc", "drive.h", "drive_map.cc", "drive_map.h", "friction.cc")
 SOURCES += ("drive_map_parse.cc", "friction.h", "hysteresis.cc", "hysteresis.h")
-SOURCES += ("lanes.h", "law.h", "register.cc")
+SOURCES += ("lanes.cc", "lanes.h", "law.h", "local_sums.cc", "local_sums.h")
+SOURCES += ("register.cc",)
 CXX = os.environ.get("CXX", "g++")
 RUN = """
 import sys

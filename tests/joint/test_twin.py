@@ -101,12 +101,15 @@ def test_scheme_force_of_many_harmonics_equals_twin(bench, phase):
     check_scheme(b, phase / top / b.model.opt.timestep)
 
 
-def with_many_harmonics(drive, orders):
-    """The map with weak harmonics of the given orders that it does not have yet."""
+def with_many_harmonics(drive, orders, share=1e-4):
+    """The map with weak harmonics of the given orders that it does not have yet.
+
+    ``share`` is their largest amplitude relative to the mean.
+    """
     own = {tuple(order) for order in drive.orders.tolist()}
     more = np.array([order for order in orders if order not in own])
     rng = np.random.default_rng(4)
-    size = 1e-4 * rng.uniform(-1.0, 1.0, (len(more), 2, 1, 1))
+    size = share * rng.uniform(-1.0, 1.0, (len(more), 2, 1, 1))
     weak, ends = size * drive.potential[0, 0], size[..., 0] * drive.end_stiffness[0, 0]
     error = 1e-8 * rng.normal(size=(len(more), 2))
     return replace(
@@ -118,20 +121,70 @@ def with_many_harmonics(drive, orders):
     )
 
 
+WAVES = [(n - q, q) for n in range(6) for q in range(-24, 25) if (n, q) > (0, 0)]
+"""Many harmonics with few different orders p + q in theta, as of tooth errors."""
+
+
 @pytest.mark.parametrize("speed", [0.2, 3.0, 30.0])
 @pytest.mark.parametrize(
     "orders",
     [
         [(p, q) for p in range(12) for q in range(-7, 8) if (p, q) > (0, 0)],
         [(2 * p, 0) for p in range(1, 160)],
+        WAVES,
     ],
-    ids=["both", "multiples"],
+    ids=["both", "multiples", "waves"],
 )
 def test_scheme_force_of_weak_harmonics_equals_twin(bench, any_layout, orders, speed):
     """More than 128 harmonics, processed in wide blocks, most of them from others."""
     b = bench(with_many_harmonics(any_layout, orders), damping_ratio=0.05)
     assert len(b.drive.drive.orders) - 1 > MANY
     check_scheme(b, speed)
+
+
+@pytest.mark.parametrize("change", [0.03, 0.037, 0.039, 0.3])
+def test_steps_anywhere_near_a_position_equal_the_twin(bench, synthetic_map, change):
+    """Polynomials of the output angle hold up to half their width away.
+
+    The largest phase change by psi is ``change`` in a step, to either side; above 0.038
+    rad, the harmonics are summed one by one. Two positions are 0.4 rad of phase apart.
+    """
+    b = bench(with_many_harmonics(synthetic_map, WAVES, share=0.1), damping_ratio=0.05)
+    drive, h = b.drive.drive, b.model.opt.timestep
+    top = np.abs(drive.angle_orders[:, 1]).max()
+    rng = np.random.default_rng(9)
+    for place in np.linspace(-0.2, 0.2, 9):
+        rate = rng.choice([-1.0, 1.0]) * change / top / h
+        psi = (0.4 * rng.integers(-99, 100) + place) / top
+        theta = drive.ratio * (psi + 1e-4 * rng.normal())
+        b.place(theta, psi, 0.9 / np.abs(drive.angle_orders).max() / h, rate)
+        # the scheme begins half a step earlier
+        b.data.qpos[b.v] += 0.5 * h * b.data.qvel[b.v]
+        mujoco.mj_forward(b.model, b.data)
+        motion = b.motion()
+        want = scheme_force(drive, motion, timestep=h, damping=b.drive.damping)
+        t = b.model.tendon(b.drive.tendon).id
+        g = np.array([want.g_theta, want.g_psi])
+        shift = h * want.metric * b.data.ten_velocity[t] * g
+        np.testing.assert_allclose(
+            b.data.qfrc_passive[b.v],
+            np.array([want.theta, want.psi]) + shift,
+            rtol=0,
+            atol=1e-12 * scale(drive) + 1e-12 * np.abs(shift).max(),
+        )
+
+
+def test_forces_do_not_depend_on_earlier_positions(bench, synthetic_map):
+    """The same state yields the same bits after the joint has been elsewhere."""
+    b = bench(with_many_harmonics(synthetic_map, WAVES), damping_ratio=0.05)
+    ratio = b.drive.drive.ratio
+    forces = []
+    for psi in (0.1, 0.1 + 1e-3, 0.4, 0.1):
+        b.place(ratio * psi, psi, 1.0, 1.0 / ratio)
+        mujoco.mj_forward(b.model, b.data)
+        forces.append(b.data.qfrc_passive[b.v].copy())
+    np.testing.assert_array_equal(forces[3], forces[0])
+    assert (forces[1] != forces[0]).any()
 
 
 LIMIT = {"joint": 'limited="true" range="-10 10"'}

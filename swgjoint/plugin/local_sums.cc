@@ -1,0 +1,427 @@
+#include "local_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "lanes.h"
+
+namespace swgjoint {
+namespace {
+
+#if defined(SWGJOINT_WIDE_CLONES)
+const bool kHasWide = __builtin_cpu_supports("x86-64-v4");
+#else
+constexpr bool kHasWide = false;
+#endif
+
+// Multiplies sums of (A - i B) exp(i m c) m^d/d! by i^d.
+template <class V>
+SWGJOINT_INLINE void TurnBy(int d, const V& x, const V& y, V* re, V* im) {
+  const V real = d % 2 ? y * -1 : x, imaginary = d % 2 ? x : y;
+  const double sign = d % 4 < 2 ? 1 : -1;
+  *re = real * sign;
+  *im = imaginary * sign;
+}
+
+// Rounds up to whole blocks of numbers.
+size_t Padded(size_t count) {
+  return (count + kWideLanes - 1) / kWideLanes * kWideLanes;
+}
+
+}  // namespace
+
+void LocalSums::Set(const double* orders, const double* errors, int count,
+                    int segments) {
+  std::vector<double> n(count), m(count);
+  for (int k = 0; k < count; ++k) {
+    n[k] = orders[2 * k];
+    m[k] = orders[2 * k + 1];
+  }
+  const auto different = [](std::vector<double> all) {
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  };
+  const std::vector<double> of_theta = different(n), of_psi = different(m);
+  waves_ = 0;
+  for (const double x : of_theta) top_theta_ = std::max(top_theta_, std::fabs(x));
+  for (const double x : of_psi) top_psi_ = std::max(top_psi_, std::fabs(x));
+  if (top_psi_ == 0 || static_cast<int>(of_theta.size()) * kPerWave > count) return;
+  waves_ = static_cast<int>(of_theta.size());
+  width_ = 2 * kReach / top_psi_;
+  const size_t padded = Padded(of_theta.size());
+  blocks_ = static_cast<int>(padded) / kWideLanes;
+  place_.resize(count);
+  std::iota(place_.begin(), place_.end(), 0);
+  std::stable_sort(place_.begin(), place_.end(),
+                   [&](int a, int b) { return n[a] < n[b]; });
+  first_.assign(1, 0);
+  psi_.resize(count);
+  errors_.resize(2 * static_cast<size_t>(count));
+  for (int k = 0; k < count; ++k) {
+    const int own = place_[k];
+    if (k > 0 && n[own] != n[place_[k - 1]]) first_.push_back(k);
+    psi_[k] = static_cast<int>(
+        std::lower_bound(of_psi.begin(), of_psi.end(), m[own]) - of_psi.begin());
+    std::copy_n(errors + 2 * own, 2, &errors_[2 * k]);
+  }
+  first_.push_back(count);
+  n_.assign(padded, 0.0);
+  std::copy(of_theta.begin(), of_theta.end(), n_.begin());
+  m_.assign(Padded(of_psi.size()), 0.0);
+  std::copy(of_psi.begin(), of_psi.end(), m_.begin());
+  powers_.assign(of_psi.size() * kPowers, 0.0);
+  for (size_t k = 0; k < of_psi.size(); ++k) {
+    double power = 1;
+    for (int d = 0; d < kTerms; ++d) {
+      powers_[k * kPowers + d] = power;
+      power *= m_[k] / (d + 1);
+    }
+  }
+  turned_.assign(2 * m_.size(), 0.0);
+  error_z_.assign(2 * kTerms * padded, 0.0);
+  base_.assign(2 * padded, 0.0);
+  weights_.assign(kWeights * kTerms * padded, 0.0);
+  windows_.assign(segments, Window());
+  known_ = false;
+}
+
+double LocalSums::Begin(double theta, double psi) {
+  const double center = Center(psi);
+  if (!known_ || center != center_) {
+    center_ = center;
+    BuildErrorsAll();
+    known_ = true;
+  }
+  s_ = psi - center;
+  return BeginAll(theta);
+}
+
+template <class V>
+SWGJOINT_INLINE double LocalSums::BeginWaves(double theta) {
+  constexpr int width = sizeof(V) / sizeof(double);
+  const size_t padded = n_.size();
+  V sums[kWideLanes / width] = {};
+  for (size_t k = 0; k < padded; k += width) {
+    V n, c, s, re, im, z;
+    Load(&n_[k], &n);
+    CosSin(n * theta, &c, &s);
+    Store(&base_[k], c);
+    Store(&base_[padded + k], s);
+    const double* at = &error_z_[2 * kDegree * padded + k];
+    Load(at, &re);
+    Load(at + padded, &im);
+    for (int d = kDegree - 1; d >= 0; --d) {
+      at -= 2 * padded;
+      Load(at, &z);
+      re = re * s_ + z;
+      Load(at + padded, &z);
+      im = im * s_ + z;
+    }
+    sums[k % kWideLanes / width] += re * c - im * s;
+  }
+  V sum = sums[0];
+  for (int part = 1; part < kWideLanes / width; ++part) sum += sums[part];
+  double error[4];
+  Sums(sum, sum, sum, sum, error);
+  return error[0];
+}
+
+SWGJOINT_CLONES double LocalSums::BeginAll(double theta) {
+  return kHasWide ? BeginWaves<Wide>(theta) : BeginWaves<Lanes>(theta);
+}
+
+// Computes exp(i m center) and the polynomials of the kinematic error.
+template <class V>
+SWGJOINT_INLINE void LocalSums::BuildErrors() {
+  constexpr int width = sizeof(V) / sizeof(double), vectors = kPowers / width;
+  const size_t padded = n_.size(), orders = m_.size();
+  for (size_t k = 0; k < orders; k += width) {
+    V m, c, s;
+    Load(&m_[k], &m);
+    CosSin(m * center_, &c, &s);
+    Store(&turned_[k], c);
+    Store(&turned_[orders + k], s);
+  }
+  for (int wave = 0; wave < waves_; ++wave) {
+    V x[vectors] = {}, y[vectors] = {};
+    for (int k = first_[wave]; k < first_[wave + 1]; ++k) {
+      const double a = errors_[2 * k], b = errors_[2 * k + 1];
+      const double c = turned_[psi_[k]], s = turned_[orders + psi_[k]];
+      const double re = a * c + b * s, im = a * s - b * c;
+      for (int v = 0; v < vectors; ++v) {
+        V power;
+        Load(&powers_[psi_[k] * kPowers + v * width], &power);
+        x[v] += power * re;
+        y[v] += power * im;
+      }
+    }
+    double all_x[kPowers], all_y[kPowers];
+    for (int v = 0; v < vectors; ++v) {
+      Store(all_x + v * width, x[v]);
+      Store(all_y + v * width, y[v]);
+    }
+    for (int d = 0; d < kTerms; ++d) {
+      double* to = &error_z_[2 * d * padded + wave];
+      TurnBy(d, all_x[d], all_y[d], to, to + padded);
+    }
+  }
+}
+
+SWGJOINT_CLONES void LocalSums::BuildErrorsAll() {
+  if (kHasWide) {
+    BuildErrors<Wide>();
+  } else {
+    BuildErrors<Lanes>();
+  }
+}
+
+bool LocalSums::Step(double dtheta, double dpsi) {
+  // written so that NaN is too large as well
+  if (!(top_theta_ * std::fabs(dtheta) <= kTurn) ||
+      !(top_psi_ * std::fabs(dpsi) <= kChange)) {
+    return false;
+  }
+  StepAll(dtheta, dpsi);
+  return true;
+}
+
+// Computes the weights of all amplitudes in the sums of a step from t = 0 to t = 1.
+template <class V>
+SWGJOINT_INLINE void LocalSums::StepWaves(double dtheta, double dpsi) {
+  constexpr int width = sizeof(V) / sizeof(double);
+  // (s + t dpsi)^d is the sum over k of by[d][k] t^k
+  double by[kTerms][kWithin + 1] = {{1}}, begin[kTerms], end[kTerms];
+  begin[0] = end[0] = 0.5;
+  for (int d = 1; d < kTerms; ++d) {
+    by[d][0] = by[d - 1][0] * s_;
+    for (int k = 1; k <= std::min(d, kWithin); ++k) {
+      by[d][k] = by[d - 1][k] * s_ + by[d - 1][k - 1] * dpsi;
+    }
+    begin[d] = begin[d - 1] * s_;
+    end[d] = end[d - 1] * (s_ + dpsi);
+  }
+  const size_t padded = n_.size();
+  for (size_t first = 0; first < padded; first += width) {
+    V n, c0, s0, c, s, sinc;
+    Load(&n_[first], &n);
+    Load(&base_[first], &c0);
+    Load(&base_[padded + first], &s0);
+    const V x = n * dtheta, xx = x * x;
+    SincCos<1>(x, &sinc, &c);
+    s = x * sinc;
+    // integrals of t^k exp(i x t): the last one is a series, the others follow by
+    // integration by parts
+    constexpr int kSeriesTerms = 18;
+    V re[kWithin + 1], im[kWithin + 1];
+    V even = {}, odd = {};
+    double factor[kSeriesTerms] = {1};
+    for (int j = 1; j < kSeriesTerms; ++j) factor[j] = factor[j - 1] / j;
+    for (int j = kSeriesTerms - 2; j >= 0; j -= 2) {
+      const double sign = j % 4 ? -1 : 1;
+      even = even * xx + sign * factor[j] / (j + kWithin + 1);
+      odd = odd * xx + sign * factor[j + 1] / (j + kWithin + 2);
+    }
+    re[kWithin] = even;
+    im[kWithin] = odd * x;
+    for (int k = kWithin; k > 0; --k) {
+      re[k - 1] = (c + x * im[k]) * (1.0 / k);
+      im[k - 1] = (s - x * re[k]) * (1.0 / k);
+    }
+    // turned by the phases at the start
+    const V c1 = c0 * c - s0 * s, s1 = s0 * c + c0 * s;
+    for (int k = 0; k <= kWithin; ++k) {
+      const V before = re[k];
+      re[k] = before * c0 - im[k] * s0;
+      im[k] = before * s0 + im[k] * c0;
+    }
+    V last_re = {}, last_im = {};
+    double* to = &weights_[first / kWideLanes * kTerms * kWeights * kWideLanes +
+                           first % kWideLanes];
+    for (int d = 0; d < kTerms; ++d, to += kWeights * kWideLanes) {
+      V mean_re = {}, mean_im = {};
+      for (int k = 0; k <= std::min(d, kWithin); ++k) {
+        mean_re += re[k] * by[d][k];
+        mean_im += im[k] * by[d][k];
+      }
+      Store(to, c0 * begin[d] + c1 * end[d]);
+      Store(to + kWideLanes, s0 * begin[d] + s1 * end[d]);
+      // derivative by theta, i n
+      Store(to + 2 * kWideLanes, mean_im * n * -1);
+      Store(to + 3 * kWideLanes, mean_re * n);
+      Store(to + 4 * kWideLanes, last_re * d);
+      Store(to + 5 * kWideLanes, last_im * d);
+      last_re = mean_re;
+      last_im = mean_im;
+    }
+  }
+}
+
+SWGJOINT_CLONES void LocalSums::StepAll(double dtheta, double dpsi) {
+  if (kHasWide) {
+    StepWaves<Wide>(dtheta, dpsi);
+  } else {
+    StepWaves<Lanes>(dtheta, dpsi);
+  }
+}
+
+// Copies the amplitudes of one segment in the order of the waves.
+void LocalSums::Fill(const double* table, LaneVector* out) const {
+  out->assign(place_.size() * 2 * kColumns, 0.0);
+  for (size_t k = 0; k < place_.size(); ++k) {
+    const int own = place_[k];
+    const double* from =
+        table + own / kWideLanes * 10 * kWideLanes + own % kWideLanes;
+    double* to = &(*out)[k * 2 * kColumns];
+    for (int p = 0; p < kError; ++p) {
+      to[p] = from[2 * p * kWideLanes];
+      to[kColumns + p] = from[(2 * p + 1) * kWideLanes];
+    }
+    to[kError] = errors_[2 * k];
+    to[kColumns + kError] = errors_[2 * k + 1];
+  }
+}
+
+template <class V>
+SWGJOINT_INLINE void LocalSums::Build(Window* window) const {
+  constexpr int width = sizeof(V) / sizeof(double);
+  const size_t orders = m_.size();
+  for (int part = 0; part < kColumns; part += width) {
+    for (int wave = 0; wave < waves_; ++wave) {
+      V x[kTerms] = {}, y[kTerms] = {};
+      for (int k = first_[wave]; k < first_[wave + 1]; ++k) {
+        const double* from = &window->harmonics[k * 2 * kColumns + part];
+        const double* power = &powers_[psi_[k] * kPowers];
+        const double c = turned_[psi_[k]], s = turned_[orders + psi_[k]];
+        V a, b;
+        Load(from, &a);
+        Load(from + kColumns, &b);
+        const V re = a * c + b * s, im = a * s - b * c;
+        for (int d = 0; d < kTerms; ++d) {
+          x[d] += re * power[d];
+          y[d] += im * power[d];
+        }
+      }
+      double* to = &window->z[wave * kTerms * 2 * kColumns + part];
+      for (int d = 0; d < kTerms; ++d, to += 2 * kColumns) {
+        V re, im;
+        TurnBy(d, x[d], y[d], &re, &im);
+        Store(to, re);
+        Store(to + kColumns, im);
+      }
+    }
+  }
+}
+
+SWGJOINT_CLONES void LocalSums::BuildAll(Window* window) const {
+  if (kHasWide) {
+    Build<Wide>(window);
+  } else {
+    Build<Lanes>(window);
+  }
+}
+
+template <class V>
+SWGJOINT_INLINE void LocalSums::SumWaves(const Window& window, Totals* out) const {
+  constexpr int width = sizeof(V) / sizeof(double);
+  for (int part = 0; part < kColumns; part += width) {
+    // real and imaginary parts in sums that do not wait for each other
+    V sum[kWeights] = {};
+    const double* z = window.z.data() + part;
+    for (int wave = 0; wave < waves_; ++wave) {
+      const double* by = &weights_[wave / kWideLanes * kTerms * kWeights * kWideLanes +
+                                   wave % kWideLanes];
+      for (int d = 0; d < kTerms; ++d, z += 2 * kColumns) {
+        V re, im;
+        Load(z, &re);
+        Load(z + kColumns, &im);
+        for (int q = 0; q < kWeights; q += 2, by += 2 * kWideLanes) {
+          sum[q] += re * by[0];
+          sum[q + 1] += im * by[kWideLanes];
+        }
+      }
+    }
+    Store(out->mean + part, sum[0] - sum[1]);
+    Store(out->theta + part, sum[2] - sum[3]);
+    Store(out->psi + part, sum[4] - sum[5]);
+  }
+}
+
+SWGJOINT_CLONES void LocalSums::SumAll(const Window& window, Totals* out) const {
+  if (kHasWide) {
+    SumWaves<Wide>(window, out);
+  } else {
+    SumWaves<Lanes>(window, out);
+  }
+}
+
+template <class V>
+SWGJOINT_INLINE void LocalSums::ValueWaves(const Window& window, Totals* out) const {
+  constexpr int width = sizeof(V) / sizeof(double);
+  const size_t padded = n_.size();
+  double power[kTerms], slope[kTerms];  // of s^d and its derivative
+  power[0] = 1;
+  slope[0] = 0;
+  for (int d = 1; d < kTerms; ++d) {
+    power[d] = power[d - 1] * s_;
+    slope[d] = d * power[d - 1];
+  }
+  for (int part = 0; part < kColumns; part += width) {
+    V mean = {}, theta = {}, psi = {};
+    const double* z = window.z.data() + part;
+    for (int wave = 0; wave < waves_; ++wave) {
+      // even and odd powers in sums that do not wait for each other
+      V re[2] = {}, im[2] = {}, by_re[2] = {}, by_im[2] = {};
+      for (int d = 0; d < kTerms; ++d, z += 2 * kColumns) {
+        V x, y;
+        Load(z, &x);
+        Load(z + kColumns, &y);
+        re[d % 2] += x * power[d];
+        im[d % 2] += y * power[d];
+        by_re[d % 2] += x * slope[d];
+        by_im[d % 2] += y * slope[d];
+      }
+      const double c = base_[wave], s = base_[padded + wave], n = n_[wave];
+      const V x = re[0] + re[1], y = im[0] + im[1];
+      mean += x * c - y * s;
+      theta -= (x * s + y * c) * n;
+      psi += (by_re[0] + by_re[1]) * c - (by_im[0] + by_im[1]) * s;
+    }
+    Store(out->mean + part, mean);
+    Store(out->theta + part, theta);
+    Store(out->psi + part, psi);
+  }
+}
+
+SWGJOINT_CLONES void LocalSums::ValueAll(const Window& window, Totals* out) const {
+  if (kHasWide) {
+    ValueWaves<Wide>(window, out);
+  } else {
+    ValueWaves<Lanes>(window, out);
+  }
+}
+
+// The polynomials of a segment near the position of the start.
+LocalSums::Window& LocalSums::Near(int segment, const double* table) {
+  Window& window = windows_[segment];
+  if (window.known && window.center == center_) return window;
+  if (!window.known) {
+    Fill(table, &window.harmonics);
+    window.z.assign(static_cast<size_t>(waves_) * kTerms * 2 * kColumns, 0.0);
+  }
+  window.center = center_;
+  window.known = true;
+  BuildAll(&window);
+  return window;
+}
+
+void LocalSums::Sum(int segment, const double* table, Totals* out) {
+  SumAll(Near(segment, table), out);
+}
+
+void LocalSums::Value(int segment, const double* table, Totals* out) {
+  ValueAll(Near(segment, table), out);
+}
+
+}  // namespace swgjoint
