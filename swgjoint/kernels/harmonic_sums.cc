@@ -10,7 +10,7 @@ namespace swgjoint {
 
 namespace {
 
-constexpr std::size_t kLanes = 8;
+constexpr std::size_t kEight = 8;
 
 #if defined(__GNUC__)
 // eight harmonics; processors without such vectors process them in parts
@@ -20,13 +20,13 @@ SWGJOINT_INLINE void load(const double* from, Eight* x) {
 }
 #else
 struct Eight {
-  double v[kLanes];
+  double v[kEight];
   double operator[](std::size_t k) const { return v[k]; }
 };
 template <class F>
 SWGJOINT_INLINE Eight each(F f) {
   Eight x;
-  for (std::size_t k = 0; k < kLanes; ++k) x.v[k] = f(k);
+  for (std::size_t k = 0; k < kEight; ++k) x.v[k] = f(k);
   return x;
 }
 SWGJOINT_INLINE Eight operator+(const Eight& a, const Eight& b) {
@@ -43,7 +43,7 @@ SWGJOINT_INLINE Eight operator*(double a, const Eight& b) {
 }
 SWGJOINT_INLINE Eight& operator+=(Eight& a, const Eight& b) { return a = a + b; }
 SWGJOINT_INLINE void load(const double* from, Eight* x) {
-  std::copy(from, from + kLanes, x->v);
+  std::copy(from, from + kEight, x->v);
 }
 #endif
 
@@ -95,15 +95,15 @@ SWGJOINT_WIDE void multiply(const double* row, const double* powers,
 SWGJOINT_WIDE void add_errors(const double* cos, const double* sin,
                               const double* shared, std::size_t groups, double* out) {
   Eight error = {}, theta = {}, psi = {};
-  for (std::size_t g = 0; g < groups; ++g, cos += kLanes, sin += kLanes) {
+  for (std::size_t g = 0; g < groups; ++g, cos += kEight, sin += kEight) {
     Eight c, s, a, b, p, q;
     load(cos, &c);
     load(sin, &s);
     load(shared, &a);
-    load(shared + kLanes, &b);
-    load(shared + 2 * kLanes, &p);
-    load(shared + 3 * kLanes, &q);
-    shared += 4 * kLanes;
+    load(shared + kEight, &b);
+    load(shared + 2 * kEight, &p);
+    load(shared + 3 * kEight, &q);
+    shared += 4 * kEight;
     error += a * c + b * s;
     const Eight slope = b * c - a * s;
     theta += slope * p;
@@ -119,18 +119,18 @@ SWGJOINT_WIDE void add_powers(const double* cos, const double* sin,
                               const double* shared, const double* table, double d,
                               std::size_t groups, double* out) {
   Eight w1 = {}, w2 = {}, w3 = {}, w4 = {}, theta = {}, psi = {};
-  for (std::size_t g = 0; g < groups; ++g, cos += kLanes, sin += kLanes) {
+  for (std::size_t g = 0; g < groups; ++g, cos += kEight, sin += kEight) {
     Eight c, s, a[5], b[5], p, q;
     load(cos, &c);
     load(sin, &s);
     for (std::size_t k = 0; k < 5; ++k) {
-      load(table + 2 * k * kLanes, &a[k]);
-      load(table + (2 * k + 1) * kLanes, &b[k]);
+      load(table + 2 * k * kEight, &a[k]);
+      load(table + (2 * k + 1) * kEight, &b[k]);
     }
-    load(shared + 2 * kLanes, &p);
-    load(shared + 3 * kLanes, &q);
-    table += 10 * kLanes;
-    shared += 4 * kLanes;
+    load(shared + 2 * kEight, &p);
+    load(shared + 3 * kEight, &q);
+    table += 10 * kEight;
+    shared += 4 * kEight;
     w1 += a[1] * c + b[1] * s;
     w2 += a[2] * c + b[2] * s;
     w3 += a[3] * c + b[3] * s;
@@ -182,6 +182,15 @@ HarmonicSums::HarmonicSums(const Pieces& map, const WaveNumbers& waves,
   for (std::size_t r = waves.count_theta; r-- > 0;) {
     first_[r] = std::min(first_[r], first_[r + 1]);
   }
+  std::vector<double> sorted, errors;
+  for (const std::size_t own : order_) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      sorted.push_back(static_cast<double>(orders[2 * own + i]));
+      errors.push_back(amplitudes[2 * own + i]);
+    }
+  }
+  waves_.Set(sorted.data(), errors.data(), static_cast<int>(map.harmonics),
+             static_cast<int>(map.intervals) + 2);
 }
 
 const double* HarmonicSums::table(std::size_t segment) const {
@@ -214,13 +223,66 @@ void HarmonicSums::fill(std::size_t segment) const {
   }
 }
 
+// Whether enough states in sequence are near each of the positions.
+bool HarmonicSums::slow(const double* psi, std::size_t n) const {
+  if (!waves_.used()) return false;
+  std::size_t places = 1;
+  for (std::size_t k = 1; k < n; ++k) {
+    places += waves_.Center(psi[k]) != waves_.Center(psi[k - 1]);
+  }
+  return n >= kFew * places;
+}
+
+void HarmonicSums::find_segment(double torsion, std::size_t* segment,
+                                double* origin) const {
+  const std::size_t m = map_.intervals;
+  const double x = torsion, low = map_.knots[0], high = map_.knots[m];
+  const double inside = x < low ? low : x > high ? high : x;
+  const double* above = std::upper_bound(map_.knots, map_.knots + m + 1, inside);
+  *segment = std::min(static_cast<std::size_t>(above - map_.knots), m);
+  *origin = map_.knots[*segment > 0 ? *segment - 1 : 0];
+  if (x < low) {
+    *segment = 0;
+    *origin = low;
+  } else if (x > high) {
+    *segment = m + 1;
+    *origin = high;
+  }
+}
+
+void HarmonicSums::evaluate_waves(const double* theta, const double* psi, std::size_t n,
+                                  double* result) const {
+  const std::lock_guard<std::mutex> alone(one_);
+  constexpr int e = LocalSums::kError;
+  for (std::size_t at = 0; at < n; ++at) {
+    const double x = theta[at] / ratio_ + waves_.Begin(theta[at], psi[at]) - psi[at];
+    std::size_t segment;
+    double origin;
+    find_segment(x, &segment, &origin);
+    const double d = x - origin;
+    LocalSums::Totals sums;
+    waves_.Value(static_cast<int>(segment), table(segment), &sums);
+    const double* w = sums.mean;
+    const auto value = [d](const double* v) {
+      return v[0] + d * (v[1] + d * (v[2] + d * (v[3] + d * v[4])));
+    };
+    result[at] = x;
+    result[n + at] = sums.theta[e];
+    result[2 * n + at] = sums.psi[e];
+    result[3 * n + at] = w[1] + d * (2 * w[2] + d * (3 * w[3] + d * 4 * w[4]));
+    result[4 * n + at] = 2 * w[2] + d * (6 * w[3] + d * 12 * w[4]);
+    result[5 * n + at] = value(sums.theta);
+    result[6 * n + at] = value(sums.psi);
+  }
+}
+
 void HarmonicSums::evaluate(const double* theta, const double* psi, std::size_t n,
                             double* result) const {
-  const std::size_t m = map_.intervals, size = groups_ * kGroup;
+  if (slow(psi, n)) return evaluate_waves(theta, psi, n, result);
+  const std::size_t size = groups_ * kGroup;
   std::vector<double> phases(2 * size, 0.0), waves(2 * (theta_.size() + psi_.size()));
   double *cos = phases.data(), *sin = cos + size;
   double *about_theta = waves.data(), *about_psi = about_theta + 2 * theta_.size();
-  const double low = map_.knots[0], high = map_.knots[m];
   for (std::size_t at = 0; at < n; ++at) {
     powers(theta[at], theta_, about_theta);
     powers(psi[at], psi_, about_psi);
@@ -232,17 +294,9 @@ void HarmonicSums::evaluate(const double* theta, const double* psi, std::size_t 
     double error[3], force[4];
     add_errors(cos, sin, shared_.data(), groups_, error);
     const double x = theta[at] / ratio_ + error[0] - psi[at];
-    const double inside = x < low ? low : x > high ? high : x;
-    const double* above = std::upper_bound(map_.knots, map_.knots + m + 1, inside);
-    std::size_t segment = std::min(static_cast<std::size_t>(above - map_.knots), m);
-    double origin = map_.knots[segment > 0 ? segment - 1 : 0];
-    if (x < low) {
-      segment = 0;
-      origin = low;
-    } else if (x > high) {
-      segment = m + 1;
-      origin = high;
-    }
+    std::size_t segment;
+    double origin;
+    find_segment(x, &segment, &origin);
     add_powers(cos, sin, shared_.data(), table(segment), x - origin, groups_, force);
     result[at] = x;
     result[n + at] = error[1];

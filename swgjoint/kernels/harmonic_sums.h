@@ -3,7 +3,8 @@
 // The compiled twin of law_sums in swgjoint/maps/sums.py, which explains the quantities.
 // It differs from it by round-off. Harmonics are processed in groups of eight; cosines
 // and sines of their phases are products of powers of exp(i theta) and exp(i psi).
-// Harmonics with the same power of exp(i theta) follow each other.
+// Harmonics with the same power of exp(i theta) follow each other. At many states near
+// each other, as of a recorded motion, they are one wave, see LocalSums.
 
 #ifndef SWGJOINT_KERNELS_HARMONIC_SUMS_H_
 #define SWGJOINT_KERNELS_HARMONIC_SUMS_H_
@@ -14,6 +15,7 @@
 #include <mutex>
 #include <vector>
 
+#include "../plugin/local_sums.h"
 #include "map_sums.h"
 
 namespace swgjoint {
@@ -39,6 +41,13 @@ class HarmonicSums {
   static constexpr std::size_t kShared = 4 * kGroup;  // amplitudes and orders
   static constexpr std::size_t kPowers = 10 * kGroup;  // A0, B0, .. A4, B4
 
+  // Fewest states per position near which polynomials of the output angle are made.
+  static constexpr std::size_t kFew = 12;
+
+  bool slow(const double* psi, std::size_t n) const;
+  void find_segment(double torsion, std::size_t* segment, double* origin) const;
+  void evaluate_waves(const double* theta, const double* psi, std::size_t n,
+                      double* result) const;
   const double* table(std::size_t segment) const;
   void fill(std::size_t segment) const;
 
@@ -54,6 +63,8 @@ class HarmonicSums {
   // made when a torsion is first in it
   mutable std::vector<std::vector<double>> tables_;
   std::unique_ptr<std::once_flag[]> made_;
+  mutable LocalSums waves_;
+  mutable std::mutex one_;  // that uses waves_
 };
 
 }  // namespace swgjoint

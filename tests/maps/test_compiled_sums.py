@@ -109,6 +109,38 @@ def test_law_of_many_harmonics(monkeypatch, synthetic_map, shape, sign):
     assert outside or np.size(theta) < 50
 
 
+def test_law_along_a_slow_motion(monkeypatch, synthetic_map):
+    """Harmonics with few orders in theta are waves, to round-off as the others.
+
+    The motion passes seven positions of the polynomials and crosses knots. The same
+    states in random sequence are summed by harmonics, with other bits.
+    """
+    rng = np.random.default_rng(14)
+    orders = [(n - q, q) for n in range(6) for q in range(-24, 25) if (n, q) > (0, 0)]
+    size = len(orders) + 1
+    drive = replace(
+        synthetic_map,
+        orders=np.concatenate([[[0, 0]], orders]),
+        kinematic_error=1e-5 * rng.normal(size=(size, 2)),
+        potential=1e-3 * rng.normal(size=(size, *synthetic_map.potential.shape[1:])),
+        end_stiffness=rng.normal(size=(size, 2, 2)),
+    )
+    psi = 0.3 + np.linspace(0.0, 2.8 / 24, 300)
+    twist = 1.3 * drive.torsion_knots[-1] * np.sin(np.linspace(0.0, 20.0, 300))
+    theta = drive.ratio * (psi + twist)
+    mixed = rng.permutation(psi.size)
+
+    def compute():
+        sums = law_sums(drive, theta, psi, stiffness=True)
+        return [*vars(drive.law(theta, psi)).values(), *sums]
+
+    for got, wanted in zip(*both(monkeypatch, compute), strict=True):
+        assert np.allclose(got, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
+    one_by_one = law_sums(drive, theta[mixed], psi[mixed]).torque
+    together = law_sums(drive, theta, psi).torque[mixed]
+    assert (one_by_one != together).any()
+
+
 def test_law_on_the_knots(monkeypatch, synthetic_map):
     """At the outermost knots the law is that of numpy, from one side to the other."""
     drive = with_many_harmonics(synthetic_map, np.random.default_rng(13))
