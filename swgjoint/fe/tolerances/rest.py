@@ -91,6 +91,7 @@ class Rest:
         follow: Follower[Any],
         levels: Array,
         tick: Callable[[int], None] = lambda parts: None,
+        before: Rest | None = None,
     ) -> Rest:
         """The position with linearisations under load.
 
@@ -103,12 +104,18 @@ class Rest:
             follow: Solver of the drive with perfect teeth.
             levels: Magnitudes of the torques, increasing (n,) [N·m].
             tick: Called with the number of torques that are done or left out.
+            before: The position before, under load, whose states are turned to this
+                one; None to load the state of this position. In 3D, turning takes an
+                eighth of the time.
         """
-        loaded = {}
+        angle, loaded = follow.input_angle(self.state), {}
         for sign in (1.0, -1.0):
             state = self.near(sign)[0]
             for k, torque in enumerate((sign * levels).tolist()):
-                state = follow.to_torque(state, torque)
+                if before is not None and torque in before.loaded:
+                    state = follow.to_angle(before.loaded[torque][0], angle)
+                else:
+                    state = follow.to_torque(state, torque)
                 if not state.outcome.ok:
                     tick(levels.size - k)
                     break

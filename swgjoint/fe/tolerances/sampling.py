@@ -54,8 +54,7 @@ reference drive, what errors change varies slowly with the torque at most positi
 With the simplified wave generator and without 0.3 and 0.7, the input torque was off by
 9.7 instead of 3.6 % of its peak to peak (rms 4.6 instead of 1.5 %). Where few teeth
 carry the load, the stiffness changes fivefold between 0.45 and 0.7: without 0.575 the
-output error of the reference drive was off by 9.1 instead of 5.0 % at 0.51. In 3D the
-drive is linearised without load only."""
+output error of the reference drive was off by 9.1 instead of 5.0 % at 0.51."""
 CHECKS = {"2d": 24, "3d": 3}
 """Number of positions that are also solved without linearisation to validate the map.
 In 2D they lie between the sampled positions, half of them under negative torques, see
@@ -126,27 +125,30 @@ def sample_tolerances(
     has_play = any(rest.opposite is not None for rest in (*linear, *reference))
     if has_play:
         levels = np.append(small, levels)
-    # in 3D a linearisation takes minutes, so that only the unloaded one is used
-    under_load = levels if model == "2d" else levels[:0]
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
     steps = loads * -(-pitches.size // CHUNK)  # number of chunks, rounded up
     # a linearisation under load takes about as long as a chunk
-    linearised = 2 * under_load.size * (2 if own_reference else 1)
+    linearised = 2 * levels.size * (2 if own_reference else 1)
     tick = _stage(progress, design, 2, phases * (steps + linearised))
+    before: tuple[Rest | None, Rest | None] = None, None
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
-        flawless = flawless.under_both_signs(ideal_drive, under_load, tick)
+        flawless = flawless.under_both_signs(ideal_drive, levels, tick, before[0])
         loaded = flawless
+        # a resumed run turns the same states as an uninterrupted one
+        if own_reference and (there is None or model == "3d"):
+            loaded = rest.under_both_signs(follow, levels, tick, before[1])
+        if model == "3d":
+            before = flawless, loaded
         if there is None:
-            if own_reference:
-                loaded = rest.under_both_signs(follow, under_load, tick)
             phase_table, count = respond_over_torque(
                 loaded, by_errors, levels, small, tick
             )
         else:
             phase_table, count = there
-            tick(steps + (linearised // 2 if own_reference else 0))
+            skipped = own_reference and model != "3d"
+            tick(steps + (linearised // 2 if skipped else 0))
         if not np.isfinite(phase_table).all():
             lost = np.isnan(phase_table).any(axis=(0, 1)).sum()
             raise ComputationError(
