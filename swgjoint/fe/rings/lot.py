@@ -2,7 +2,7 @@
 
 The rings on their wave generator and bearing are linearised under each torque. The
 errors of the teeth are superposed at positions of one output turn, as in
-:mod:`swgjoint.fe.rings.tolerances`, which takes about half a CPU second per drive. The
+:mod:`swgjoint.fe.rings.tolerances`, which takes about 0.4 CPU seconds per drive. The
 search for the equilibria of a drive starts from those of the drive without errors.
 """
 
