@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import subprocess
@@ -238,6 +239,23 @@ def test_long_messages_are_cut(command, capsys):
         with pytest.raises(SystemExit):
             main(arguments)
         assert len(capsys.readouterr().err) < 600
+
+
+def test_collections_are_rare_while_a_command_runs(command):
+    """The thresholds of the caller are back afterwards, also after an error."""
+    before, seen = gc.get_threshold(), []
+
+    def work(args):
+        seen.append(gc.get_threshold()[0])
+        if len(seen) > 1:
+            raise DesignError("no such drive")
+        return {}
+
+    command(work)
+    for status in (0, 2):
+        assert main(["doctor"]) == status
+        assert gc.get_threshold() == before
+    assert seen == [50_000, 50_000]
 
 
 def test_json_is_alone_on_stdout(command, capfd):
