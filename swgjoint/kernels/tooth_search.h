@@ -98,7 +98,7 @@ struct Sampling {
   double limit, radius;
 };
 
-// Contact point of two flanks: columns of ToothContact._gather, with the weights of the
+// Contact point of two flanks: columns of ToothContact.gather, with the weights of the
 // nodes of its two flanks in the gap and in the sliding motion.
 struct Meeting {
   double gap;

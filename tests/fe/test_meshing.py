@@ -159,8 +159,8 @@ def test_nothing_penetrates():
     direction = rng.normal(size=ring.flank.shape)
     h = 1e-8
     moved = [
-        ring.search._gather(
-            found.sector, found.side, found.station, ring.flank + s * h * direction, 1.0
+        ring.search.gather(
+            found.sector, found.side, found.station, ring.flank + s * h * direction
         ).gap
         for s in (-1, 1)
     ]

@@ -63,6 +63,14 @@ class Unloaded(Generic[AnyState]):
     """States under that torque and its opposite; None if the output is not free."""
 
 
+_FREE_OR_ALTERNATING = (
+    Outcome.SINGULAR,
+    Outcome.ACTIVE_SET_CYCLES,
+    Outcome.MAX_ITERATIONS,
+)
+"""Outcomes of an unloaded drive whose output may be free in a clearance."""
+
+
 class Follower(ABC, Generic[AnyState]):
     """Continuation of equilibria, with halved steps where a solve fails."""
 
@@ -231,7 +239,8 @@ class Follower(ABC, Generic[AnyState]):
 
         An output that is free in the clearance is placed midway between its positions
         under the torques +-``small``. Within a clearance that is much narrower than the
-        deflection under these torques, the contacts may alternate without end.
+        deflection under these torques, the contacts may alternate without end, and the
+        output is placed in the same way.
 
         Args:
             state: Equilibrium to start from.
@@ -239,7 +248,7 @@ class Follower(ABC, Generic[AnyState]):
         """
         if not is_free(state):
             unloaded = self.to_torque(state, 0.0)
-            if unloaded.outcome not in (Outcome.SINGULAR, Outcome.ACTIVE_SET_CYCLES):
+            if unloaded.outcome not in _FREE_OR_ALTERNATING:
                 return Unloaded(state=unloaded, small=small)
         sides = self.to_torque(state, small), self.to_torque(state, -small)
         return self._between(sides, small)

@@ -14,7 +14,7 @@ from swgjoint.fe.common.friction import SlipHistory
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.tooth_rows import ToothRows
 
 _KINDS: dict[str, type[Any]] = {
     kind.__name__: kind

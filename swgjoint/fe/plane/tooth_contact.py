@@ -130,7 +130,8 @@ class ToothContact:
             sector, side, station = held.add_places(
                 sector, side, station, MERGE * (high - low)
             )
-        return self._gather(sector, side, station, flank, reach)
+        contacts = self.gather(sector, side, station, flank)
+        return contacts.chosen(np.flatnonzero(contacts.gap < reach))
 
     def _minima(
         self, flank: Array, searched: Mask, limit: float, thorough: bool
@@ -332,27 +333,23 @@ class ToothContact:
                 break
         return s
 
-    def _gather(
-        self,
-        sector: Index,
-        side: Index,
-        station: Array,
-        flank: Array,
-        reach: float,
+    def gather(
+        self, sector: Index, side: Index, station: Array, flank: Array
     ) -> Contacts:
-        """Candidates with all their derivatives at given points of the flanks.
+        """Contacts with all their derivatives at given points of the flanks.
 
         Args:
             sector: Sector of each point (n,).
             side: Side of each point (n,).
             station: Arc length of each point (n,) [m].
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
-            reach: Largest gap of a candidate [m].
+
+        Returns:
+            The contacts; an infinite gap where a point faces no flank.
         """
         if self._compiled is not None:
             places = sector, side, station
-            contacts = self._compiled.gather(*places, flank, rubs=self.rubs)
-            return contacts.chosen(np.flatnonzero(contacts.gap < reach))
+            return self._compiled.gather(*places, flank, rubs=self.rubs)
         element = self.element
         size = element.flank_size
         n = len(sector)
@@ -375,7 +372,7 @@ class ToothContact:
         if seen.feet.station is not None:
             circular_spline_shapes = self.circular_spline.spline(seen.feet.station)
             slip = station + seen.feet.station
-        contacts = Contacts(
+        return Contacts(
             sector=sector,
             side=side,
             station=station,
@@ -396,4 +393,3 @@ class ToothContact:
             else none,
             slip=slip,
         )
-        return contacts.chosen(np.flatnonzero(contacts.gap < reach))

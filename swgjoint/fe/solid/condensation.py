@@ -11,7 +11,7 @@ from swgjoint.fe.solid.linearise import SolidLinearised
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent, TangentResponse
-from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.typing import Array
 
 

@@ -27,7 +27,7 @@ from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent
-from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
 
@@ -103,7 +103,7 @@ class SolidSolver:
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
-        settled = False
+        settled = stay = False
         last: Array | None = None
         tangent: SolidTangent | None = None
         # a state whose teeth carry force is close to the solution
@@ -121,9 +121,8 @@ class SolidSolver:
                 # once the search is thorough it remains so: contacts that only this
                 # search finds would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
-                step = _solve_linear(
-                    model, state, linear, tangent, load, reach, thorough
-                )
+                search = reach, thorough, stay
+                step = _solve_linear(model, state, linear, tangent, load, search)
                 history.append(step.largest)
                 limits = NARROW * model.lobe_height, WIDE * model.lobe_height
                 reach = min(max(step.largest, limits[0]), limits[1])
@@ -132,6 +131,8 @@ class SolidSolver:
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
                 longest = 0.5 if _takes_back(step.increment, last) else 1.0
+                # minima that jump to and fro over a flat flank share their force
+                stay |= longest < 1.0 and step.largest < self.thorough_below
                 damping = min(longest, self.stride * model.lobe_height / step.largest)
                 last = step.increment
                 # a contact set that occurs again would recur for ever if all its
@@ -214,12 +215,11 @@ def _solve_linear(
     linear: SolidLinearised,
     tangent: SolidTangent,
     load: SolidLoad,
-    reach: float,
-    thorough: bool,
+    search: tuple[float, bool, bool],
 ) -> _Step:
     """Condense the ring to tooth forces and rotations, solve and expand the result."""
     # candidates of tooth contact, and the condensed problem
-    candidates = None
+    candidates, (reach, thorough, stay) = None, search
     if load.teeth:
         candidates = model.teeth.find(
             linear.frames[0],
@@ -228,33 +228,35 @@ def _solve_linear(
             reach,
             state.held,
             thorough=thorough,
+            stay=stay,
             circular_spline_rotation=state.circular_spline_rotation,
+            held_force=state.tooth_force,
         )
     condensed = condense(model, state, linear, tangent, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
-    # unknowns: forces of the candidates and, under a torque, the output rotation
-    n = 0 if candidates is None else len(candidates)
-    used, output = np.arange(n), n if load.rotation is None else n + 1
+    # unknowns: forces of contacts, output rotation under a torque, forces of slopes
+    n, slopes = (0, 0) if candidates is None else (len(candidates), candidates.slopes)
+    contacts, output = n - slopes, n if load.rotation is None else n + 1
+    unsigned = np.arange(contacts, n)
     if load.torque is not None:
         offset[output] -= load.torque / model.copies
-        used = np.append(used, output)
-    unknown, compliance = np.zeros(n + 2), float("nan")
-    active = np.zeros(n, dtype=bool)
+        unsigned = np.append(output, unsigned)
+    used = np.append(np.arange(contacts), unsigned)
+    unknown, active, compliance = np.zeros(n + 2), np.zeros(contacts, bool), np.nan
     if len(used):
-        guess = offset[:n] < 0.0
+        guess = offset[:contacts] < 0.0
         if state.held is not None and candidates is not None and len(state.held):
-            guess = candidates.contacts.share_flank_with(state.held.contacts)
+            guess = candidates.contacts.share_flank_with(state.held.contacts)[:contacts]
         elif load.torque is not None:
-            guess |= first_to_close(system, offset, n, output)
+            guess |= first_to_close(system, offset, contacts, output)
         unknown[used], active = solve_mixed(
-            system[np.ix_(used, used)], offset[used], n, 0, guess
+            system[np.ix_(used, used)], offset[used], contacts, slopes, guess
         )
         if load.torque is not None:
-            acting = np.append(np.flatnonzero(active), output)
-            unit = np.zeros(len(acting))
-            unit[-1] = -1.0 / model.copies
+            acting = np.append(np.flatnonzero(active), unsigned)
+            unit = np.where(acting == output, -1.0 / model.copies, 0.0)
             answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
-            compliance = float(answer[-1])
+            compliance = float(answer[acting == output][0])
     # increments of the ring, and contact forces and gaps of the bore after the step
     force, (turn, circular_spline_turn) = unknown[:n], unknown[n:]
     increment = condensed.increment(unknown)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swgjoint.fe.plane.state import StateFigures
-from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.typing import Array, Mask
 
 

@@ -2,12 +2,14 @@
 
 The flanks of the circular spline are parallel to the axis, so that a point of a
 flexspline flank touches them in its own plane z = const. Crowning makes the teeth of
-the flexspline thinner towards both ends of the face width.
+the flexspline thinner towards both ends of the face width. Crowned flanks also touch
+between the planes of the mesh, see :mod:`swgjoint.fe.solid.flank_minima`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -15,11 +17,19 @@ from swgjoint.fe.plane.circular_spline import CircularSpline
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.tooth_contact import ToothContact
+from swgjoint.fe.solid.across import crown_bend
 from swgjoint.fe.solid.circular_spline import ElasticCircularSpline
 from swgjoint.fe.solid.corotation import SolidFrames, spin
+from swgjoint.fe.solid.flank_minima import FlankSurfaces
+from swgjoint.fe.solid.flank_points import FlankPoints
 from swgjoint.fe.solid.strip.strip import Strip
+from swgjoint.fe.solid.tooth_rows import ToothRows, flank_candidates
 from swgjoint.fe.solid.wave_generator.surface import crown
 from swgjoint.typing import Array, Index
+
+Place = tuple[SolidFrames, Array, Array]
+"""Frames of the toothed segments, flank nodes (N, n_planes, 2 n_b, 3) [m] and angles of
+the frames (N,) [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,43 +56,6 @@ class FlankCrowning:
             strip.mesh.teeth.z, self.height, self.width, circular=self.circular
         )
         return np.asarray(-depth[:, None, None] * both)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ToothRows:
-    """The n candidate contacts of all planes and the derivatives of their gaps."""
-
-    contacts: Contacts
-    """Candidates as the 2D search finds them in each plane."""
-    plane: Index
-    """Plane of each candidate (n,)."""
-    weight: Array
-    """Derivative of the gaps by the displacements of the flexspline's flank nodes, in
-    the frames of its teeth (n, n_flank) [-]."""
-    circular_spline_weight: Array
-    """Derivative of the gaps by the displacements of the circular spline's flank nodes,
-    in the frames of its teeth (n, n_c) [-]."""
-    rows: Array
-    """Derivative of the gaps by the masters of the toothed segments in the global frame
-    (n, 3 m) [-]."""
-    arm: Array
-    """Lever arm of the normals: derivative of the gaps by a rotation of the whole
-    flexspline about the axis of the drive (n,) [m]."""
-    circular_spline_arm: Array
-    """Lever arm about the axis of the circular spline: negative derivative of the gaps
-    by a rotation of the circular spline (n,) [m]."""
-
-    def __len__(self) -> int:
-        return len(self.plane)
-
-    def chosen(self, index: Index) -> ToothRows:
-        """The candidates with the given indices."""
-        picked = {
-            key: getattr(self, key)[index]
-            for key in self.__dataclass_fields__
-            if key != "contacts"
-        }
-        return ToothRows(contacts=self.contacts.chosen(index), **picked)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,7 +103,9 @@ class SolidTeeth:
         held: ToothRows | None,
         *,
         thorough: bool,
+        stay: bool = False,
         circular_spline_rotation: float = 0.0,
+        held_force: Array | None = None,
     ) -> ToothRows:
         """Find the candidate contacts at a state.
 
@@ -145,7 +120,10 @@ class SolidTeeth:
                 none.
             thorough: Whether to search between the nodes, see
                 :meth:`swgjoint.fe.plane.tooth_contact.ToothContact.search`.
+            stay: See :func:`swgjoint.fe.solid.tooth_rows.flank_candidates`.
             circular_spline_rotation: Rotation of the circular spline [rad].
+            held_force: Normal forces of the held contacts (n,) [N]; without them there
+                are no slopes.
         """
         # deflected flank nodes, seen in every plane from the rotated frame of the tooth
         strip = self.strip
@@ -176,8 +154,12 @@ class SolidTeeth:
             self._circular_spline_offset(circular_spline_rotation),
             displacements.shape[2] // 2,
         )
-        # the 2D search in every plane
-        parts, numbers = [], []
+        # the 2D search in every plane; between the planes crowned flanks are closer
+        z, old = strip.mesh.teeth.z, held if held is not None and len(held) else None
+        crowned = self.crowning.height > 0.0
+        beyond = crown_bend(self.crowning.height, z) if crowned else 0.0
+        parts, searches = list[Contacts](), list[ToothContact]()
+        flanks = plane_flank.reshape(n, planes, -1).transpose(1, 0, 2)
         for p in range(planes):
             search = ToothContact(
                 element=strip,
@@ -186,18 +168,107 @@ class SolidTeeth:
                 angle=seen,
                 bearing=seen - np.arctan2(centre[:, p, 0], centre[:, p, 1]),
             )
-            old = None
-            if held is not None and len(held):
-                old = held.contacts.chosen(np.flatnonzero(held.plane == p))
-            in_plane = search.search(
-                plane_flank[:, p].reshape(n, -1), reach, old, thorough=thorough
+            kept = None
+            if old is not None and not crowned:
+                kept = old.contacts.chosen(np.flatnonzero(old.plane == p))
+            found = search.search(flanks[p], reach + beyond, kept, thorough=thorough)
+            searches.append(search)
+            parts.append(found)
+        contacts = reduce(Contacts.join, parts)
+        plane = np.repeat(np.arange(planes), [len(part) for part in parts])
+        place = frame, nodes, angle
+        if not crowned:
+            return self._in_planes(contacts, plane, place)
+        # minima between the planes
+        surfaces = FlankSurfaces(searches=tuple(searches), flank=flanks)
+        seeds, before = surfaces.seeds(contacts, plane), None
+        if old is not None:
+            before = FlankPoints.from_contacts(
+                old.contacts, (old.z - z[0]) / (z[1] - z[0]), planes
             )
-            parts.append(in_plane)
-            numbers.append(np.full(len(in_plane), p))
-        contacts = parts[0]
-        for part in parts[1:]:
-            contacts = Contacts.join(contacts, part)
-        return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
+        points, loads = flank_candidates(
+            surfaces, seeds, reach, before, held_force, stay=stay
+        )
+        return self._between(surfaces, points, loads, place)
+
+    def _between(
+        self,
+        surfaces: FlankSurfaces,
+        points: FlankPoints,
+        loads: Array,
+        place: Place,
+    ) -> ToothRows:
+        """Candidates between the planes, and slopes of their gaps.
+
+        Args:
+            surfaces: Gaps of the flanks.
+            points: Places of the candidates (n,).
+            loads: Forces of the first of them, which are minima; without force they
+                have no slopes (m,) [N].
+            place: Frames, flank nodes and angles.
+        """
+        strip, frame = self.strip, place[0]
+        gaps = surfaces.gaps(points)
+        n, planes = len(points), strip.planes
+        # a minimum that carries force moves, unless it is at an end
+        rolls, bend, skew = surfaces.springs(gaps)
+        rolls[: len(loads)] &= (loads > 0.0)[:, None]
+        rolls[len(loads) :] = False
+        # weights of the contacts in the planes
+        value, along, across = gaps.sums()
+        across -= skew[:, None, None] * along
+        some, way = np.nonzero(rolls)
+        of = np.concatenate([np.arange(n), some])
+        sums = np.concatenate([value, np.stack([along, across], axis=1)[some, way]])
+        spring = np.zeros(len(of))
+        spring[n:] = bend[some, way] / loads[some]
+        # the contacts in all planes, and their sums
+        contacts, number = gaps.contacts, np.tile(np.arange(planes), 3 * n)
+        spline, push, turning, arm, facing_arm = (
+            part.reshape(n, 3, planes, *part.shape[1:])[of]
+            for part in self._directions(contacts, number, place)
+        )
+        sector, side = points.sector[of], points.side[of]
+        row = np.arange(len(of))
+        on_nodes = np.zeros((len(of), planes, 2, strip.flank_size, 3))
+        on_nodes[row[:, None], np.arange(planes), side[:, None]] = np.einsum(
+            "rkp,rkpb,rkpi->rpbi", sums, spline, push
+        )
+        weight = on_nodes.reshape(len(of), strip.flank_dofs)
+        nearest = points.nearest[of]
+        near = contacts.chosen((3 * of + 1) * planes + nearest)
+
+        by_own, by_facing = (
+            np.einsum(
+                "rkp,rkpw->rpw",
+                sums,
+                part.reshape(n, 3, planes, part.shape[1])[of],
+            )
+            for part in (contacts.weight, contacts.circular_spline_weight)
+        )
+        near = replace(
+            near,
+            gap=np.einsum("rkp,rkp->r", sums, gaps.gap[of]),
+            weight=by_own.sum(axis=1),
+            circular_spline_weight=by_facing.sum(axis=1),
+        )
+        z = strip.mesh.teeth.z
+        return ToothRows(
+            contacts=near,
+            plane=nearest,
+            z=z[0] + (z[1] - z[0]) * points.place[of],
+            slope=row >= n,
+            spring=spring,
+            weight=weight,
+            circular_spline_weight=by_facing.reshape(
+                len(of), planes * by_facing.shape[2]
+            ),
+            rows=self._by_masters(
+                weight, np.einsum("rkp,rkpi->ri", sums, turning), sector, frame
+            ),
+            arm=np.einsum("rkp,rkp->r", sums, arm),
+            circular_spline_arm=np.einsum("rkp,rkp->r", sums, facing_arm),
+        )
 
     def circular_spline_place(self, circular_spline_rotation: float) -> Array:
         """Angular positions of the teeth of the circular spline (N_c,) [rad]."""
@@ -224,17 +295,46 @@ class SolidTeeth:
             offset += np.multiply.outer(turned, planes).transpose(0, 2, 1)
         return offset
 
-    def _rows(
-        self,
-        contacts: Contacts,
-        plane: Index,
-        frame: SolidFrames,
-        nodes: Array,
-        angle: Array,
-    ) -> ToothRows:
-        """Candidates of the planes with the derivatives of their gaps."""
+    def _in_planes(self, contacts: Contacts, plane: Index, place: Place) -> ToothRows:
+        """Candidates in the planes with the derivatives of their gaps."""
+        strip, n = self.strip, len(plane)
+        spline, push, turning, arm, facing_arm = self._directions(
+            contacts, plane, place
+        )
+        on_nodes = np.zeros((n, strip.planes, 2, strip.flank_size, 3))
+        on_nodes[np.arange(n), plane, contacts.side] = (
+            spline[:, :, None] * push[:, None, :]
+        )
+        weight = on_nodes.reshape(n, strip.flank_dofs)
+        width = contacts.circular_spline_weight.shape[1]
+        facing = np.zeros((n, strip.planes, width))
+        facing[np.arange(n), plane] = contacts.circular_spline_weight
+        return ToothRows(
+            contacts=contacts,
+            plane=plane,
+            z=strip.mesh.teeth.z[plane],
+            slope=np.zeros(n, dtype=bool),
+            spring=np.zeros(n),
+            weight=weight,
+            circular_spline_weight=facing.reshape(n, strip.planes * width),
+            rows=self._by_masters(weight, turning, contacts.sector, place[0]),
+            arm=arm,
+            circular_spline_arm=facing_arm,
+        )
+
+    def _directions(
+        self, contacts: Contacts, plane: Index, place: Place
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """Directions in which contacts in the planes push.
+
+        Returns:
+            Weights of the nodes of the flank (n, size); normals in the frames of the
+            segments (n, 3); their moments about the middles of the segments (n, 3) [m];
+            lever arms about the axes of the drive and of the circular spline, each (n,)
+            [m].
+        """
         # normals and points in the global frame, and the lever arms of the normals
-        strip = self.strip
+        strip, (frame, nodes, angle) = self.strip, place
         sector, side, n = contacts.sector, contacts.side, len(plane)
         size, teeth = strip.flank_size, strip.teeth
         turn = frame.turn[sector]
@@ -246,38 +346,36 @@ class SolidTeeth:
         on_side = nodes[sector, plane].reshape(n, 2, size, 3)[np.arange(n), side]
         point[:, 2] = np.einsum("kb,kb->k", spline, on_side[..., 2])
         arm = normal[:, 1] * point[:, 0] - normal[:, 0] * point[:, 1]
-        circular_spline_arm = arm
+        facing_arm = arm
         if self.tilt is not None:
             x, y = np.multiply.outer(self.tilt, strip.mesh.teeth.z[plane])
-            circular_spline_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
-        # derivatives by the flank nodes in the frames of the segments
-        seen = np.einsum("kji,kj->ki", turn, normal)
+            facing_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
+        push = np.einsum("kji,kj->ki", turn, normal)
         at = np.einsum("kji,kj->ki", turn, point)
-        on_nodes = np.zeros((n, strip.planes, 2, size, 3))
-        on_nodes[np.arange(n), plane, side] = spline[:, :, None] * seen[:, None, :]
-        weight = on_nodes.reshape(n, strip.flank_dofs)
-        # derivatives by the masters: deformation and rotation of the frame
-        carried = weight @ teeth.loaded_from_masters[: strip.flank_dofs]
-        m = frame.position.shape[1]
         middle = at - frame.centre[sector] - teeth.position.mean(axis=0)
+        return spline, push, np.cross(middle, push), arm, facing_arm
+
+    def _by_masters(
+        self, weight: Array, turning: Array, sector: Index, frame: SolidFrames
+    ) -> Array:
+        """Derivatives of gaps by the masters in the global frame (n, 3 m) [-].
+
+        Args:
+            weight: Derivatives by the flank nodes in the frames of the segments
+                (n, n_flank) [-].
+            turning: Moments of the normals about the middles of the segments (n, 3)
+                [m].
+            sector: Sectors (n,).
+            frame: Frames of the toothed segments.
+        """
+        # deformation and rotation of the frame
+        n, m = len(sector), frame.position.shape[1]
+        carried = weight @ self.strip.teeth.loaded_from_masters[: weight.shape[1]]
         s = -spin(frame.position[sector]).reshape(n, 3 * m, 3)
-        turning = np.cross(middle, seen) - np.einsum("km,kmw->kw", carried, s)
+        turning = turning - np.einsum("km,kmw->kw", carried, s)
         rows = carried + np.einsum("kw,kwm->km", turning, frame.gradient[sector])
-        rows = np.einsum("kij,kaj->kai", turn, rows.reshape(n, m, 3))
-        width = contacts.circular_spline_weight.shape[1]
-        circular_spline_weight = np.zeros((n, strip.planes, width))
-        circular_spline_weight[np.arange(n), plane] = contacts.circular_spline_weight
-        return ToothRows(
-            contacts=contacts,
-            plane=plane,
-            weight=weight,
-            circular_spline_weight=circular_spline_weight.reshape(
-                n, strip.planes * width
-            ),
-            rows=rows.reshape(n, 3 * m),
-            arm=arm,
-            circular_spline_arm=circular_spline_arm,
-        )
+        rows = np.einsum("kij,kaj->kai", frame.turn[sector], rows.reshape(n, m, 3))
+        return np.asarray(rows.reshape(n, 3 * m))
 
     def compliance(self, found: ToothRows) -> Array:
         """Compliance between candidates through the teeth of both members (n, n) [m/N].
@@ -295,4 +393,5 @@ class SolidTeeth:
                 found.circular_spline_weight,
                 self.circular_spline_teeth,
             )
+        matrix[np.diag_indices(len(found))] += found.spring
         return matrix

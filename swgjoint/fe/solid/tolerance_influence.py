@@ -1,7 +1,9 @@
 """Influence of every tooth gap on the output of the 3D drive.
 
 Tooth contacts may open and close anywhere over the face width, but the bore nodes that
-touch the wave generator are always those of the perfect drive.
+touch the wave generator are always those of the perfect drive. Contacts of crowned
+teeth move over the flanks with their forces, but not with the errors: a tilt of an
+arcminute moves them by a tenth of the distance of two planes.
 """
 
 from __future__ import annotations
@@ -11,11 +13,12 @@ import numpy as np
 from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.condensation import condense
+from swgjoint.fe.solid.flank_points import FlankPoints
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent
-from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.typing import Mask
 
 REACH = 0.03
@@ -49,14 +52,21 @@ def influence(
         )
     linear = linearise(model, state)
     contacts, carries = _tooth_contacts(model, linear, state)
-    n = len(contacts)
     condensed = condense(model, state, linear, SolidTangent(model, linear), contacts)
-    # the member that is not the output is fixed
-    used = np.append(np.arange(n), n + 1 if circular_spline_is_output else n)
-    offset = condensed.offset[used]
+    # the member that is not the output is fixed, and slopes follow the contacts
+    every, n = len(contacts), len(carries)
+    used = np.append(np.arange(n), every + 1 if circular_spline_is_output else every)
+    slopes = np.arange(n, every)
+    through = np.linalg.solve(
+        condensed.system[np.ix_(slopes, slopes)], condensed.system[slopes]
+    )
+    system = condensed.system - condensed.system[:, slopes] @ through
+    offset = condensed.offset - condensed.offset[slopes] @ through
+    offset = offset[used]
     offset[n] -= state.torque
+    contacts = contacts.chosen(np.arange(n))
     return pivot_system(
-        condensed.system[np.ix_(used, used)],
+        system[np.ix_(used, used)],
         offset,
         _gaps(model, state, contacts, carries),
         closed_supports=np.zeros(0, dtype=bool),
@@ -91,7 +101,7 @@ def _gaps(
 def _tooth_contacts(
     model: SolidSectorModel, linear: SolidLinearised, state: SolidState
 ) -> tuple[ToothRows, Mask]:
-    """Contact points within reach, and a mask of those that carry force."""
+    """Contacts within reach, and a mask of those that carry force, without slopes."""
     held = state.held
     if held is None or not len(held):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
@@ -103,10 +113,17 @@ def _tooth_contacts(
         held,
         thorough=True,
         circular_spline_rotation=state.circular_spline_rotation,
+        held_force=state.tooth_force,
     )
-    carries = np.zeros(len(possible), dtype=bool)
-    for plane in np.unique(held.plane):
-        here = np.flatnonzero(possible.plane == plane)
-        own = held.contacts.chosen(np.flatnonzero(held.plane == plane))
-        carries[here[own.nearest_in(possible.contacts.chosen(here))]] = True
+    contacts = len(possible) - possible.slopes
+    z = model.strip.mesh.teeth.z
+    old, new = (
+        FlankPoints.from_contacts(
+            rows.contacts, (rows.z - z[0]) / (z[1] - z[0]), len(z)
+        )
+        for rows in (held, possible.chosen(np.arange(contacts)))
+    )
+    carries = np.zeros(contacts, dtype=bool)
+    low, high = model.strip.flank_range
+    carries[old.nearest_in(new, high - low)] = True
     return possible, carries

@@ -71,8 +71,10 @@ def test_map_of_a_flawed_drive_with_play(
 ):
     """The map meets full solves that it has not seen; low orders are even.
 
-    Two linearised positions in a pitch leave 0.06 of the turn of the output and 0.08 of
-    its energy, four of them 0.04; a wrong sign leaves as much as there is.
+    Two linearised positions in a pitch leave 0.05 of the turn of the output. Crowned
+    teeth ripple little: the map misses 2.4e-3 of the input torque T/i, when teeth
+    touched in the planes of the mesh alone and the ripple was 14 times as large it
+    missed 1.2e-3; a wrong sign leaves as much as there is.
     """
     monkeypatch.setattr(tolerance_sampling, "influences", lambda *a, **k: at_both_ends)
     monkeypatch.setitem(tolerance_sampling.PHASES, "3d", 2)
@@ -81,7 +83,8 @@ def test_map_of_a_flawed_drive_with_play(
     # four angles alias: teeth come into contact one after the other on coarse flanks
     drive = fit_map(small_pattern(design))
     assert drive.info["residual"]["relative_to_turn"] < 0.1
-    assert drive.info["energy_check"]["relative"] < 0.1
+    missed = drive.info["energy_check"]["input_torque_error_Nm"]
+    assert missed < 3e-3 * drive.ratings.rated_torque / 20
     assert drive.info["tolerances"]["free_positions"] == 42 * 2
     assert drive.info["label"]["tolerances"]["misalignment_arcmin"] == 1.0
     sizes = np.hypot(*drive.kinematic_error.T)
@@ -92,12 +95,17 @@ def test_map_of_a_flawed_drive_with_play(
 
 
 @pytest.mark.parametrize(
-    ("crowning", "position"), [(45.0, 0.0), (45.0, 1.0 / 3.0), (34.0, 0.0)]
+    ("crowning", "position", "loads"),
+    [(45.0, 0.0, (4.0 * TORQUE,)), (45.0, 1.0 / 3.0, (4.0 * TORQUE,)), (34.0, 0.0, ())],
 )
-def test_single_contact_at_either_end_of_the_play(small_design, crowning, position):
+def test_single_contact_at_either_end_of_the_play(
+    small_design, crowning, position, loads
+):
     """The eccentric lobe alone holds a torque: its contact shifts and may open.
 
-    At 34 µm the play is 2 µrad, a fiftieth of the deflection under the torques.
+    At 34 µm the play is 2 µrad, a fiftieth of the deflection under the small torque.
+    Its contact passes to other teeth at once: the drive linearised there turns by 14 %
+    too much under a hundredfold torque, at which maps linearise the drive again.
     """
     design = with_play(small_design).with_changes(
         {
@@ -118,7 +126,7 @@ def test_single_contact_at_either_end_of_the_play(small_design, crowning, positi
         at = follow.influence(state)
         gaps = np.stack([np.zeros(len(at.sector)), at.gap_change(*errors)])
         apart, moved, opened = [], [], []
-        for torque in (state.torque, 4.0 * TORQUE * np.sign(state.torque)):
+        for torque in (state.torque, *(np.sign(state.torque) * load for load in loads)):
             found = at.respond(gaps, torque)
             full = flawed.to_torque(state, torque)
             perfect = follow.to_torque(state, torque)
@@ -129,7 +137,8 @@ def test_single_contact_at_either_end_of_the_play(small_design, crowning, positi
             opened.append(found.active[:, at.closed].any())
         assert not any(opened)
         # few teeth carry these torques, on crowned flanks
-        assert np.abs(apart).max() < 0.05 * np.ptp(moved)
+        turned = max(np.ptp(moved), np.ptp([side.rotation for side in rest.sides]))
+        assert np.abs(apart).max() < 0.05 * turned
         # if the tooth is far too thin, the contact opens and another tooth holds
         wide = gaps[1:] + 2e-5 * at.closed
         assert at.respond(wide, 4.0 * state.torque).active[0, at.closed].all()

@@ -97,7 +97,7 @@ def solid_torsion(
             [
                 series * torque - follow.output_angle(state),
                 state.compliance + series,
-                _tooth_centre(model, state) / width,
+                _tooth_centre(state) / width,
                 model.copies * float(forces.sum()),
                 bore_centre(model, state) / width,
                 0 if state.ball_force is None else np.sum(state.ball_force > 0.0),
@@ -114,12 +114,11 @@ def solid_torsion(
     )
 
 
-def _tooth_centre(model: SolidSectorModel, state: SolidState) -> float:
+def _tooth_centre(state: SolidState) -> float:
     """Axial centre of the tooth forces [m]; NaN without tooth contact."""
     if state.held is None:
         return float("nan")
-    z = model.strip.mesh.teeth.z[state.held.plane]
-    return float(state.tooth_force @ z / state.tooth_force.sum())
+    return float(state.tooth_force @ state.held.z / state.tooth_force.sum())
 
 
 def bore_centre(model: SolidSectorModel, state: SolidState) -> float:
