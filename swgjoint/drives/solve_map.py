@@ -51,7 +51,7 @@ def solve_map(
     """
     check_level(design, model)
     if model == "3d":
-        minutes = "about 10 min" if has_errors(design) else "2 to 5 min"
+        minutes = "10 to 20 min" if has_errors(design) else "2 to 5 min"
         hint = f"takes {minutes}; 2d and ring are faster"
         progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
     if model == "ring":
