@@ -14,6 +14,8 @@ import pytest
 
 CXX = os.environ.get("CXX", "g++")
 KERNELS = Path(__file__).parents[2] / "swgjoint/kernels"
+SHARED = ("lanes", "local_sums")
+"""Sources that the loops have in common with the plugin."""
 HEADERS = Path(sysconfig.get_path("include"))
 PROGRAM = """
 import importlib.util, sys
@@ -48,12 +50,17 @@ def library(name: str) -> str:
 
 def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
     """The module with both sanitizers; ``change`` is a file, a text and another one."""
-    for path in [*KERNELS.glob("*.cc"), *KERNELS.glob("*.h")]:
+    shared = [KERNELS.parent / "plugin" / f"{name}.cc" for name in SHARED]
+    for path in [*KERNELS.glob("*.cc"), *KERNELS.glob("*.h"), *shared]:
         text = path.read_text(encoding="utf-8")
         if change and path.name == change[0]:
             assert text.count(change[1]) == 1
             text = text.replace(change[1], change[2])
-        (folder / path.name).write_text(text, encoding="utf-8")
+        (folder / path.parent.name).mkdir(exist_ok=True)
+        (folder / path.parent.name / path.name).write_text(text, encoding="utf-8")
+    for path in shared:
+        header = path.with_suffix(".h")
+        shutil.copy(header, folder / "plugin" / header.name)
     spec = find_spec("nanobind")
     assert spec is not None and spec.submodule_search_locations
     nanobind = Path(spec.submodule_search_locations[0])
@@ -62,7 +69,7 @@ def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
     options += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     options += ["-fno-sanitize=vptr", "-D_GLIBCXX_ASSERTIONS"]
     include = [nanobind / "include", nanobind / "ext/robin_map/include", HEADERS]
-    sources = [nanobind / "src/nb_combined.cpp", *sorted(folder.glob("*.cc"))]
+    sources = [nanobind / "src/nb_combined.cpp", *sorted(folder.glob("*/*.cc"))]
     subprocess.run(
         [CXX, *options, *(f"-I{path}" for path in include), *sources, "-o", out],
         check=True,
