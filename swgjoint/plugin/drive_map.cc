@@ -9,14 +9,6 @@
 namespace swgjoint {
 namespace {
 
-// Whether the processor has vectors for eight numbers. The others add the two halves of
-// such vectors one after the other, with the same bits.
-#if defined(SWGJOINT_WIDE_CLONES)
-const bool kHasWide = __builtin_cpu_supports("x86-64-v4");
-#else
-constexpr bool kHasWide = false;
-#endif
-
 // The mean torque between two torsions that belong to one polynomial of the potential,
 // and its derivative by the second torsion.
 SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {

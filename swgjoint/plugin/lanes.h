@@ -28,6 +28,14 @@ namespace swgjoint {
 
 constexpr int kLanes = 4, kWideLanes = 8;
 
+// Whether the processor has vectors for eight numbers. The others add the two halves of
+// such vectors one after the other, with the same bits.
+#if defined(SWGJOINT_WIDE_CLONES)
+const bool kHasWide = __builtin_cpu_supports("x86-64-v4");
+#else
+constexpr bool kHasWide = false;
+#endif
+
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(8 * kLanes)));
 typedef double Wide __attribute__((vector_size(8 * kWideLanes)));

@@ -9,12 +9,6 @@
 namespace swgjoint {
 namespace {
 
-#if defined(SWGJOINT_WIDE_CLONES)
-const bool kHasWide = __builtin_cpu_supports("x86-64-v4");
-#else
-constexpr bool kHasWide = false;
-#endif
-
 // Multiplies sums of (A - i B) exp(i m c) m^d/d! by i^d.
 template <class V>
 SWGJOINT_INLINE void TurnBy(int d, const V& x, const V& y, V* re, V* im) {
