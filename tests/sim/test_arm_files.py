@@ -208,7 +208,8 @@ def test_a_body_with_a_mass_alone_becomes_a_sphere_when_asked(kind, tmp_path):
     path.write_text(text)
     with pytest.raises(InputError, match=naming("mjMINVAL", "--balance-inertia")):
         RigidArm(str(path))
-    arm = RigidArm(str(path), reading=ArmReading(balance_inertia=True))
+    with pytest.warns(UserWarning, match=naming("water", "upper", "kg·m²")):
+        arm = RigidArm(str(path), reading=ArmReading(balance_inertia=True))
     body = arm.model.body("upper")
     radius = (3.0 * body.mass[0] / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
     np.testing.assert_allclose(body.inertia, 0.4 * body.mass[0] * radius**2)

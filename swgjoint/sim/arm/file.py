@@ -82,7 +82,7 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
     """The arm in a file, see :func:`read_arm`."""
     spec = open_model(path)
     if reading.balance_inertia:
-        _balance_inertia(spec)
+        _balance_inertia(spec, path)
     _check_references(spec, path)
     limits = _effort(spec)
     for name, limit in limits.items():
@@ -176,27 +176,39 @@ def _forget_actuators(spec: mujoco.MjSpec) -> None:
         setattr(own, key, getattr(plain, key))
 
 
-def _balance_inertia(spec: mujoco.MjSpec) -> None:
+def _balance_inertia(spec: mujoco.MjSpec, path: Path) -> None:
     """Replace the moments of inertia of impossible rigid bodies.
 
     Their mean replaces the moments; a body that has a mass alone becomes a solid sphere
-    with the density of water.
+    with the density of water, which a warning states.
     """
     # the compiler replaces moments that violate the triangle inequality; the loop
     # replaces inertia tensors that are zero or not positive definite
     spec.compiler.balanceinertia = True
+    spheres = []
     for body in spec.bodies:
         full = np.array(body.fullinertia)
         if not np.isfinite(full).all():  # the file states principal moments, or none
-            if body.explicitinertial and not np.any(body.inertia):
+            if body.explicitinertial and body.mass > 0.0 and not any(body.inertia):
                 body.inertia = 3 * [_sphere_inertia(body.mass)]
+                spheres.append(body)
             continue
         xx, yy, zz, xy, xz, yz = full
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if not full.any():
+        if body.mass > 0.0 and not full.any():
             body.fullinertia = [*3 * [_sphere_inertia(body.mass)], 0.0, 0.0, 0.0]
+            spheres.append(body)
         elif (xx + yy + zz) > 0.0 and np.linalg.eigvalsh(tensor)[0] <= 0.0:
             body.fullinertia = [*3 * [(xx + yy + zz) / 3.0], 0.0, 0.0, 0.0]
+    if spheres:
+        which = ", ".join(
+            f"{body.name} ({_sphere_inertia(body.mass):.3g} kg·m²)" for body in spheres
+        )
+        warnings.warn(
+            f"{path}: moments of inertia of solid spheres of water are assumed for"
+            f" bodies with a mass alone: {which}",
+            stacklevel=3,
+        )
 
 
 def _sphere_inertia(mass: float) -> float:
