@@ -8,9 +8,12 @@ import pytest
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.ellipse import Elliptical
+from swgjoint.gear.wave_generators.parabolic import Side, parabolic
 from swgjoint.gear.wave_generators.pieces import Arc, Line
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.kernels import kernels
+
+SIDE = Side(coefficient=9.7, length_coefficient=0.51, connector_radius=0.01)
 
 pytestmark = pytest.mark.skipif(
     kernels() is None, reason="the package was built without compiled loops"
@@ -58,9 +61,10 @@ def test_distance_from_a_circle():
     [
         wave_generator(Design.load("reference-2d-parabolic")),
         wave_generator(Design.load("reference-2d-asymmetric")),
+        parabolic(major=0.0311, minor=0.029, left=SIDE, right=SIDE, turn=0.05),
         wave_generator(Design.load("reference-2d-four-roller")).band,
     ],
-    ids=["parabolic", "asymmetric", "band"],
+    ids=["parabolic", "asymmetric", "rotated lobes", "band"],
 )
 def test_distances_from_chains_are_those_of_numpy(monkeypatch, outline):
     """Outside, inside as far as contact reaches, on the outline, at the junctions."""
