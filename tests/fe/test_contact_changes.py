@@ -49,6 +49,21 @@ def test_what_both_ends_predict_is_one_step_next_to_the_nearer_prediction():
     assert jump[8] > 0.98 * 3e-6
 
 
+def test_small_changes_of_a_contact_do_not_displace_a_large_one():
+    """A contact that changes by little first, according to one end only.
+
+    Paired in order of occurrence, the small change of one end would be merged with the
+    large one of the other, half-way between, and the large one of the first end halved.
+    """
+    first = changes((14.0, 3, 2e-9), (20.0, 3, 4e-6)).steps_between(LOW, HIGH)
+    last = changes((20.4, 3, 4.4e-6)).steps_between(LOW, HIGH)
+    both = Steps.merge(first, last)
+    large = both.jump > 1e-6
+    assert both.place[large] == pytest.approx([0.51], abs=5e-3)
+    assert both.jump[large] == pytest.approx([4.2e-6], abs=1e-7)
+    assert both.jump[~large].max() < 2e-9
+
+
 def test_predictions_seen_in_a_mirror_are_those_of_opposite_torques():
     """The same steps the other way round; twice gives the first ones."""
     seen = FIRST.mirror()

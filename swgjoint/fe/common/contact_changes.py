@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swgjoint.arrays import frozen_array
+from swgjoint.maps.fit.contact_corners import pair_changes
 from swgjoint.typing import Array, Index
 
 LONE = 0.3
@@ -87,7 +88,10 @@ class Steps:
             first: Steps that the equilibrium at the start of the interval predicts.
             last: Steps that the equilibrium at its end predicts.
         """
-        here, there = _pairs(first.contact, last.contact)
+        here, there = pair_changes(
+            (first.place, first.jump, first.contact),
+            (last.place, last.jump, last.contact),
+        )
         a, b = first.place[here], last.place[there]
         x = 0.5 * (a + b)
         weight = x**2 / (x**2 + (1.0 - x) ** 2)
@@ -146,14 +150,3 @@ class Steps:
             shift = np.clip(size * scales[: place.size], -size, size)
             place = np.clip(self.place + shift, 0.0, 1.0)
         return replace(self, place=place)
-
-
-def _pairs(first: Index, last: Index) -> tuple[Index, Index]:
-    """Indices of numbers that both arrays contain, paired in order of occurrence."""
-    here, there = list[int](), list[int]()
-    for number in np.unique(first):
-        one, two = np.flatnonzero(first == number), np.flatnonzero(last == number)
-        count = min(one.size, two.size)
-        here.extend(one[:count])
-        there.extend(two[:count])
-    return np.array(here, dtype=np.int64), np.array(there, dtype=np.int64)

@@ -71,7 +71,7 @@ class ContactCorners:
         """
         rows = [np.zeros((0, 5))]
         for k, (one, two) in enumerate(pairwise(changes)):
-            here, there = _pairs(one, two)
+            here, there = pair_changes(one, two)
             ends = np.stack([one[0][here], two[0][there]], axis=1)
             jump = 0.5 * (one[1][here] + two[1][there])
             step = np.broadcast_to([angle[k], angle[k + 1] - angle[k]], ends.shape)
@@ -134,13 +134,19 @@ class ContactCorners:
         return there, self.start[there] + way * self.step[there]
 
 
-def _pairs(
+def pair_changes(
     one: tuple[Array, Array, Index], two: tuple[Array, Array, Index]
 ) -> tuple[Index, Index]:
-    """Indices of the same contact changes at two angles.
+    """Indices of the same contact changes in two predictions.
 
-    Each is the nearest change of the same contact for the other one over the torque,
-    and their jumps are similar.
+    Each is, for the other one, the nearest change of the same contact in the same
+    direction, and their jumps are similar. Much smaller changes are no obstacle: a
+    contact may change several times, most of them by little.
+
+    Args:
+        one: Torques or places, jumps of the compliance [rad/(N·m)] and numbers of the
+            contacts of one prediction, each (n,).
+        two: The same of the other prediction, each (m,).
     """
     none = np.zeros(0, dtype=np.int64)
     if not one[0].size or not two[0].size:
@@ -148,10 +154,11 @@ def _pairs(
     jump, other = one[1][:, None], two[1]
     same = (jump * other > 0.0) & (one[2][:, None] == two[2])
     apart = np.where(same, np.abs(one[0][:, None] - two[0]), np.inf)
-    there = apart.argmin(axis=1)
+    not_less = ALIKE * np.abs(other) > np.abs(jump)
+    not_more = ALIKE * np.abs(jump) > np.abs(other)
+    there = np.where(not_less, apart, np.inf).argmin(axis=1)
+    back = np.where(not_more, apart, np.inf).argmin(axis=0)
     here = np.arange(there.size)
-    # a contact may change several times, which may be paired wrongly
-    sizes = np.abs(np.stack([one[1], two[1][there]]))
-    alike = sizes.max(axis=0) < ALIKE * sizes.min(axis=0)
-    mutual = (apart.argmin(axis=0)[there] == here) & np.isfinite(apart[here, there])
+    alike = not_less[here, there] & not_more[here, there]
+    mutual = (back[there] == here) & np.isfinite(apart[here, there])
     return here[mutual & alike], there[mutual & alike]
