@@ -26,6 +26,7 @@ from swgjoint.fe.plane.race import RaceForces
 from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     SolidFrames,
+    dead_load_tangent,
     matrices_in_global,
     project_to_frames,
     rotate_to_global,
@@ -35,6 +36,7 @@ from swgjoint.fe.solid.corotation import tangent as stiffness
 from swgjoint.fe.solid.sector_matrices import SectorMatrices
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.wave_generator.turning import sliding_tangent
 from swgjoint.typing import Array, Index, Mask
 
 
@@ -63,6 +65,9 @@ class BoreContact:
     """Mask of the points that touch (N, p)."""
     points: Index
     """Points that touch, then others that fill the rows (N, a)."""
+    weight: Array
+    """Weights of the nodes in the gaps at these points, zero at points that do not
+    touch (N, a, b) [-]."""
     rows: Array
     """Derivative B of the gaps at these points by the masters of the toothed segment in
     the global frame, and by the 16 coordinates of a race if there is one (N, a, 3 m) or
@@ -77,6 +82,9 @@ class BoreContact:
     """Frames of the toothed segments."""
     carry: Array
     """Displacements of the bore nodes by the masters in the frames (3 b, 3 m) [-]."""
+    place: Array
+    """Positions of the nodes in the frames, relative to the mean of the masters
+    (N, b, 3) [m]."""
     arm: Array
     """Derivative of the gaps at the nodes by a rotation of the bore in the frames
     (N, b, 3) [m]."""
@@ -140,6 +148,12 @@ class BoreContact:
         size = pressure[:, :b] + np.einsum("svb,sv->sb", self.vertex, pressure[:, b:])
         return np.asarray((size[..., None] * self.normal).reshape(len(size), -1))
 
+    def size(self, state: SolidState) -> Array:
+        """Contact forces at ``points`` (N, a) [N]; zero at slopes."""
+        b, p = self.normal.shape[1], self.gap.shape[1]
+        at = self.among_points(state.pressure)
+        return np.where(self.points < (b + p) // 2, at, 0.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidLinearised:
@@ -191,18 +205,28 @@ def linearise(
     ):
         dofs = model.dofs(segment.masters)
         elastic = frame.deformation @ segment.stiffness
-        total = elastic
-        if number == 0:
-            total = elastic - loads @ segment.loaded_from_masters
         gradient[:, dofs] += rotate_to_global(frame, project_to_frames(frame, elastic))
         if tangent:
-            local = stiffness(segment, frame, total)
+            acting, turned = elastic, np.zeros(())
+            if number == 0:
+                acting = elastic - loads @ segment.loaded_from_masters
+            force = project_to_frames(frame, acting)
+            if number == 0:  # forces on the bore do not turn with the frame
+                push = state.bore_force.reshape(bore.place.shape)
+                moment, turned = dead_load_tangent(frame, bore.carry, bore.place, push)
+                force += moment
+            local = stiffness(segment, frame, force) + turned
             terms.append((dofs, matrices_in_global(frame, local)))
     into, held = model.contact_dofs, bore.inverse @ bore.rows
     free = bore.among_points(bore.free_gap)
     pushed[:, into] += (free[:, None] @ held)[:, 0]
     if tangent:
-        terms.append((into, bore.rows.transpose(0, 2, 1) @ held))
+        pressed = bore.rows.transpose(0, 2, 1) @ held
+        if model.nonlinear and bore.active.any():
+            pressed += sliding_tangent(
+                model, state, bore.frame, bore.place, bore.weight, bore.size(state)
+            )
+        terms.append((into, pressed))
     race = None
     if model.race is not None and state.race is not None:
         race, dofs = (
@@ -275,8 +299,8 @@ def bore_contact(
     # their derivatives by the masters: deformation and rotation of the frame
     carry, m = teeth.loaded_from_masters[first:], frame.position.shape[1]
     carried = (push @ carry).reshape(n, touching, 3 * m)
-    middle = local - frame.centre[:, None] - teeth.position.mean(axis=0)
-    arm = np.cross(middle, normal)
+    place = local - frame.centre[:, None] - teeth.position.mean(axis=0)
+    arm = np.cross(place, normal)
     spun = spin(frame.position).reshape(n, 3 * m, 3)
     rows = carried + (weight @ arm + carried @ spun) @ frame.gradient
     rows = rows.reshape(n, touching * m, 3) @ frame.turn.transpose(0, 2, 1)
@@ -312,12 +336,14 @@ def bore_contact(
         present=present,
         active=active,
         points=points,
+        weight=weight,
         rows=rows,
         free_gap=with_vertices(free),
         compliance=w,
         inverse=inverse,
         frame=frame,
         carry=carry,
+        place=place,
         arm=arm,
         by_race=by_race,
     )

@@ -263,3 +263,25 @@ class SolidRace:
         by_race[..., PLANE] = by_line.reshape(*gap.shape, 8)
         by_race[..., ROLL] = by_edge
         return gap, by_point, by_race
+
+    def sliding(
+        self, race: Array, points: Array, start: Array
+    ) -> tuple[Array, Array, Array]:
+        """Second derivative of the gaps, see :meth:`RaceOutside.sliding`.
+
+        Args:
+            race: Coordinates (N, 2, 4) [m].
+            points: Bore nodes of every sector in the global frame (N, b, 3) [m].
+            start: Initial guess of their parameters on the elements, 0 to 1 (b,) [-].
+
+        Returns:
+            Coefficients of the quadratic form of sliding and turn (N, b, 2, 2), the
+            derivative of the sliding by the points (N, b, 3), and the derivatives of
+            sliding and turn by the coordinates of both nodes of the elements (N, b, 2,
+            16).
+        """
+        line = self.elements(race)[:, PLANE].reshape(-1, 4, 2)
+        form, by_point, by_line = self.outside.sliding(line, points, start)
+        by_race = np.zeros((*form.shape[:3], 2 * NODE))
+        by_race[..., PLANE] = by_line.reshape(*form.shape[:3], 8)
+        return form, by_point, by_race

@@ -72,21 +72,11 @@ class RaceOutside:
             Gap (N, b) [m], and its derivatives by the points (N, b, 3), by the mean
             line (N, b, 4, 2) and by u (N, b, 4) [-].
         """
-        # feet of the points on the mean line, by Newton's method
-        flat, z = points[..., :2], points[..., 2]
-        xi = np.broadcast_to(start, z.shape).copy()
-        for _ in range(8):
-            value, first, second = hermite(xi)
-            r, v, w = (h @ line for h in (value, first, second))
-            rest = flat - r
-            step = np.sum(rest * v, axis=-1) / np.sum(v * v - rest * w, axis=-1)
-            xi += np.clip(step, -1.0, 1.0)
-            if np.abs(step).max() < 1e-12:
-                break
+        value, first, second = hermite(self._foot(line, points, start))
         # distance from the mean line, roll at the foot and its derivative along the
         # outside
-        value, first, second = hermite(xi)
         r, v, w = (h @ line for h in (value, first, second))
+        flat, z = points[..., :2], points[..., 2]
         length = np.hypot(v[..., 0], v[..., 1])
         tangent = v / length[..., None]
         normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1)
@@ -106,3 +96,63 @@ class RaceOutside:
         moved = -value[..., :, None] * by_point[..., None, :2]
         moved -= (turn * first)[..., :, None] * normal[..., None, :]
         return gap, by_point, moved, -lever[..., None] * value
+
+    def sliding(
+        self, line: Array, points: Array, start: Array
+    ) -> tuple[Array, Array, Array]:
+        r"""Second derivative of the gap of points to the outside, without roll.
+
+        If a point slides by :math:`\sigma` along the mean line and the line turns by
+        :math:`\vartheta` towards it, the gap changes to second order by half of
+
+        .. math:: \frac{\kappa\sigma^2 - 2\sigma\vartheta - D\vartheta^2}
+            {1 + \kappa D}
+
+        with the distance D and the curvature :math:`\kappa` of the line.
+
+        Args:
+            line: Mean line by element, see :meth:`gap` (N, 4, 2) [m].
+            points: Points of every sector in the global frame (N, b, 3) [m].
+            start: Initial guess of their parameters on the elements, 0 to 1 (b,) [-].
+
+        Returns:
+            Coefficients (N, b, 2, 2) of the quadratic form of sliding and turn, the
+            derivative of the sliding by the points (N, b, 3), and the derivatives of
+            sliding and turn by the mean line (N, b, 2, 4, 2).
+        """
+        value, first, second = hermite(self._foot(line, points, start))
+        r, v, w = (h @ line for h in (value, first, second))
+        length = np.hypot(v[..., 0], v[..., 1])
+        tangent = v / length[..., None]
+        normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1)
+        distance = np.sum((points[..., :2] - r) * normal, axis=-1)
+        curvature = -np.sum(normal * w, axis=-1) / length**2
+        ones = np.ones_like(distance)
+        form = np.stack([curvature, -ones, -ones, -distance], axis=-1)
+        form /= (1.0 + curvature * distance)[..., None]
+        by_point = np.concatenate([tangent, 0.0 * ones[..., None]], axis=-1)
+        slope = first / length[..., None]
+        by_line = np.stack(
+            [
+                -value[..., :, None] * tangent[..., None, :],
+                slope[..., :, None] * normal[..., None, :],
+            ],
+            axis=2,
+        )
+        return form.reshape(*distance.shape, 2, 2), by_point, by_line
+
+    def _foot(self, line: Array, points: Array, start: Array) -> Array:
+        """Parameters of the feet of points on the mean line (N, b) [-].
+
+        Found by Newton's method.
+        """
+        flat = points[..., :2]
+        xi = np.broadcast_to(start, flat.shape[:2]).copy()
+        for _ in range(8):
+            r, v, w = (h @ line for h in hermite(xi))
+            rest = flat - r
+            step = np.sum(rest * v, axis=-1) / np.sum(v * v - rest * w, axis=-1)
+            xi += np.clip(step, -1.0, 1.0)
+            if np.abs(step).max() < 1e-12:
+                break
+        return np.asarray(xi)
