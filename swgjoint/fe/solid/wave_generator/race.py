@@ -264,10 +264,10 @@ class SolidRace:
         by_race[..., ROLL] = by_edge
         return gap, by_point, by_race
 
-    def sliding(
+    def bend_gap(
         self, race: Array, points: Array, start: Array
     ) -> tuple[Array, Array, Array]:
-        """Second derivative of the gaps, see :meth:`RaceOutside.sliding`.
+        """Second derivative of the gaps, see :meth:`RaceOutside.bend_gap`.
 
         Args:
             race: Coordinates (N, 2, 4) [m].
@@ -281,7 +281,7 @@ class SolidRace:
             16).
         """
         line = self.elements(race)[:, PLANE].reshape(-1, 4, 2)
-        form, by_point, by_line = self.outside.sliding(line, points, start)
+        form, by_point, by_line = self.outside.bend_gap(line, points, start)
         by_race = np.zeros((*form.shape[:3], 2 * NODE))
         by_race[..., PLANE] = by_line.reshape(*form.shape[:3], 8)
         return form, by_point, by_race

@@ -97,7 +97,7 @@ class RaceOutside:
         moved -= (turn * first)[..., :, None] * normal[..., None, :]
         return gap, by_point, moved, -lever[..., None] * value
 
-    def sliding(
+    def bend_gap(
         self, line: Array, points: Array, start: Array
     ) -> tuple[Array, Array, Array]:
         r"""Second derivative of the gap of points to the outside, without roll.

@@ -47,7 +47,9 @@ def sliding_tangent(
     points = np.einsum("sij,spj->spi", frame.turn, local)
     # second derivative of the gaps by sliding, and by the turn of a race
     if model.race is not None and state.race is not None:
-        form, along, by_race = model.race.sliding(state.race, points, model.bore_places)
+        form, along, by_race = model.race.bend_gap(
+            state.race, points, model.bore_places
+        )
     else:
         _, normal, curvature = model.wave_generator.gap(
             points.reshape(-1, 3), state.wave_generator_angle
