@@ -168,7 +168,7 @@ SWGJOINT_INLINE void DriveMap::CombineBlocks(int segment, const double* weight,
     const double* by = weight + part;
     // data() is used because a map without harmonics has an empty table
     const double* row =
-        table_.data() + static_cast<size_t>(segment) * blocks_ * size.block() + part;
+        table_->data() + static_cast<size_t>(segment) * blocks_ * size.block() + part;
     for (int b = 0; b < blocks_; ++b, row += size.block(), by += size.weights()) {
       V wc, ws, even, odd;
       Load(by, &wc);
@@ -212,7 +212,7 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
   const double per_step = still ? 0 : 2 / dtheta;
   for (int part = 0; part < kSize; part += width) {
     const double* row =
-        table_.data() + static_cast<size_t>(j0_) * blocks_ * size.block() + part;
+        table_->data() + static_cast<size_t>(j0_) * blocks_ * size.block() + part;
     const double* own = harmonics_.data() + part;
     double* weight = weight_.data() + part;
     V w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
@@ -288,7 +288,7 @@ void DriveMap::Add(int segment, Weighting by, double out[5]) {
   }
   if (segment != totals_of_) {
     const size_t row = static_cast<size_t>(segment) * blocks_ * size_.block();
-    local_.Sum(segment, table_.data() + row, &totals_);
+    local_.Sum(segment, table_->data() + row, &totals_);
     totals_of_ = segment;
   }
   const double* sums = by == Weighting::kMean    ? totals_.mean

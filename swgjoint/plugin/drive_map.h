@@ -3,6 +3,8 @@
 #ifndef SWGJOINT_PLUGIN_DRIVE_MAP_H_
 #define SWGJOINT_PLUGIN_DRIVE_MAP_H_
 
+#include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -101,6 +103,10 @@ class DriveMap {
  private:
   // Number of harmonics above which blocks are wide.
   static constexpr int kMany = 128;
+  // Length of the texts above which maps are looked for that have the same ones.
+  static constexpr size_t kLongTexts = 100000;
+
+  struct Origin;
 
   // Rule that computes cos and sin of one block of harmonics from those of an earlier
   // block, if all four orders differ from it by the same amount.
@@ -111,6 +117,7 @@ class DriveMap {
 
   enum class Weighting { kMean, kTheta, kPsi };  // in the order of the weights
 
+  bool Read(const DriveText& text, std::string* error);
   void FindRecipes(const std::vector<double>& orders);
   int Segment(double torsion) const;
   // The same, but tests a guess first, because the torsion rarely leaves its segment
@@ -150,8 +157,10 @@ class DriveMap {
   std::vector<double> base_;   // (segments) torsion origin of each polynomial
   std::vector<double> low_, high_;  // (segments) bounds of the open interval
   LaneVector mean_;                 // (segments, mean)
-  LaneVector table_;                // (segments, blocks, block)
+  // (segments, blocks, block), never null once a map is read
+  std::shared_ptr<const LaneVector> table_;
   LaneVector harmonics_;            // (blocks, harmonics), padded with zeros
+  std::shared_ptr<const Origin> origin_;  // map that this one is a copy of, or null
   double error_mean_ = 0;
   std::vector<Recipe> recipe_;  // one per block
 

@@ -7,7 +7,11 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <memory>
+#include <mutex>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "drive_map.h"
 #include "lanes.h"
@@ -102,7 +106,60 @@ bool ParseNumbers(const char* text, std::vector<double>* out) {
   }
 }
 
+// A map of many harmonics as it was read, and its texts, which end with zeros.
+struct DriveMap::Origin {
+  std::string texts;
+  DriveMap map;
+};
+
+// The joints of an arm often have the same map, and an engine makes its data several
+// times. A map of many harmonics, which takes long to read and has a large table, is
+// therefore copied from one in use that has the same texts, and shares its table.
 bool DriveMap::Parse(const DriveText& text, std::string* error) {
+  static std::mutex mutex;
+  static std::vector<std::weak_ptr<const Origin>> known;
+  const char* const parts[] = {text.ratio,     text.orders,        text.knots,
+                               text.potential, text.end_stiffness, text.kinematic_error};
+  size_t size = 0;
+  for (const char* part : parts) size += part ? std::strlen(part) + 1 : 0;
+  if (size > kLongTexts) {
+    std::vector<std::shared_ptr<const Origin>> used;
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      known.erase(std::remove_if(known.begin(), known.end(),
+                                 [](const auto& one) { return one.expired(); }),
+                  known.end());
+      for (const auto& one : known) used.push_back(one.lock());
+    }
+    for (const auto& one : used) {
+      if (!one || one->texts.size() != size) continue;
+      std::string_view rest = one->texts;
+      bool equal = true;
+      for (const char* part : parts) {
+        if (!part) continue;
+        const std::string_view own(part, std::strlen(part) + 1);
+        equal = equal && rest.substr(0, own.size()) == own;
+        rest.remove_prefix(std::min(own.size(), rest.size()));
+      }
+      if (!equal) continue;
+      *this = one->map;
+      origin_ = one;
+      return true;
+    }
+  }
+  if (!Read(text, error)) return false;
+  if (!many() || size <= kLongTexts) return true;
+  auto origin = std::make_shared<Origin>();
+  origin->texts.reserve(size);
+  for (const char* part : parts) origin->texts.append(part, std::strlen(part) + 1);
+  origin->map = *this;
+  origin_ = origin;
+  const std::lock_guard<std::mutex> lock(mutex);
+  known.push_back(origin);
+  return true;
+}
+
+bool DriveMap::Read(const DriveText& text, std::string* error) {
   std::vector<double> list, orders;
   if (!Numbers(text.ratio, "ratio", 1, &list, error)) return false;
   ratio_ = list[0];
@@ -163,7 +220,9 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
   high_.assign(segments_, std::numeric_limits<double>::infinity());
   mean_.assign(static_cast<size_t>(segments_) * size_.mean(), 0.0);
-  table_.assign(static_cast<size_t>(segments_) * blocks_ * size_.block(), 0.0);
+  auto table = std::make_shared<LaneVector>(
+      static_cast<size_t>(segments_) * blocks_ * size_.block(), 0.0);
+  table_ = table;
   for (int seg = 0; seg < segments_; ++seg) {
     base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
     if (seg > 0) low_[seg] = knots_[seg - 1];
@@ -188,7 +247,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
         }
         const int block = (k - 1) / lanes, lane = (k - 1) % lanes;
         const size_t place = static_cast<size_t>(seg) * blocks_ + block;
-        double* row = &table_[place * size_.block()];
+        double* row = &(*table)[place * size_.block()];
         for (int p = 0; p < 5; ++p) row[(2 * p + ab) * lanes + lane] = to[p];
       }
     }
