@@ -82,8 +82,9 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
 
     The picture of the demo is drawn; those of its report have tests of their own.
     """
-    for picture in ("report.joint_png", "tables.spec_picture"):
-        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
+    report, png = "swgjoint.view.report.", b"\x89PNG"
+    monkeypatch.setattr(report + "report.joint_pngs", lambda _, all: [png for _ in all])
+    monkeypatch.setattr(report + "tables.spec_picture", lambda *_: png)
     soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
     maps = {"size-25-100-bought": synthetic_map, "size-25-100-bought-coarse": soft}
 

@@ -4,6 +4,7 @@ import base64
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.own_drives import scene_of_run
 from swgjoint.sim.run import Run
-from swgjoint.view.report.plots import envelope
+from swgjoint.view.report.plots import envelope, joint_pngs
 from swgjoint.view.report.report import write_report
 from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.run import run_scene
@@ -22,6 +23,7 @@ from swgjoint.view.validity import STEP_KEYS, step_error
 from swgjoint.view.words import format_figure, words
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
+PNG = b"\x89PNG"
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 
 
@@ -74,8 +76,9 @@ def written(synthetic_map: DriveMap, tmp_path) -> tuple[Run, str]:
 @pytest.fixture
 def without_pictures(monkeypatch):
     """The first bytes of a PNG in place of every picture."""
-    for picture in ("report.joint_png", "tables.spec_picture"):
-        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
+    report = "swgjoint.view.report."
+    monkeypatch.setattr(report + "report.joint_pngs", lambda _, all: [PNG for _ in all])
+    monkeypatch.setattr(report + "tables.spec_picture", lambda *_: PNG)
 
 
 def test_the_page_needs_nothing_else(written):
@@ -191,10 +194,24 @@ def test_the_report_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise RuntimeError("no picture")
 
-    monkeypatch.setattr("swgjoint.view.report.report.joint_png", fail)
+    monkeypatch.setattr("swgjoint.view.report.report.joint_pngs", fail)
     with pytest.raises(RuntimeError, match="no picture"):
         write_report({"": run}, tmp_path / "report.html", check_step=False)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_picture_of_a_joint_does_not_depend_on_those_before(synthetic_map):
+    """Neither its lines nor its axes; one joint rests and has no spectrum."""
+    run = run_scene(
+        "ur5e-sweep",
+        overrides={"simulation.duration_s": 4.0, "trajectory.end_deg.wrist_3_joint": 0},
+        drives={"reference-2d": synthetic_map},
+    )
+    joints = ["elbow_joint", "wrist_3_joint", "wrist_1_joint", "elbow_joint"]
+    runs = {"a": run, "b": run}
+    found = list(joint_pngs(runs, joints))
+    assert found == [next(joint_pngs(runs, [joint])) for joint in joints]
+    assert len(set(found)) == 3
 
 
 def test_a_thinned_line_keeps_every_peak():
@@ -207,6 +224,13 @@ def test_a_thinned_line_keeps_every_peak():
     assert thin_y.max() == 3.0 and thin_y.min() == -4.0
     assert thin_x[thin_y.argmax()] == x[31_234]
     assert envelope(x[:100], y[:100])[1].size == 100
+    # by pieces, one after the other
+    edges = np.linspace(0, y.size, 1501).astype(int)
+    pieces = [(low, y[low:high]) for low, high in pairwise(edges)]
+    rows = {0, y.size - 1}
+    rows |= {low + int(piece.argmin()) for low, piece in pieces}
+    rows |= {low + int(piece.argmax()) for low, piece in pieces}
+    assert thin_x.tolist() == x[sorted(rows)].tolist()
 
 
 def test_figures_read_as_people_write_them():

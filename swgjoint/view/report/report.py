@@ -16,7 +16,7 @@ from swgjoint.view.gauges import gauge_picture, gauge_tables
 from swgjoint.view.life.picture import life_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
 from swgjoint.view.report.life import bearing_tables, life_tables
-from swgjoint.view.report.plots import joint_png
+from swgjoint.view.report.plots import joint_pngs
 from swgjoint.view.report.tables import (
     Table,
     _joint_table,
@@ -85,11 +85,11 @@ def write_report(
         labels.append(label_table(label, run, step_error(run) if check_step else None))
         count()
     panels = []
-    for joint in joints:
+    for joint, picture in zip(joints, joint_pngs(runs, joints), strict=True):
         panels.append(
             {
                 "title": short(joint),
-                "picture": inline_picture(joint_png(runs, joint)),
+                "picture": inline_picture(picture),
                 "table": _joint_table(runs, joint),
             }
         )
