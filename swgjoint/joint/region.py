@@ -84,7 +84,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import sticking_stiffness
-from swgjoint.maps.phase_bounds import MANY, largest_sums
+from swgjoint.maps.phase_bounds import MANY, largest_sums, largest_total
 from swgjoint.typing import Array
 
 MAX_SUB_STEPS = 64
@@ -315,7 +315,7 @@ def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:
     n = (drive.angle_orders[1:] @ [1.0, 1.0 / drive.ratio])[:, None]
     by_theta = n * error[:, ::-1] * [1.0, -1.0]
     slope, of_error = largest_sums(orders, np.stack([by_theta, n**2 * error]))
-    of_energy = largest_sums(orders, n**2 * energy).max()
+    of_energy = largest_total(orders, n**2 * energy, np.zeros(len(energy)))
     return float(slope), float(peak * of_error + of_energy)
 
 

@@ -38,6 +38,8 @@ with fewer harmonics are the sums of their amplitudes."""
 POINTS = 6
 """Smallest number of points per period of the fastest harmonic; the denominator above
 is then at least cos²(pi/6) = 0.75."""
+COARSE = 4
+"""The same for the search of the largest of many sums."""
 _BLOCK = 64  # numbers of points are multiples of it, for a fast transform
 
 
@@ -54,14 +56,65 @@ def largest_sums(orders: NDArray[np.int64], amplitudes: Array) -> Array:
     bounds = np.hypot(amplitudes[..., 0], amplitudes[..., 1]).sum(axis=-1)
     if len(orders) <= MANY:
         return np.asarray(bounds)
+    found, least = _largest_at_points(orders, amplitudes, POINTS)
+    return np.minimum(bounds, found / least)
+
+
+def largest_total(
+    orders: NDArray[np.int64], amplitudes: Array, constants: Array
+) -> float:
+    """Largest of the sums of a constant and its bound of :func:`largest_sums`.
+
+    Bounds are evaluated only where the total can be the largest one. The amplitudes and
+    a coarse grid show where this is, in a third of the time of all bounds.
+
+    Args:
+        orders: Orders (p, q) of the harmonics (n, 2).
+        amplitudes: Cosine and sine amplitudes of m sums (m, n, 2).
+        constants: Constants in the unit of the amplitudes (m,).
+    """
+    if len(orders) > MANY:
+        most = constants + np.hypot(*np.moveaxis(amplitudes, -1, 0)).sum(axis=-1)
+        near = np.flatnonzero(most >= constants.max())
+        found, least = _largest_at_points(orders, amplitudes[near], COARSE)
+        least *= _least_share(orders, POINTS)
+        near = near[constants[near] + found / least >= (constants[near] + found).max()]
+        amplitudes, constants = amplitudes[near], constants[near]
+    return float((constants + largest_sums(orders, amplitudes)).max())
+
+
+def _points(orders: NDArray[np.int64], per_period: int) -> NDArray[np.int64]:
+    """Numbers of points per turn of alpha and beta (2,)."""
     degree = np.abs(orders).max(axis=0)
-    points = np.maximum(-(-POINTS * degree // _BLOCK) * _BLOCK, 1)
-    least = float(np.prod(np.cos(np.pi * degree / points)))
+    return np.maximum(-(-per_period * degree // _BLOCK) * _BLOCK, 1)
+
+
+def _least_share(orders: NDArray[np.int64], per_period: int) -> float:
+    """Smallest ratio of the largest value at points to the largest one at any phase."""
+    degree = np.abs(orders).max(axis=0)
+    return float(np.prod(np.cos(np.pi * degree / _points(orders, per_period))))
+
+
+def _largest_at_points(
+    orders: NDArray[np.int64], amplitudes: Array, per_period: int
+) -> tuple[Array, float]:
+    """Largest magnitude at points, and its :func:`_least_share`.
+
+    Args:
+        orders: Orders (p, q) of the harmonics (n, 2).
+        amplitudes: Cosine and sine amplitudes of m sums (m, n, 2).
+        per_period: Smallest number of points per period of the fastest harmonic.
+
+    Returns:
+        Largest magnitudes (m,), and the share.
+    """
+    points = _points(orders, per_period)
     # two real sums are the real and the imaginary part of one complex sum
     waves = 0.5 * (amplitudes[..., 0] - 1j * amplitudes[..., 1])
     mirrored = np.concatenate([orders, -orders])
     rows, row = np.unique(mirrored[:, 0], return_inverse=True)
     at = row * points[1] + mirrored[:, 1] % points[1]
+    largest = np.zeros(len(waves))
     for first in range(0, len(waves), 2):
         pair = waves[first : first + 2]
         factor = np.array([1.0, 1j])[: len(pair)]
@@ -73,9 +126,8 @@ def largest_sums(orders: NDArray[np.int64], amplitudes: Array) -> Array:
         grid[rows % points[0]] = np.fft.ifft(part, axis=1, norm="forward")
         values = np.fft.ifft(grid, axis=0, norm="forward")
         found = [np.abs(values.real).max(), np.abs(values.imag).max()][: len(pair)]
-        there = bounds[first : first + 2]
-        np.minimum(there, np.array(found) / least, out=there)
-    return np.asarray(bounds)
+        largest[first : first + 2] = found
+    return largest, _least_share(orders, per_period)
 
 
 def stiffness_range(drive: Potential) -> tuple[float, float]:

@@ -34,7 +34,7 @@ from swgjoint.maps import sums
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
-from swgjoint.maps.phase_bounds import MANY, largest_sums
+from swgjoint.maps.phase_bounds import MANY, largest_total
 from swgjoint.typing import Array, Index
 from swgjoint.units import arcmin
 
@@ -315,8 +315,7 @@ class Potential:
         inside = self.coefficients(np.unique(x), 2)
         ends = np.moveaxis(self.end_stiffness, 2, 0)
         values = np.concatenate([inside, ends])
-        swing = largest_sums(self.orders[1:], values[:, 1:])
-        return float(np.max(values[:, 0, 0] + swing))
+        return largest_total(self.orders[1:], values[:, 1:], values[:, 0, 0])
 
     @property
     def torque_range(self) -> tuple[float, float]:

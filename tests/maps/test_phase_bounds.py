@@ -9,7 +9,7 @@ import pytest
 
 from swgjoint.maps import phase_bounds
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.phase_bounds import largest_sums, stiffness_range
+from swgjoint.maps.phase_bounds import largest_sums, largest_total, stiffness_range
 
 
 def random_orders(rng, count):
@@ -53,6 +53,29 @@ def test_few_harmonics_are_bounded_by_their_amplitudes():
     amplitudes = np.tile([3.0, 4.0], (2, phase_bounds.MANY, 1))
     assert largest_sums(orders, amplitudes) == pytest.approx(5.0 * phase_bounds.MANY)
     assert largest_sums(orders[:0], amplitudes[:, :0]).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("count", [phase_bounds.MANY, 900])
+@pytest.mark.parametrize("spread", [0.0, 0.1, 1.0, 10.0])
+def test_the_largest_total_is_that_of_all_bounds(count, spread, monkeypatch):
+    """Whether the constants or the sums decide; bounds of few sums are evaluated."""
+    rng = np.random.default_rng(int(10 * spread) + count)
+    orders = random_orders(rng, count)
+    sums = 40
+    amplitudes = rng.normal(size=(sums, count, 2))
+    amplitudes *= rng.uniform(0.3, 1.0, (sums, 1, 1))
+    bounds = largest_sums(orders, amplitudes)
+    constants = spread * bounds.mean() * rng.normal(size=sums)
+    evaluated = []
+
+    def counted(orders, amplitudes):
+        evaluated.append(len(amplitudes))
+        return largest_sums(orders, amplitudes)
+
+    monkeypatch.setattr(phase_bounds, "largest_sums", counted)
+    found = largest_total(orders, amplitudes, constants)
+    assert found == pytest.approx((constants + bounds).max(), rel=1e-14)
+    assert sum(evaluated) < sums or count == phase_bounds.MANY
 
 
 def test_stiffness_of_many_harmonics_is_bounded():
