@@ -246,3 +246,14 @@ def contact_compliance(
 ) -> None: ...
 def add_banded(rows: Index, parts: Array, columns: Array) -> None: ...
 def solve_banded(columns: Array, loads: Array) -> bool: ...
+def ring_forces(
+    step: float,
+    stiffness: Array,
+    shapes: Array,
+    derivatives: Array,
+    hoop: Array,
+    moment: Array,
+    turning: Array,
+    gradient: Array,
+    hessian: Array,
+) -> None: ...

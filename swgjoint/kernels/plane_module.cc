@@ -6,6 +6,7 @@
 #include "bore.h"
 #include "corotation.h"
 #include "flank_arrays.h"
+#include "hermite_ring.h"
 #include "race.h"
 
 namespace {
@@ -221,6 +222,31 @@ bool solve_banded(Out<2> columns, Out<2> loads) {
                                 loads.shape(1));
 }
 
+void ring_forces(double step, In<2> stiffness, In<3> shapes, In<4> derivatives,
+                 In<2> hoop, In<2> moment, In<2> turning, Out<2> gradient,
+                 Out<3> hessian) {
+  constexpr std::size_t points = swgjoint::kGauss;
+  const std::size_t n = derivatives.shape(0);
+  require(stiffness.shape(0) == 2 && stiffness.shape(1) == points,
+          "stiffness: (2, points)");
+  require(shapes.shape(0) == points && shapes.shape(1) == 2 && shapes.shape(2) == 4,
+          "shapes: (points, 2, 4)");
+  require(derivatives.shape(1) == points && derivatives.shape(2) == 2 &&
+              derivatives.shape(3) == 2,
+          "derivatives: (n, points, 2, 2)");
+  for (const auto& part : {hoop, moment, turning}) {
+    require(part.shape(0) == n && part.shape(1) == points,
+            "hoop, moment, turning: (n, points)");
+  }
+  require(gradient.shape(0) == n && gradient.shape(1) == 8 && hessian.shape(0) == n &&
+              hessian.shape(1) == 8 && hessian.shape(2) == 8,
+          "gradient: (n, 8), hessian: (n, 8, 8)");
+  const nb::gil_scoped_release release;
+  swgjoint::ring_forces({step, stiffness.data(), shapes.data()}, derivatives.data(),
+                        hoop.data(), moment.data(), turning.data(), n, gradient.data(),
+                        hessian.data());
+}
+
 }  // namespace
 
 void bind_plane(nb::module_& m) {
@@ -262,4 +288,9 @@ void bind_plane(nb::module_& m) {
         nb::arg("parts").noconvert(), nb::arg("columns").noconvert());
   m.def("solve_banded", &solve_banded, nb::arg("columns").noconvert(),
         nb::arg("loads").noconvert());
+  m.def("ring_forces", &ring_forces, nb::arg("step"), nb::arg("stiffness").noconvert(),
+        nb::arg("shapes").noconvert(), nb::arg("derivatives").noconvert(),
+        nb::arg("hoop").noconvert(), nb::arg("moment").noconvert(),
+        nb::arg("turning").noconvert(), nb::arg("gradient").noconvert(),
+        nb::arg("hessian").noconvert());
 }

@@ -23,6 +23,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -57,6 +58,10 @@ def _shapes(xi: Array) -> Array:
     powers[..., 2] = xi * xi
     powers[..., 3] = powers[..., 2] * xi
     return np.asarray(powers @ _SHAPES).reshape(*xi.shape, 3, 4)
+
+
+_GAUSS_SHAPES = np.ascontiguousarray(_shapes(GAUSS[0])[:, 1:])
+"""First two derivatives of the shape functions at the Gauss points (3, 2, 4)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,17 +166,17 @@ class HermiteRing:
 
         Shape (3, 4, 8).
         """
-        both = _shapes(GAUSS[0])[:, 1:]
-        return np.asarray(np.kron(both, np.eye(2)), np.float64)
+        return np.asarray(np.kron(_GAUSS_SHAPES, np.eye(2)), np.float64)
 
     def _strains(self, q: Array) -> tuple[Array, ...]:
-        """Both derivatives, length, stretch and curvature at all Gauss points."""
+        """First two derivatives, length, stretch and curvature at all Gauss points."""
         local = self.nodal(q).reshape(self.elements, 8)
         both = local @ self._shape.reshape(-1, 8).T
-        v, w = both.reshape(self.elements, -1, 2, 2).transpose(2, 0, 1, 3)
+        both = both.reshape(self.elements, -1, 2, 2)
+        v, w = both.transpose(2, 0, 1, 3)
         length = np.hypot(v[..., 0], v[..., 1])
         cross = v[..., 0] * w[..., 1] - v[..., 1] * w[..., 0]
-        return v, w, length, length / self.step, cross / length**2 / self.step
+        return both, length, length / self.step, cross / length**2 / self.step
 
     @cached_property
     def _unstrained(self) -> tuple[Array, Array]:
@@ -200,12 +205,39 @@ class HermiteRing:
 
     def forces(self, q: Array) -> tuple[float, Array, Array]:
         """Energy [J], its gradient (size,) [N] and Hessians (elements, 8, 8) [N/m]."""
-        v, w, length, stretch, turning = self._strains(q)
+        both, length, stretch, turning = self._strains(q)
         stretch0, turning0 = self._unstrained
-        h, weight = self.step, self.step * GAUSS[1]
+        weight = self.step * GAUSS[1]
         hoop = weight * self.stretching * (stretch - stretch0)
         moment = weight * self.bending * (turning - turning0)
-        square = length**2
+        if (native := kernels()) is not None:
+            stiffness = np.stack([weight * self.stretching, weight * self.bending])
+            element = np.empty((self.elements, 8))
+            matrix = np.empty((self.elements, 8, 8))
+            native.ring_forces(
+                *(self.step, stiffness, _GAUSS_SHAPES, both, hoop, moment, turning),
+                *(element, matrix),
+            )
+        else:
+            element, matrix = self._parts(both, length, turning, hoop, moment)
+        gradient = np.bincount(self.dofs.ravel(), element.ravel(), self.size)
+        return self._energy(stretch, turning), gradient, matrix
+
+    def _parts(
+        self, both: Array, length: Array, turning: Array, hoop: Array, moment: Array
+    ) -> tuple[Array, Array]:
+        """Gradients (elements, 8) and Hessians (elements, 8, 8) of the elements.
+
+        Args:
+            both: First two derivatives of the position by the element parameter at the
+                Gauss points (elements, 3, 2, 2) [m].
+            length: Length of the first derivative (elements, 3) [m].
+            turning: Curvature (elements, 3) [1/m].
+            hoop: Derivative of the energy by the stretch (elements, 3) [J].
+            moment: Derivative of the energy by the curvature (elements, 3) [J·m].
+        """
+        v, w = both.transpose(2, 0, 1, 3)
+        h, weight, square = self.step, self.step * GAUSS[1], length**2
 
         # gradients of stretch and curvature with respect to (v, w)
         by_v = np.stack([w[..., 1], -w[..., 0]], axis=-1)  # of v x w
@@ -239,11 +271,9 @@ class HermiteRing:
         force = hoop[..., None] * s + moment[..., None] * k
 
         element = force.reshape(self.elements, -1) @ self._shape.reshape(-1, 8)
-        gradient = np.zeros(self.size)
-        gradient += np.bincount(self.dofs.ravel(), element.ravel(), self.size)
         by_dofs = (hess @ self._shape).reshape(self.elements, -1, 8)
         matrix = self._shape.reshape(-1, 8).T @ by_dofs
-        return self._energy(stretch, turning), gradient, matrix
+        return element, matrix
 
     def nearest(
         self, q: Array, points: Array, start: Array, own: Index | None = None
