@@ -257,3 +257,17 @@ def ring_forces(
     gradient: Array,
     hessian: Array,
 ) -> None: ...
+def face_ring(
+    q: Array,
+    points: Array,
+    start: Array,
+    own: Index,
+    inside: bool,
+    place: Array,
+    element: Index,
+    distance: Array,
+    normal: Array,
+    tangent: Array,
+    by_ring: Array,
+    curvature: Array,
+) -> None: ...

@@ -52,7 +52,93 @@ Point at_point(const double* v, const double* w, double h, double axial, double 
   return out;
 }
 
+// Position on an element and its first two derivatives, with the shape functions of the
+// four coordinate pairs and their first derivatives.
+struct Place {
+  double r[2] = {}, v[2] = {}, w[2] = {};
+  double value[4], slope[4];
+};
+
+Place evaluate(const double* q, std::size_t elements, std::size_t element, double x) {
+  Place at;
+  const double x2 = x * x, x3 = x2 * x;
+  const double value[4] = {1 - 3 * x2 + 2 * x3, x - 2 * x2 + x3, 3 * x2 - 2 * x3,
+                           x3 - x2};
+  const double slope[4] = {6 * x2 - 6 * x, 1 - 4 * x + 3 * x2, 6 * x - 6 * x2,
+                           3 * x2 - 2 * x};
+  const double bend[4] = {12 * x - 6, 6 * x - 4, 6 - 12 * x, 6 * x - 2};
+  const std::size_t next = element + 1 == elements ? 0 : element + 1;
+  for (int a = 0; a < 4; ++a) {
+    const double* node = q + 4 * (a < 2 ? element : next) + 2 * (a % 2);
+    for (int c = 0; c < 2; ++c) {
+      at.r[c] += value[a] * node[c];
+      at.v[c] += slope[a] * node[c];
+      at.w[c] += bend[a] * node[c];
+    }
+    at.value[a] = value[a];
+    at.slope[a] = slope[a];
+  }
+  return at;
+}
+
+double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1]; }
+
 }  // namespace
+
+void face_ring(const double* q, std::size_t elements, const double* points,
+               const double* start, const std::int64_t* own, bool inside, std::size_t n,
+               const FacingArrays& out) {
+  constexpr int kIterations = 6;
+  const auto count = static_cast<double>(elements);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double* point = points + 2 * k;
+    double place = start[k];
+    std::size_t element = 0;
+    double xi = 0.0;
+    // an infinite place or none has no element; its results are not numbers
+    const auto split = [&] {
+      if (own) {
+        element = static_cast<std::size_t>(own[k]);
+        xi = place - static_cast<double>(own[k]);
+      } else if (std::isfinite(place)) {
+        const double whole = std::floor(place);
+        const double turns = std::floor(whole / count);
+        element = static_cast<std::size_t>(
+            std::clamp(whole - count * turns, 0.0, count - 1.0));
+        xi = place - whole;
+      } else {
+        xi = std::nan("");
+      }
+      return evaluate(q, elements, element, xi);
+    };
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      const Place at = split();
+      const double rest[2] = {point[0] - at.r[0], point[1] - at.r[1]};
+      const double step = dot(rest, at.v) / (dot(at.v, at.v) - dot(rest, at.w));
+      place += std::clamp(step, -2.0, 2.0);
+      if (std::fabs(step) < 1e-10) break;
+    }
+    const Place at = split();
+    const double length = std::hypot(at.v[0], at.v[1]), side = inside ? -1.0 : 1.0;
+    const double tangent[2] = {at.v[0] / length, at.v[1] / length};
+    const double normal[2] = {side * tangent[1], -side * tangent[0]};
+    const double rest[2] = {point[0] - at.r[0], point[1] - at.r[1]};
+    out.place[k] = place;
+    out.element[k] = static_cast<std::int64_t>(element);
+    out.distance[k] = dot(rest, normal);
+    out.curvature[k] = dot(normal, at.w) / (length * length);
+    double* rows = out.by_ring + 24 * k;
+    for (int c = 0; c < 2; ++c) {
+      out.normal[2 * k + c] = normal[c];
+      out.tangent[2 * k + c] = tangent[c];
+      for (int a = 0; a < 4; ++a) {
+        rows[2 * a + c] = -at.value[a] * normal[c];
+        rows[8 + 2 * a + c] = -at.value[a] * tangent[c];
+        rows[16 + 2 * a + c] = at.slope[a] / length * normal[c];
+      }
+    }
+  }
+}
 
 void ring_forces(const RingElement& element, const double* derivatives,
                  const double* hoop, const double* moment, const double* turning,

@@ -1,11 +1,14 @@
-// Forces and tangents of the elements of an elastic ring of Hermite cubics.
+// Forces and tangents of the elements of an elastic ring of Hermite cubics, and points
+// that face it.
 //
-// The compiled twin of HermiteRing.forces in swgjoint/fe/rings/hermite_ring.py.
+// The compiled twins of HermiteRing.forces in swgjoint/fe/rings/hermite_ring.py and of
+// distances_to_ring in swgjoint/fe/rings/facing.py.
 
 #ifndef SWGJOINT_KERNELS_HERMITE_RING_H_
 #define SWGJOINT_KERNELS_HERMITE_RING_H_
 
 #include <cstddef>
+#include <cstdint>
 
 namespace swgjoint {
 
@@ -27,6 +30,23 @@ struct RingElement {
 void ring_forces(const RingElement& element, const double* derivatives,
                  const double* hoop, const double* moment, const double* turning,
                  std::size_t n, double* gradient, double* hessian);
+
+// Feet of the perpendiculars from n points (n, 2), distances and derivatives, see Facing.
+struct FacingArrays {
+  double* place;          // (n,)
+  std::int64_t* element;  // (n,)
+  double* distance;       // (n,)
+  double* normal;         // (n, 2)
+  double* tangent;        // (n, 2)
+  double* by_ring;        // (n, 3, 8)
+  double* curvature;      // (n,)
+};
+
+// Coordinates q (elements, 2, 2) of the ring, initial guesses of the feet (n,), and the
+// elements on whose cubics they are sought (n,) or null.
+void face_ring(const double* q, std::size_t elements, const double* points,
+               const double* start, const std::int64_t* own, bool inside, std::size_t n,
+               const FacingArrays& out);
 
 }  // namespace swgjoint
 

@@ -247,6 +247,32 @@ void ring_forces(double step, In<2> stiffness, In<3> shapes, In<4> derivatives,
                         hessian.data());
 }
 
+void face_ring(In<1> q, In<2> points, In<1> start, Index own, bool inside,
+               Out<1> place, IndexOut element, Out<1> distance, Out<2> normal,
+               Out<2> tangent, Out<3> by_ring, Out<1> curvature) {
+  const std::size_t n = points.shape(0), elements = q.shape(0) / 4;
+  require(elements > 0 && q.shape(0) % 4 == 0, "q: (4 elements,)");
+  require(points.shape(1) == 2 && start.shape(0) == n, "points: (n, 2), start: (n,)");
+  require(own.shape(0) == 0 || own.shape(0) == n, "own: (n,) or (0,)");
+  for (std::size_t k = 0; k < own.shape(0); ++k) {
+    const std::int64_t one = own.data()[k];
+    require(one >= 0 && one < static_cast<std::int64_t>(elements), "own: elements");
+  }
+  require(place.shape(0) == n && element.shape(0) == n && distance.shape(0) == n &&
+              curvature.shape(0) == n,
+          "place, element, distance, curvature: (n,)");
+  require(normal.shape(0) == n && normal.shape(1) == 2 && tangent.shape(0) == n &&
+              tangent.shape(1) == 2,
+          "normal, tangent: (n, 2)");
+  require(by_ring.shape(0) == n && by_ring.shape(1) == 3 && by_ring.shape(2) == 8,
+          "by_ring: (n, 3, 8)");
+  const nb::gil_scoped_release release;
+  swgjoint::face_ring(q.data(), elements, points.data(), start.data(),
+                      own.shape(0) > 0 ? own.data() : nullptr, inside, n,
+                      {place.data(), element.data(), distance.data(), normal.data(),
+                       tangent.data(), by_ring.data(), curvature.data()});
+}
+
 }  // namespace
 
 void bind_plane(nb::module_& m) {
@@ -293,4 +319,10 @@ void bind_plane(nb::module_& m) {
         nb::arg("hoop").noconvert(), nb::arg("moment").noconvert(),
         nb::arg("turning").noconvert(), nb::arg("gradient").noconvert(),
         nb::arg("hessian").noconvert());
+  m.def("face_ring", &face_ring, nb::arg("q").noconvert(),
+        nb::arg("points").noconvert(), nb::arg("start").noconvert(),
+        nb::arg("own").noconvert(), nb::arg("inside"), nb::arg("place").noconvert(),
+        nb::arg("element").noconvert(), nb::arg("distance").noconvert(),
+        nb::arg("normal").noconvert(), nb::arg("tangent").noconvert(),
+        nb::arg("by_ring").noconvert(), nb::arg("curvature").noconvert());
 }

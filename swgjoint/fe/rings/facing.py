@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.rings.hermite_ring import HermiteRing, hermite
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index
 
 
@@ -83,6 +84,26 @@ def distances_to_ring(
     Returns:
         Feet, distances and derivatives.
     """
+    if (native := kernels()) is not None:
+        n, element = len(points), np.empty(len(points), np.int64)
+        found = {
+            "place": np.empty(n),
+            "distance": np.empty(n),
+            "normal": np.empty((n, 2)),
+            "tangent": np.empty((n, 2)),
+            "by_ring": np.empty((n, 3, 8)),
+            "curvature": np.empty(n),
+        }
+        native.face_ring(
+            np.ascontiguousarray(q),
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(start, np.float64),
+            own=np.empty(0, np.int64) if own is None else own,
+            inside=inside,
+            element=element,
+            **found,
+        )
+        return Facing(dofs=ring.dofs[element], **found)
     place = ring.nearest(q, points, start, own)
     element, xi = ring.split(place, own)
     value, slope, _ = hermite(xi)
