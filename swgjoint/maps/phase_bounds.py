@@ -57,7 +57,7 @@ def largest_sums(orders: NDArray[np.int64], amplitudes: Array) -> Array:
     if len(orders) <= MANY:
         return np.asarray(bounds)
     found, least = _largest_at_points(orders, amplitudes, POINTS)
-    return np.minimum(bounds, found / least)
+    return np.asarray(np.minimum(bounds, found / least))
 
 
 def largest_total(
@@ -86,7 +86,7 @@ def largest_total(
 def _points(orders: NDArray[np.int64], per_period: int) -> NDArray[np.int64]:
     """Numbers of points per turn of alpha and beta (2,)."""
     degree = np.abs(orders).max(axis=0)
-    return np.maximum(-(-per_period * degree // _BLOCK) * _BLOCK, 1)
+    return np.asarray(np.maximum(-(-per_period * degree // _BLOCK) * _BLOCK, 1))
 
 
 def _least_share(orders: NDArray[np.int64], per_period: int) -> float:

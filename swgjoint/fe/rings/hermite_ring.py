@@ -220,7 +220,8 @@ class HermiteRing:
             )
         else:
             element, matrix = self._parts(both, length, turning, hoop, moment)
-        gradient = np.bincount(self.dofs.ravel(), element.ravel(), self.size)
+        gradient = np.zeros(self.size)
+        gradient += np.bincount(self.dofs.ravel(), element.ravel(), self.size)
         return self._energy(stretch, turning), gradient, matrix
 
     def _parts(
