@@ -26,7 +26,7 @@ from swgjoint.fe.solid.corotation import energies
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.tangent import SolidTangent
+from swgjoint.fe.solid.tangent import SolidTangent, keeps_tangent
 from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
@@ -75,9 +75,9 @@ class SolidSolver:
     """Largest displacement increment below which tooth contact is also searched between
     the nodes [m]."""
     keep_below: float = 1e-6
-    """Largest displacement increment below which the tangent of the last iteration is
-    kept [m]. The tangent of a state so close reduces the error as much as that of the
-    last state."""
+    """Largest displacement increment, and largest sum of increments at settled contact,
+    below which a tangent is kept [m]. The tangent of a state so close reduces the error
+    as much as that of the last state."""
     slowest: float = 0.5
     """Ratio of the displacement increments of two iterations above which the tangent
     is computed anew [-]."""
@@ -103,7 +103,7 @@ class SolidSolver:
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
-        settled = stay = False
+        settled, stay, since = False, False, 0
         last: Array | None = None
         tangent: SolidTangent | None = None
         # a state whose teeth carry force is close to the solution
@@ -112,12 +112,13 @@ class SolidSolver:
         released = np.zeros(start.shared.shape, int)
         try:
             for _ in range(self.max_iterations):
-                anew = tangent is None or not self._keeps_tangent(history)
+                keep = self.keep_below, self.slowest
+                anew = not keeps_tangent(history, since, keep, settled=settled)
                 linear = linearise(
                     model, state, kept=released >= RELEASES, tangent=anew
                 )
                 if tangent is None or anew:
-                    tangent = SolidTangent(model, linear)
+                    tangent, since = SolidTangent(model, linear), len(history)
                 # once the search is thorough it remains so: contacts that only this
                 # search finds would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
@@ -156,12 +157,6 @@ class SolidSolver:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
         return _finished(model, state, outcome, history)
-
-    def _keeps_tangent(self, history: list[float]) -> bool:
-        """Whether the next iteration can use the tangent of the last one."""
-        if not history or not history[-1] < self.keep_below:
-            return False
-        return len(history) < 2 or history[-1] < self.slowest * history[-2]
 
 
 def _takes_back(increment: Array, last: Array | None) -> bool:

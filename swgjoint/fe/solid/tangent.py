@@ -130,6 +130,32 @@ class SolidTangent:
         return np.concatenate(sectors), np.concatenate(shapes), np.concatenate(factors)
 
 
+def keeps_tangent(
+    history: list[float], since: int, limits: tuple[float, float], *, settled: bool
+) -> bool:
+    """Whether the next iteration can use the tangent of an earlier one.
+
+    A kept tangent follows the contacts of the bore. While these change one after the
+    other, a new tangent would not save iterations. Once they are settled, a tangent
+    from farther away is renewed, because the compliance of the output follows from it.
+
+    Args:
+        history: Largest displacement increments of all iterations [m].
+        since: Number of iterations before the tangent was computed.
+        limits: Largest increment, and largest sum of increments at settled contact
+            [m]; ratio of two increments above which settled iterations need a new
+            tangent [-].
+        settled: Whether the last iteration changed no contact of the bore.
+    """
+    keep_below, slowest = limits
+    if not history or not history[-1] < keep_below:
+        return False
+    if not settled:
+        return True
+    slow = len(history) > 1 and not history[-1] < slowest * history[-2]
+    return sum(history[since:]) < keep_below and not slow
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TangentResponse:
     """Response of the ring to k loads."""

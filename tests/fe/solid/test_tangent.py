@@ -12,7 +12,7 @@ from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.equilibrium import SolidSolver
 from swgjoint.fe.solid.linearise import linearise
-from swgjoint.fe.solid.tangent import SolidTangent
+from swgjoint.fe.solid.tangent import SolidTangent, keeps_tangent
 
 BEARING = {
     "wave_generator.bearing.balls": 12,
@@ -153,6 +153,26 @@ def test_kept_tangent_reaches_the_same_state(small_drive, loaded):
     assert kept.wave_generator_torque == pytest.approx(
         anew.wave_generator_torque, rel=1e-7
     )
+
+
+@pytest.mark.parametrize(
+    ("history", "since", "settled", "kept"),
+    [
+        ([], 0, True, False),
+        ([2e-6], 0, False, False),
+        # contacts change one after the other
+        ([3e-6, 9e-7, 8e-7, 7e-7], 1, False, True),
+        # they are settled, but the tangent is that of a state 2.4 um away
+        ([3e-6, 9e-7, 8e-7, 7e-7, 1e-9], 1, True, False),
+        ([3e-6, 9e-7, 8e-7, 7e-7, 1e-9], 3, True, True),
+        # nothing but the tangent explains the slow convergence
+        ([3e-6, 1e-7, 8e-8], 1, True, False),
+        ([3e-6, 1e-7, 8e-8], 1, False, True),
+    ],
+)
+def test_tangent_is_kept_while_contacts_change(history, since, settled, kept):
+    """Below 1 um, unless settled contacts converge slowly or the tangent is old."""
+    assert keeps_tangent(history, since, (1e-6, 0.5), settled=settled) is kept
 
 
 def test_tangent_needs_a_linearisation_with_tangent(small_ring, loaded):
