@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.common.influence import Response
 from swgjoint.fe.common.strip_problems import StripProblems
 from swgjoint.fe.tolerances.cycle import gap_errors, pitches_of
+from swgjoint.fe.tolerances.perfect import PerfectSolid
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.fe.tolerances.sampling import CHUNK, respond_over_torque
 from swgjoint.gear.catalogue import ratings_of
@@ -49,6 +51,35 @@ def test_both_ends_of_a_clearance_are_solved_once():
     torque = np.array([-4.0, -0.5, 0.0, 0.5, 4.0])
     assert np.allclose(table[0], errors - 1e-3 * torque[:, None], atol=1e-15)
     assert free == CHUNK and sum(parts) == torque.size
+
+
+def sprung(torque: float, play: float = 0.0) -> SimpleNamespace:
+    """State of a spring of 1 mrad/(N·m), beyond half of its play."""
+    return SimpleNamespace(
+        torque=torque,
+        angle=-1e-3 * torque - 0.5 * play * np.sign(torque),
+        energy=0.5e-3 * torque**2,
+        compliance=1e-3,
+    )
+
+
+@pytest.mark.parametrize("play", [0.0, 2e-3])
+def test_perfect_drive_is_linear_beyond_a_failed_solve(play):
+    """A spring with play whose larger positive torques have no equilibrium."""
+    levels = np.array([0.5, 2.0, 3.0, 4.0])
+    loaded = {t: sprung(t, play) for t in (0.5, 2.0, -0.5, -2.0, -3.0, -4.0)}
+    sides = (loaded[0.5], loaded[-0.5]) if play else None
+    rest = Unloaded(state=sprung(0.0), small=0.5, sides=sides)
+    follow = SimpleNamespace(output_angle=lambda state: state.angle)
+    drive = PerfectSolid(follow=follow, positions=[rest])
+    angle, energy, compliance = drive.table([loaded], levels)[:, :, 0]
+    torque = np.concatenate([-levels[::-1], [0.0], levels])
+    wanted = [sprung(t, play) for t in torque]
+    assert angle == pytest.approx([one.angle for one in wanted], abs=1e-15)
+    assert energy == pytest.approx([one.energy for one in wanted], abs=1e-15)
+    # the output is free to turn by the play and by twice its deflection at 0.5 N·m
+    assert compliance[4] == pytest.approx(1e-3 + play)
+    assert np.delete(compliance, 4) == pytest.approx(1e-3)
 
 
 @pytest.mark.fe

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -54,3 +55,40 @@ class SolidState(StateFigures):
     """Tooth contacts that carry force; None before the first search for them."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Normal forces of these contacts (n_contacts,) [N]."""
+
+    def of_both_halves(self) -> SolidState:
+        """State of the whole drive that a state of a half model describes.
+
+        Energy and moments are those of the whole drive already. A race is left out.
+        """
+        n, teeth = len(self.faces), len(self.circular_spline_force)
+        turned = np.array([-1.0, -1.0, 1.0])  # by 180 deg
+        held = self.held
+        if held is not None:
+            half = np.repeat([0, 1], len(held))
+            held = held.chosen(np.tile(np.arange(len(held)), 2))
+            sector = held.contacts.sector + n * half
+            # two teeth are one in the half model: the one that faces the sector
+            tooth = held.contacts.tooth + teeth * half
+            tooth += teeth * np.rint(sector / n - tooth / teeth).astype(np.int64)
+            contacts = replace(held.contacts, sector=sector, tooth=tooth % (2 * teeth))
+            held = replace(held, contacts=contacts)
+        twice: dict[str, Any] = {
+            key: np.concatenate([getattr(self, key)] * 2)
+            for key in (
+                "pressure",
+                "touching",
+                "shared",
+                "bore_force",
+                "flank_force",
+                "circular_spline_force",
+                "tooth_force",
+            )
+        }
+        return replace(
+            self,
+            faces=np.concatenate([self.faces, self.faces * turned]),
+            inside=np.concatenate([self.inside, self.inside * turned]),
+            held=held,
+            **twice,
+        )

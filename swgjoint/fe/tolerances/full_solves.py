@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
 from swgjoint.fe.tolerances.rest import SMALL, Rest
 from swgjoint.gear.catalogue import ratings_of
@@ -37,7 +38,8 @@ def full_solves(
     Args:
         design: A drive with manufacturing errors.
         follow: Solver of the drive with perfect teeth and axis.
-        rests: Unloaded positions of that drive within a pitch.
+        rests: Unloaded positions of that drive within a pitch. Without an offset, the
+            search for an equilibrium may start from their loaded states.
         positions: Numbers of the positions in the cycle, which has ``len(rests)``
             positions per pitch (n,).
         torques: Torques T at each position [N·m].
@@ -65,6 +67,7 @@ def full_solves(
     def solved(k: int, errors: tuple[Array, ...], loads: Array) -> Array:
         rows = []
         flawed, start = follow.with_errors(*errors), starts[phase[k]]
+        loaded = {} if offset else rests[phase[k]].loaded
         sides = start.sides
         state = start.state if sides is None else sides[int(factors[k] < 0.0)]
         for torque in loads.tolist():
@@ -72,7 +75,7 @@ def full_solves(
                 # midway between both ends of the clearance
                 states = [flawed.to_torque(s, s.torque) for s in sides]
             else:
-                state = flawed.to_torque(state, torque)
+                state = flawed.to_torque(_nearer(state, torque, loaded), torque)
                 states = [state]
             angle = np.mean(
                 [flawed.output_angle(s) if s.outcome.ok else np.nan for s in states]
@@ -101,6 +104,15 @@ def full_solves(
         output_error=table[2],
         input_torque=table[3],
     )
+
+
+def _nearer(
+    state: Any, torque: float, loaded: Mapping[float, tuple[Any, Influence]]
+) -> Any:
+    """The state whose torque is closest to the given one [N·m]."""
+    near = min(loaded, key=lambda level: abs(level - torque), default=state.torque)
+    closer = abs(near - torque) < abs(state.torque - torque)
+    return loaded[near][0] if closer else state
 
 
 def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:

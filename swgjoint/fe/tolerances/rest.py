@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from math import isclose
 from typing import Any
 
 from swgjoint.errors import ComputationError
@@ -91,37 +92,70 @@ class Rest:
         follow: Follower[Any],
         levels: Array,
         tick: Callable[[int], None] = lambda parts: None,
-        before: Rest | None = None,
+        before: Mapping[float, Any] | None = None,
     ) -> Rest:
         """The position with linearisations under load.
 
         With some wave generators the contacts change so much between zero and rated
         torque that a drive linearised at zero torque has twenty times the ripple of the
         nonlinear one. If a torque cannot be solved, it and all larger ones of its sign
-        are left out.
+        are left out. The torque that takes up a clearance needs no second
+        linearisation.
 
         Args:
             follow: Solver of the drive with perfect teeth.
             levels: Magnitudes of the torques, increasing (n,) [N·m].
             tick: Called with the number of torques that are done or left out.
-            before: The position before, under load, whose states are turned to this
-                one; None to load the state of this position. In 3D, turning takes an
-                eighth of the time.
+            before: States under these torques [N·m], of another position or of the
+                drive without errors, from which to start; None to load the state of
+                this position. In 3D, turning takes an eighth of the time.
         """
-        angle, loaded = follow.input_angle(self.state), {}
-        for sign in (1.0, -1.0):
-            state = self.near(sign)[0]
-            for k, torque in enumerate((sign * levels).tolist()):
-                if before is not None and torque in before.loaded:
-                    state = follow.to_angle(before.loaded[torque][0], angle)
-                else:
-                    state = follow.to_torque(state, torque)
-                if not state.outcome.ok:
-                    tick(levels.size - k)
-                    break
-                loaded[torque] = state, follow.influence(state)
-                tick(1)
+        starts = self.sides[0][0], self.sides[1][0]
+        states = loaded_states(follow, starts, levels, tick, before)
+        loaded = dict[float, tuple[Any, Influence]]()
+        for torque, state in states:
+            side = self.near(torque)
+            loaded[torque] = (
+                side if state is side[0] else (state, follow.influence(state))
+            )
         return replace(self, loaded=loaded)
+
+
+def loaded_states(
+    follow: Follower[Any],
+    starts: tuple[Any, Any],
+    levels: Array,
+    tick: Callable[[int], None] = lambda parts: None,
+    before: Mapping[float, Any] | None = None,
+) -> Iterator[tuple[float, Any]]:
+    """Equilibria of one position under torques of both signs.
+
+    Args:
+        follow: Solver of the drive.
+        starts: Equilibria from which to load the drive by positive and by negative
+            torques. They are not solved again where they have one of the torques.
+        levels: Magnitudes of the torques, increasing (n,) [N·m].
+        tick: Called with the number of torques that are done or left out.
+        before: States of other positions by torque, which are turned to this one.
+
+    Yields:
+        Torques [N·m] and states, up to the first failure of each sign.
+    """
+    angle = follow.input_angle(starts[0])
+    for sign, start in zip((1.0, -1.0), starts, strict=True):
+        state = start
+        for k, torque in enumerate((sign * levels).tolist()):
+            if isclose(start.torque, torque, rel_tol=1e-9):
+                state = start
+            elif before is not None and torque in before:
+                state = follow.to_angle(before[torque], angle)
+            else:
+                state = follow.to_torque(state, torque)
+            if not state.outcome.ok:
+                tick(levels.size - k)
+                break
+            yield torque, state
+            tick(1)
 
 
 def influences(
@@ -130,6 +164,7 @@ def influences(
     phases: int = PHASES,
     model: str = "2d",
     bearing: bool = True,
+    start: Any = None,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Follower[Any], list[Rest]]:
     """Unloaded drive with perfect teeth, linearised at positions within a pitch.
@@ -142,6 +177,7 @@ def influences(
         model: Fidelity, ``2d`` or ``3d``.
         bearing: Whether a 2D model includes the bearing of the wave generator, see
             :func:`perfect_drive`.
+        start: State close to the first position; None without any.
         tick: Called after every position.
 
     Returns:
@@ -150,23 +186,43 @@ def influences(
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
     """
-    period, small = pitch_of(design), SMALL * ratings_of(design).rated_torque
     follow = perfect_drive(design, model, bearing=bearing)
-    state = follow.engage(follow.deflect())
-    rest = Unloaded(state=state, small=small)
     positions = []
-    for k in range(phases):
-        if k:
-            rest = follow.turn_unloaded(rest, period * k / phases)
-        elif state.outcome.ok:
-            rest = follow.unload(state, small)
-        if not rest.state.outcome.ok:
-            raise ComputationError(
-                f"{design.drive.name}: no equilibrium without torque and with perfect"
-                f" teeth: {rest.state.outcome.value}"
-            )
+    for rest in unloaded_positions(follow, design, phases, start):
         up, down = rest.sides or (rest.state, None)
         opposite = None if down is None else (down, follow.influence(down))
         positions.append(Rest(state=up, at=follow.influence(up), opposite=opposite))
         tick()
     return follow, positions
+
+
+def unloaded_positions(
+    follow: Follower[Any], design: Design, phases: int, start: Any = None
+) -> Iterator[Unloaded[Any]]:
+    """Equilibria of a drive without load at positions within a pitch.
+
+    Args:
+        follow: Solver of the drive.
+        design: The drive.
+        phases: Number of positions, equally spaced over a pitch.
+        start: State close to the first position; None without any.
+
+    Raises:
+        ComputationError: If the unloaded drive cannot be solved.
+    """
+    period, small = pitch_of(design), SMALL * ratings_of(design).rated_torque
+    rest = None if start is None else follow.unload(start, small)
+    if rest is None or not rest.state.outcome.ok:
+        state = follow.engage(follow.deflect())
+        rest = Unloaded(state=state, small=small)
+        if state.outcome.ok:
+            rest = follow.unload(state, small)
+    for k in range(phases):
+        if k:
+            rest = follow.turn_unloaded(rest, period * k / phases)
+        if not rest.state.outcome.ok:
+            raise ComputationError(
+                f"{design.drive.name}: no equilibrium without torque and with perfect"
+                f" teeth: {rest.state.outcome.value}"
+            )
+        yield rest

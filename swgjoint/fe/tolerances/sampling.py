@@ -21,6 +21,7 @@ from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves
+from swgjoint.fe.tolerances.perfect import PerfectSolid, midway
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
 from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
 from swgjoint.fe.tolerances.unseen import (
@@ -113,9 +114,14 @@ def sample_tolerances(
     own_reference = has_errors(with_perfect_teeth(design))
     tick = _stage(progress, design, 1, phases * (2 if own_reference else 1))
     options: dict[str, Any] = {"phases": phases, "model": model, "tick": tick}
+    solid: PerfectSolid | None = None
+    if own_reference and model == "3d":
+        solid = PerfectSolid.from_design(design, phases, tick)
+        options["start"] = solid.whole(solid.positions[0].state)
     follow, linear = influences(design, **options)
     ideal_drive, reference = follow, linear
-    if own_reference:
+    if own_reference and model == "2d":
+        # bore contacts of linearised 2D drives are coarser than those of equilibria
         ideal_drive, reference = influences(without_errors(design), **options)
     pitches = np.arange(pitches_of(design), dtype=np.int64)
 
@@ -123,6 +129,8 @@ def sample_tolerances(
     levels = np.array([part * repeated_peak for part in LEVELS[model]])
     small = SMALL * rated_torque
     has_play = any(rest.opposite is not None for rest in (*linear, *reference))
+    if solid is not None:
+        has_play |= any(position.sides is not None for position in solid.positions)
     if has_play:
         levels = np.append(small, levels)
     tables, perfect, free = [], [], 0
@@ -131,16 +139,24 @@ def sample_tolerances(
     # a linearisation under load takes about as long as a chunk
     linearised = 2 * levels.size * (2 if own_reference else 1)
     tick = _stage(progress, design, 2, phases * (steps + linearised))
-    before: tuple[Rest | None, Rest | None] = None, None
-    for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
+    before, under_load = None, list[Rest]()
+    if solid is not None:
+        perfect_states = solid.under_both_signs(levels, tick)
+        perfect = list(solid.table(perfect_states, levels).transpose(2, 0, 1))
+        # the first position starts from these states, the others from the one before
+        before = {t: solid.whole(state) for t, state in perfect_states[0].items()}
+    for k, rest in enumerate(linear):
         there = _kept(keep, k, (3, loads, pitches.size))
-        flawless = flawless.under_both_signs(ideal_drive, levels, tick, before[0])
-        loaded = flawless
+        loaded = rest
         # a resumed run turns the same states as an uninterrupted one
-        if own_reference and (there is None or model == "3d"):
-            loaded = rest.under_both_signs(follow, levels, tick, before[1])
+        if there is None or model == "3d" or not own_reference:
+            loaded = rest.under_both_signs(follow, levels, tick, before)
         if model == "3d":
-            before = flawless, loaded
+            before = {t: state for t, (state, _) in loaded.loaded.items()}
+            under_load.append(loaded)
+        flawless = loaded
+        if own_reference and solid is None:
+            flawless = reference[k].under_both_signs(ideal_drive, levels, tick)
         if there is None:
             phase_table, count = respond_over_torque(
                 loaded, by_errors, levels, small, tick
@@ -157,19 +173,19 @@ def sample_tolerances(
             )
         if keep is not None and there is None:
             keep.write(_PHASE.format(k), {"table": phase_table, "free": count})
-        alone, _ = respond_over_torque(
-            flawless, lambda at: np.zeros((1, len(at.sector))), levels, small
-        )
-        ideal = pitch_of(design) * k / phases / design.ratio
-        phase_table[0] -= ideal
-        alone[0] -= ideal
+        if solid is None:
+            alone, _ = respond_over_torque(
+                flawless, lambda at: np.zeros((1, len(at.sector))), levels, small
+            )
+            perfect.append(alone[:, :, 0])
         tables.append(phase_table)
-        perfect.append(alone[:, :, 0])
         free += count
-    # (3, n_torques, n_pitches, n_phases)
-    table = np.stack(tables, axis=-1)
+    # (3, n_torques, n_pitches, n_phases) and (3, n_torques, n_phases)
+    table, flawless_table = np.stack(tables, axis=-1), np.stack(perfect, axis=-1)
+    ideal_angle = pitch_of(design) * np.arange(phases) / phases / design.ratio
+    table[0] -= ideal_angle
+    flawless_table[0] -= ideal_angle
     table = table.reshape(*table.shape[:2], -1)
-    flawless_table = np.stack(perfect, axis=-1)
     torque = np.concatenate([-levels[::-1], [0.0], levels])
     tick = _stage(progress, design, 3, CHECKS[model])
     chosen = spread_positions(pitches.size, phases, CHECKS[model])
@@ -180,7 +196,7 @@ def sample_tolerances(
     solved = full_solves(
         design,
         follow,
-        linear,
+        linear if model == "2d" else under_load,
         chosen,
         torques,
         signs,
@@ -267,10 +283,7 @@ def respond_over_torque(
     if free.any():
         ends = {t: row(t, free, None, lambda: None) for t in (small, -small)}
         up, down = ends[small][0], ends[-small][0]
-        middle = 0.5 * (up + down)
-        middle[1] -= 0.5 * small**2 * middle[2]  # energy stored by the small torque
-        middle[2] = 0.5 * (down[0] - up[0]) / small
-        unloaded[:, free] = middle
+        unloaded[:, free] = midway(up, down, small)
     chunks = -(-count // CHUNK)
     if rest.opposite is not None:
         tick(chunks)

@@ -161,6 +161,17 @@ def test_half_model_is_the_whole_drive(small_design, small_ring, loaded, small_d
     assert np.abs(state.faces[:20] - loaded.faces).max() < 1e-9
     opposite = loaded.faces * small_ring.closure
     assert np.abs(state.faces[20:] - opposite).max() < 1e-9
+    # the half and its copy are in equilibrium, and every contact has its tooth
+    both = loaded.of_both_halves()
+    again = follow.load(both, TORQUE, loaded.wave_generator_angle)
+    assert again.outcome.ok and again.history[0] < 1e-9
+
+    def pairs(one):
+        c = one.held.contacts
+        keys = (c.sector.tolist(), c.side.tolist(), c.tooth.tolist())
+        return set(zip(*keys, strict=True))
+
+    assert pairs(both) == pairs(again) == pairs(state)
 
 
 def test_sectors_fit_together(small_ring, loaded):

@@ -8,6 +8,7 @@ from solved import kept
 
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.fe.tolerances.perfect import PerfectSolid
 from swgjoint.fe.tolerances.rest import SMALL, influences, perfect_drive
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
@@ -63,6 +64,26 @@ def test_play_of_a_flawed_drive(small_design, at_both_ends):
     assert np.abs(moved).max() > 2e-5
     # few teeth carry a small torque, on crowned flanks
     assert np.abs(apart).max() < 0.05 * np.abs(moved).max()
+
+
+@pytest.mark.slow
+def test_half_of_the_perfect_drive_is_the_linearised_one(small_design, at_both_ends):
+    """Its equilibria against a superposition without errors on the whole drive."""
+    follow, linear = at_both_ends
+    half = PerfectSolid.from_design(small_design, 2)
+    assert half.follow.model.half and not follow.model.half
+    small = SMALL * ratings_of(small_design).rated_torque
+    levels = np.array([small, 4.0 * TORQUE])
+    found = half.table(half.under_both_signs(levels), levels)
+    for k, rest in enumerate(linear):
+        at = rest.under_both_signs(follow, levels)
+        # the end of the clearance is not linearised again
+        assert at.near(small)[1] is rest.at
+        wanted, _ = tolerance_sampling.respond_over_torque(
+            at, lambda one: np.zeros((1, len(one.sector))), levels, small
+        )
+        apart = np.abs(found[:, :, k] - wanted[:, :, 0]).max(axis=1)
+        assert (apart < 1e-5 * np.ptp(wanted[:, :, 0], axis=1)).all()
 
 
 @pytest.mark.slow
