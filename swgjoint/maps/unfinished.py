@@ -78,7 +78,7 @@ class Unfinished:
             name: Name of the part.
             arrays: Arrays of the part by name.
         """
-        keep(self._path(name), arrays_file(join_arrays(arrays), level=1))
+        keep(self._path(name), arrays_file(join_arrays(arrays), level=0))
 
     def _path(self, name: str) -> Path:
         """File of a part."""
