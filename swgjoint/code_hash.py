@@ -68,17 +68,31 @@ def code_files(*parts: str) -> list[Path]:
 
 def _meaning(source: bytes) -> bytes:
     """Syntax tree without string statements, which are docstrings."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [line for line in body if not _is_text(line)]  # type: ignore[attr-defined]
-    return ast.dump(tree, annotate_fields=False).encode()
+    parts: list[str] = []
+
+    # ast.dump of a tree without these statements takes twice as long
+    def add(part: object) -> None:
+        if isinstance(part, ast.AST):
+            parts.append(type(part).__name__ + "(")
+            for name in part._fields:
+                add(getattr(part, name, None))
+            parts.append(")")
+        elif isinstance(part, list):
+            parts.append("[")
+            for one in part:
+                if not _is_text(one):
+                    add(one)
+            parts.append("]")
+        else:
+            parts.append(repr(part) + ",")
+
+    add(ast.parse(source))
+    return "".join(parts).encode()
 
 
-def _is_text(line: ast.stmt) -> bool:
+def _is_text(part: object) -> bool:
     return (
-        isinstance(line, ast.Expr)
-        and isinstance(line.value, ast.Constant)
-        and isinstance(line.value.value, str)
+        isinstance(part, ast.Expr)
+        and isinstance(part.value, ast.Constant)
+        and isinstance(part.value.value, str)
     )
