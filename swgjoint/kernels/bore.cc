@@ -25,34 +25,31 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
                double* curvature) {
   const double cos = std::cos(support.angle), sin = std::sin(support.angle);
   const std::size_t p = stations.p;
+  std::vector<Vec> seen(p);
+  std::vector<Nearest> feet(p);
   for (std::size_t s = 0; s < count; ++s, nodes += 2 * stations.nodes()) {
     for (std::size_t k = 0; k < stations.intervals; ++k) {
       const double* window = nodes + 2 * k;
-      const auto measure = [&](std::size_t i) {
+      const auto see = [&](std::size_t i) {
         const Vec at = station_of(stations, i, window);
-        const Vec seen{cos * at.x + sin * at.y - support.offset.x,
-                       cos * at.y - sin * at.x - support.offset.y};
-        const Nearest foot = support.outline.nearest(seen);
+        return Vec{cos * at.x + sin * at.y - support.offset.x,
+                   cos * at.y - sin * at.x - support.offset.y};
+      };
+      const auto measure = [&](std::size_t i, const Nearest& foot) {
         gap[i] = foot.gap;
         normal[2 * i] = cos * foot.normal.x - sin * foot.normal.y;
         normal[2 * i + 1] = sin * foot.normal.x + cos * foot.normal.y;
         curvature[i] = foot.curvature / (1.0 + foot.curvature * foot.gap);
       };
-      const std::size_t middle = p / 2;
-      measure(middle);
-      const bool near = gap[middle] < support.far ||
-                        std::any_of(touching, touching + p, [](bool on) { return on; });
-      for (std::size_t i = 0; i < p; ++i) {
-        if (i == middle) continue;
-        if (near) {
-          measure(i);
-          continue;
-        }
-        gap[i] = gap[middle];
-        normal[2 * i] = normal[2 * middle];
-        normal[2 * i + 1] = normal[2 * middle + 1];
-        curvature[i] = curvature[middle];
+      feet[0] = support.outline.nearest(see(p / 2));
+      if (feet[0].gap < support.far ||
+          std::any_of(touching, touching + p, [](bool on) { return on; })) {
+        for (std::size_t i = 0; i < p; ++i) seen[i] = see(i);
+        support.outline.nearest(seen.data(), p, feet.data());
+      } else {
+        std::fill(feet.begin() + 1, feet.end(), feet[0]);
       }
+      for (std::size_t i = 0; i < p; ++i) measure(i, feet[i]);
       gap += p;
       normal += 2 * p;
       curvature += p;

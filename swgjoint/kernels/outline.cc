@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "wide.h"
 
 namespace swgjoint {
 namespace {
@@ -60,6 +63,70 @@ Nearest nearest_of_ellipse(double major, double minor, Vec point) {
           major * minor / (length * length * length)};
 }
 
+constexpr std::size_t kBlock = 24;  // points whose feet are found at once
+
+// Points in the first quadrant, and the results for them.
+struct Block {
+  double x[kBlock], y[kBlock];
+  double gap[kBlock], normal_x[kBlock], normal_y[kBlock], curvature[kBlock];
+  double settled[kBlock];  // 1 if the first step of foot_of is its last one, else 0
+};
+
+// The first step of foot_of and nearest_of_ellipse for all points of a block. Points near
+// the outline need no other step.
+SWGJOINT_WIDE void first_feet(double a, double b, Block* block) {
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    const double x = block->x[i], y = block->y[i];
+    const double from_x = b * y, from_y = a * x;
+    const double first = 1.0 / std::sqrt(from_x * from_x + from_y * from_y);
+    const double tx = from_x * first, ty = from_y * first;
+    const double dx = x - b * ty, dy = y - a * tx;
+    const double f = dx * b * tx - dy * a * ty;
+    const double slope =
+        -(b * tx) * (b * tx) - (a * ty) * (a * ty) - dx * b * ty - dy * a * tx;
+    const double bend = 3.0 * (b - a) * (b + a) * tx * ty - f;
+    const double step = -f * slope / (slope * slope - 0.5 * f * bend);
+    const double next_x = tx - step * ty, next_y = ty + step * tx;
+    const double second = 1.0 / std::sqrt(next_x * next_x + next_y * next_y);
+    const double ux = next_x * second, uy = next_y * second;
+    const double change = tx * uy - ty * ux;
+    // within the bracket: towards the sign of f, in the first quadrant
+    const double lowest = std::min(std::min(ux, uy), f * change);
+    block->settled[i] = (std::abs(change) < kSmall && lowest >= 0.0) ? 1.0 : 0.0;
+    const double length = std::sqrt(a * uy * (a * uy) + b * ux * (b * ux));
+    const double nx = a * uy / length, ny = b * ux / length;
+    block->normal_x[i] = nx;
+    block->normal_y[i] = ny;
+    block->gap[i] = (x - b * uy) * nx + (y - a * ux) * ny;
+    block->curvature[i] = a * b / (length * length * length);
+  }
+}
+
+void nearest_of_ellipse(double major, double minor, const Vec* points, std::size_t n,
+                        Nearest* feet) {
+  Block block;
+  for (std::size_t first = 0; first < n; first += kBlock) {
+    const std::size_t count = std::min(kBlock, n - first);
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      const Vec point = points[first + std::min(i, count - 1)];
+      block.x[i] = std::abs(point.x);
+      block.y[i] = std::abs(point.y);
+    }
+    first_feet(major, minor, &block);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec point = points[first + i];
+      if (block.settled[i] == 0.0) {
+        feet[first + i] = nearest_of_ellipse(major, minor, point);
+        continue;
+      }
+      const double nx = block.normal_x[i], ny = block.normal_y[i];
+      feet[first + i] = {block.gap[i],
+                         {point.x < 0.0 ? -nx : nx, point.y < 0.0 ? -ny : ny},
+                         block.curvature[i]};
+    }
+  }
+}
+
 // Distance from the line between the centres of the semicircles, minus the radius.
 Nearest nearest_of_simplified(double major, double radius, Vec point) {
   const double half = major - radius;
@@ -84,14 +151,22 @@ Nearest Outline::nearest(Vec point) const {
                                  : nearest_of_simplified(major_, minor_, point);
 }
 
+void Outline::nearest(const Vec* points, std::size_t n, Nearest* feet) const {
+  if (kind_ == Kind::kEllipse) return nearest_of_ellipse(major_, minor_, points, n, feet);
+  for (std::size_t i = 0; i < n; ++i) feet[i] = nearest(points[i]);
+}
+
 void outline_distance(const double* points, std::size_t n, const Outline& outline,
                       double* result) {
-  for (std::size_t i = 0; i < n; ++i, points += 2, result += 4) {
-    const Nearest foot = outline.nearest({points[0], points[1]});
-    result[0] = foot.gap;
-    result[1] = foot.normal.x;
-    result[2] = foot.normal.y;
-    result[3] = foot.curvature;
+  std::vector<Vec> seen(n);
+  for (std::size_t i = 0; i < n; ++i) seen[i] = {points[2 * i], points[2 * i + 1]};
+  std::vector<Nearest> feet(n);
+  outline.nearest(seen.data(), n, feet.data());
+  for (const Nearest& foot : feet) {
+    *result++ = foot.gap;
+    *result++ = foot.normal.x;
+    *result++ = foot.normal.y;
+    *result++ = foot.curvature;
   }
 }
 

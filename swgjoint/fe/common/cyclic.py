@@ -313,10 +313,10 @@ def shift_rows(values: Array, shift: float) -> Array:
         shift: Shift in sectors, not necessarily an integer [-].
     """
     whole = int(np.floor(shift))
-    t = shift - whole
+    t, rows = shift - whole, np.arange(len(values)) - whole
     return np.asarray(
-        t * (t + 1) * (t - 1) / 6 * np.roll(values, whole + 2, axis=0)
-        - t * (t - 2) * (t + 1) / 2 * np.roll(values, whole + 1, axis=0)
-        + (t - 1) * (t - 2) * (t + 1) / 2 * np.roll(values, whole, axis=0)
-        - t * (t - 1) * (t - 2) / 6 * np.roll(values, whole - 1, axis=0)
+        t * (t + 1) * (t - 1) / 6 * values.take(rows - 2, axis=0, mode="wrap")
+        - t * (t - 2) * (t + 1) / 2 * values.take(rows - 1, axis=0, mode="wrap")
+        + (t - 1) * (t - 2) * (t + 1) / 2 * values.take(rows, axis=0, mode="wrap")
+        - t * (t - 1) * (t - 2) / 6 * values.take(rows + 1, axis=0, mode="wrap")
     )

@@ -227,12 +227,12 @@ class Strips:
             force: Normal forces of these points (n_held,) [N].
         """
         keys = _keys(contacts)
-        known, strip = np.unique(keys, axis=0, return_inverse=True)
+        known, strip = np.unique(keys, return_inverse=True)
         total = np.zeros(len(known))
         if held is not None and len(held):
-            same = (known[:, None] == _keys(held)).all(axis=-1)
+            same = known[:, None] == _keys(held)
             total = same @ force
-        return cls(law=law, strip=strip.ravel(), force=total)
+        return cls(law=law, strip=strip, force=total)
 
     def sums(self, force: Array) -> Array:
         """Forces of the strips (n_strips,) [N] from those of the contacts (n,) [N]."""
@@ -333,5 +333,5 @@ def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> 
 
 
 def _keys(contacts: Contacts) -> Index:
-    """Sector, side and circular-spline tooth of each contact (n, 3)."""
-    return np.stack([contacts.sector, contacts.side, contacts.tooth], axis=-1)
+    """Number of the flank pair of each contact, in the order of the flanks (n,)."""
+    return ((2 * contacts.sector + contacts.side) << 32) + contacts.tooth

@@ -122,7 +122,7 @@ class Contacts:
     def share_flank_with(self, others: Contacts) -> NDArray[np.bool_]:
         """Whether the flexspline flank of each point has one of ``others`` (n,)."""
         key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
-        return np.isin(key, other)
+        return np.asarray((key[:, None] == other).any(axis=1))
 
     def add_places(
         self, sector: Index, side: Index, station: Array, apart: float

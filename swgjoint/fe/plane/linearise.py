@@ -98,13 +98,14 @@ class Linearised:
             sectors: Sectors whose matrices are needed (k,); None for all.
         """
         some = np.arange(len(self.hessian)) if sectors is None else sectors
-        matrix = self.hessian[some]
+        matrix = self.hessian.copy() if sectors is None else self.hessian[some]
         spring = self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
-        matrix[some == 0] += spring
+        matrix[np.flatnonzero(some == 0)] += spring
         fixed = self.fixed[some]
-        matrix[fixed] = 0.0
-        matrix.transpose(0, 2, 1)[fixed] = 0.0
-        np.einsum("sii->si", matrix)[fixed] = self.anchor_stiffness
+        if fixed.any():
+            matrix[fixed] = 0.0
+            matrix.transpose(0, 2, 1)[fixed] = 0.0
+            np.einsum("sii->si", matrix)[fixed] = self.anchor_stiffness
         return matrix
 
     def gap_gradient(self, contacts: Contacts) -> Array:

@@ -364,7 +364,9 @@ def _first_guess(
     The result is None if the candidates that overlap without forces are to be guessed.
     """
     if pressing is not None:
-        return np.isin(np.arange(len(contacts)), pressing)
+        guess = np.zeros(len(contacts), dtype=bool)
+        guess[pressing] = True
+        return guess
     if state.contacts is not None and len(state.contacts):
         return contacts.share_flank_with(state.contacts)
     return None

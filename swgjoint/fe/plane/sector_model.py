@@ -142,10 +142,7 @@ class SectorModel:
         nodes = skeleton[:, self.bore_nodes]
         if self.race is not None:
             return nodes
-        before = np.roll(nodes[:, -1:], 1, axis=0)
-        after = np.roll(nodes[:, 1:2], -1, axis=0)
-        before[0] *= self.closure
-        after[-1] *= self.closure
+        before, after = self._of_last(nodes[:, -1:]), self._of_next(nodes[:, 1:2])
         return np.concatenate([before, nodes, skeleton[:, -1:], after], axis=1)
 
     def bore_points(self, state: State) -> Array:
@@ -203,9 +200,16 @@ class SectorModel:
 
     def skeleton(self, state: State) -> Array:
         """Positions of all skeleton nodes per sector (N, n_a, 2) [m]."""
-        last = np.roll(state.faces, -1, axis=0)
-        last[-1] *= self.closure
+        last = self._of_next(state.faces)
         return np.concatenate([state.faces, state.bores, last], axis=1)
+
+    def _of_next(self, vectors: Array) -> Array:
+        """Vectors (N, k, 2) of the next sector in each sector."""
+        return np.concatenate([vectors[1:], self.closure * vectors[:1]])
+
+    def _of_last(self, vectors: Array) -> Array:
+        """Vectors (N, k, 2) of the preceding sector in each sector."""
+        return np.concatenate([self.closure * vectors[-1:], vectors[:-1]])
 
     def frames(self, state: State) -> Frames:
         """Sector frames; in a linear model all turn by the flexspline's rotation."""
@@ -304,11 +308,8 @@ class SectorModel:
         # stations also exert forces on neighbouring sectors: on the last inner node of
         # the previous one, the shared corner and the first inner node of the next one
         force = nodal[:, 1:-2].copy()
-        before, after = np.roll(nodal[:, 0], -1, axis=0), np.roll(nodal[:, -2:], 1, 0)
-        before[-1] *= self.closure
-        after[0] *= self.closure
-        force[:, -1] += before
-        force[:, :2] += after
+        force[:, -1:] += self._of_next(nodal[:, :1])
+        force[:, :2] += self._of_last(nodal[:, -2:])
         return np.asarray(force)
 
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
