@@ -10,7 +10,7 @@ import pytest
 from messages import naming
 
 from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.common.load_path import CHANCE, LoadPath
+from swgjoint.fe.common.load_path import CHANCE, PLACES, LoadPath, least_certain
 
 ERROR, ENERGY, COMPLIANCE = 1e-4, 1e-3, 6e-5
 
@@ -235,3 +235,25 @@ def test_torques_outside_are_refused():
         curve.evaluate_at([47.1])
     with pytest.raises(ValueError, match=naming("torque", "increase")):
         path([1.0, 1.0])
+
+
+def test_places_where_curves_are_least_certain():
+    """In each interval the angles with the largest doubts, no neighbours among them."""
+    rng = np.random.default_rng(7)
+    count = 24
+    paths = [
+        path(TORQUES, [(t, j * (1.0 + rng.random())) for t, j in EVENTS])
+        for _ in range(count)
+    ]
+    found = least_certain(paths)
+    intervals = len(TORQUES) - 1
+    assert found.shape == (PLACES * intervals, 3)
+    doubts = np.array([one.doubt[0] for one in paths])
+    for j in range(intervals):
+        number, torque, error = found[j::intervals].T
+        number = number.astype(int)
+        assert error[0] == doubts[:, j].max() and number[0] == doubts[:, j].argmax()
+        assert error == pytest.approx(doubts[number, j])
+        assert torque == pytest.approx([paths[k].division[j] for k in number])
+        apart = np.abs((np.subtract.outer(number, number) + 12) % count - 12)
+        assert apart[np.triu_indices(PLACES, 1)].min() > count / (2 * PLACES)

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 from known_samples import RATINGS, N, samples_of
 
+from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.fit.fit import fit_map
-from swgjoint.maps.fit.worst_positions import EXTRA, worst_positions
+from swgjoint.maps.fit.sample_curves import curves_at
+from swgjoint.maps.fit.worst_positions import (
+    EXTRA,
+    LEAST,
+    UNCERTAIN,
+    worst_positions,
+)
 from swgjoint.maps.samples import FullSolves
 
 ANGLES = 24
@@ -82,3 +89,35 @@ def test_only_sampled_signs_are_validated():
     )
     samples = replace(samples, unseen=one_sign)
     assert all(torque > 0.0 for torque, _ in worst_positions(fit_map(samples), samples))
+
+
+def test_positions_include_those_where_the_load_curves_are_least_certain():
+    """Relative to the peak to peak at the torque, within the torques of the map."""
+    samples = cornered(6.5)
+    drive = fit_map(samples)
+    torque = np.linspace(0.5, 1.05 * RATINGS.repeated_peak, 2 * UNCERTAIN)
+    height = np.ptp(curves_at(samples, np.minimum(torque, drive.torque_range[1]))[0], 1)
+    rank = np.random.default_rng(2).permutation(torque.size)
+    angle = samples.input_angle[rank % ANGLES]
+    places = np.column_stack([torque, angle, (1.0 + rank) * height])
+    none = np.zeros(0)
+    corners = ContactCorners(
+        angle=samples.input_angle,
+        period=ANGLES * STEP,
+        start=none,
+        step=none,
+        torque=np.zeros((0, 2)),
+        jump=none,
+        uncertain=places,
+    )
+    without = replace(corners, uncertain=places[:0])
+    found, others = (
+        set(worst_positions(drive, samples, {1.0: one})) for one in (corners, without)
+    )
+    more = found - others
+    inside = (torque > LEAST * RATINGS.repeated_peak) & (torque < RATINGS.repeated_peak)
+    inside &= torque < drive.torque_range[1]
+    assert inside.sum() > UNCERTAIN
+    worst = np.flatnonzero(inside)[rank[inside].argsort()[-UNCERTAIN:]]
+    expected = {(float(torque[k]), float(angle[k])) for k in worst}
+    assert more == expected

@@ -17,6 +17,7 @@ of the curve.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -49,6 +50,8 @@ straight line [-]."""
 SMOOTH = 0.4
 """Typical smooth variation of the compliance between two steps, as a fraction of the
 compliance [-]."""
+PLACES = 4
+"""Number of angles in each interval at which load curves may be least certain."""
 _GRID = np.linspace(0.0, 1.0, 17)
 """Points of an interval at which candidate curves are compared [-]."""
 _NEAR_END = 0.1
@@ -312,3 +315,27 @@ class LoadPath:
             apart = AGREED * np.abs(a - b) + BENT * np.abs(bend)
             difference[known] = apart[known]
         return differences[0], differences[1]
+
+
+def least_certain(paths: Sequence[LoadPath]) -> Array:
+    """Where the load curves of several angles are likely to be least accurate.
+
+    Args:
+        paths: Load paths with the same number of intervals, of n angles.
+
+    Returns:
+        For each interval between two torques, :data:`PLACES` angles with the largest
+        estimated errors of the output error that are not neighbours: the number of the
+        angle, the torque at which this curve should be divided [N·m], and the estimate
+        [rad] (PLACES n_intervals, 3).
+    """
+    error = np.array([path.doubt[0] for path in paths])  # (n, n_intervals)
+    division = np.array([path.division for path in paths])
+    count, interval = error.shape[0], np.arange(error.shape[1])
+    number, rows = np.arange(count)[:, None], []
+    for _ in range(PLACES):
+        worst = error.argmax(axis=0)
+        rows.append([worst, division[worst, interval], error[worst, interval]])
+        apart = np.abs((number - worst + count // 2) % count - count // 2)
+        error = np.where(apart > count / (2 * PLACES), error, 0.0)
+    return np.concatenate(rows, axis=1).T

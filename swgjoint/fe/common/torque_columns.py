@@ -12,7 +12,7 @@ from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.clearance import FAINT, add_clearance
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState
-from swgjoint.fe.common.load_path import LoadPath
+from swgjoint.fe.common.load_path import LoadPath, least_certain
 from swgjoint.fe.common.torque_choice import (
     Ripple,
     common_torques,
@@ -250,14 +250,12 @@ class ColumnGrid(SolvedColumns[AnyState]):
                     )
                 )
                 places.append(there)
-            weights = np.array(parts) + 1e-12
+            weights, ends = np.array(parts) + 1e-12, curve.torque
             torques = np.average(places, axis=0, weights=weights)
-            ends = curve.torque
             tried = sign * np.array([t for t in self.failed if t * sign > 0.0])
             for j, torque in enumerate(torques):
                 if not ((tried > ends[j]) & (tried < ends[j + 1])).any():
-                    part = float(weights[:, j].max())
-                    wanted.append((part, sign * float(torque)))
+                    wanted.append((float(weights[:, j].max()), sign * float(torque)))
         return wanted
 
     def _add_torque(self, count: int, torque: float) -> None:
@@ -276,8 +274,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
         columns, angle = self.all_columns(count), self.period * self.parts(count)
         found = {}
         for sign in self.signs:
-            changes = [self.path(one, sign)[0].contact_changes for one in columns]
-            found[sign] = ContactCorners.from_changes(angle, self.period, changes)
+            paths = [self.path(one, sign)[0] for one in columns]
+            changes, doubt = [p.contact_changes for p in paths], least_certain(paths)
+            found[sign] = ContactCorners.from_changes(
+                angle, self.period, changes, doubt
+            )
         return found
 
     def divide_angles(self, count: int, most: int, goal: float) -> bool:

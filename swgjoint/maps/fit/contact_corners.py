@@ -16,7 +16,7 @@ under which the contact changes, which is taken as linear between the two angles
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -50,6 +50,10 @@ class ContactCorners:
     [N·m]."""
     jump: Array
     """Jump of the compliance above this torque (m,) [rad/(N·m)]."""
+    uncertain: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """Where the load curves of the sampled angles are likely to be least accurate:
+    magnitude of the torque [N·m], angle [rad] and estimated error of the output error
+    [rad] in each interval between sampled torques (k, 3)."""
 
     @classmethod
     def from_changes(
@@ -57,6 +61,7 @@ class ContactCorners:
         angle: Array,
         period: float,
         changes: Sequence[tuple[Array, Array, Index]],
+        uncertain: Array | None = None,
     ) -> ContactCorners:
         """Changes that neighbouring angles predict alike.
 
@@ -68,6 +73,9 @@ class ContactCorners:
             period: Period of the samples [rad].
             changes: Torques [N·m], jumps of the compliance [rad/(N·m)] and numbers of
                 the contacts that change, each (m,), at every angle.
+            uncertain: Number of the angle, torque [N·m] and estimated error of the
+                output error [rad] where the load curves are likely to be least
+                accurate (k, 3); None without any.
         """
         rows = [np.zeros((0, 5))]
         for k, (one, two) in enumerate(pairwise(changes)):
@@ -77,7 +85,9 @@ class ContactCorners:
             step = np.broadcast_to([angle[k], angle[k + 1] - angle[k]], ends.shape)
             rows.append(np.column_stack([step, ends, jump]))
         start, step, first, last, jump = np.concatenate(rows).T
+        number, torque, error = (np.zeros((0, 3)) if uncertain is None else uncertain).T
         return cls(
+            uncertain=np.column_stack([torque, angle[number.astype(int)], error]),
             angle=angle,
             period=period,
             start=start,

@@ -5,7 +5,8 @@ error, and jumps of the curvature of the complementary potential, at few angles 
 torques. Equilibria at regular positions miss most of them. Local interpolation of the
 same samples over the angle follows the corners at the samples, and the load curves
 predict those between them (see :mod:`swgjoint.maps.fit.contact_corners`). The map is
-doubtful where it differs from this interpolation.
+doubtful where it differs from this interpolation, and where the load curves between the
+sampled torques are uncertain themselves.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ EXTRA = 32
 APART = (0.03, 0.1)
 """Smallest distance of torques that are not about the same, relative to the repeated
 peak torque and to the torque itself, whichever is less [-]."""
+UNCERTAIN = 16
+"""Number of additional positions of one sign where the load curves are least certain.
+"""
 AT_TORQUE = 4
 """Largest number of additional positions of each quantity at about the same torque."""
 LEAST = 0.01
@@ -52,7 +56,7 @@ def worst_positions(
     At every validation torque there is one angle for the output error and one for the
     input torque. :data:`EXTRA` other positions for each quantity are those at which the
     map and the local interpolation differ most in relation to the peak to peak over the
-    angle.
+    angle, and :data:`UNCERTAIN` are those at which the load curves are least certain.
 
     Args:
         drive: Map of the samples.
@@ -60,7 +64,7 @@ def worst_positions(
         corners: Predicted contact changes between the sampled angles; None without any.
 
     Returns:
-        Output torque [N·m] and input angle [rad] of each position. No angle is sampled.
+        Output torque [N·m] and input angle [rad] of each position. None was sampled.
     """
     assert samples.unseen is not None
     corners = {} if corners is None else corners
@@ -97,7 +101,29 @@ def worst_positions(
                 worst_near(quantity, float(torques[j]), float(theta[k]))
                 for j, k in _largest_apart(torques / peak, doubt)
             ]
+        if sign in corners:
+            places = corners[sign].uncertain * [sign, 1.0, 1.0]
+            part = sign * places[:, 0] / peak
+            inside = (places[:, 0] > low) & (places[:, 0] < high)
+            places = places[(part > LEAST) & (part < 1.0) & inside]
+            positions += _least_certain(samples, places)
     return sorted(set(positions))
+
+
+def _least_certain(samples: MapSamples, uncertain: Array) -> list[tuple[float, float]]:
+    """Positions at which the load curves between the torques are least certain.
+
+    The map and the local interpolation over the angle share the errors of these curves.
+
+    Args:
+        samples: The samples.
+        uncertain: Torque [N·m], angle [rad] and estimated error of the output error
+            [rad] of one position in each interval (k, 3).
+    """
+    error, _ = curves_at(samples, uncertain[:, 0])
+    part = uncertain[:, 2] / np.ptp(error, axis=1)
+    worst = uncertain[part.argsort()[-UNCERTAIN:]]
+    return [(float(torque), float(angle)) for torque, angle, _ in worst]
 
 
 def _between_torques(samples: MapSamples, theta: Array, corners: Corners) -> Array:
