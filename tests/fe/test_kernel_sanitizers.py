@@ -90,7 +90,7 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
     files += sorted((tests / "gear").glob("test_compiled_*.py"))
     files += sorted((tests / "envs").glob("test_compiled_*.py"))
     files += sorted((tests / "maps").glob("test_compiled_*.py"))
-    assert len(files) == 10
+    assert len(files) == 11
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,
@@ -109,7 +109,7 @@ def test_the_loops_are_clean(tmp_path):
 
 def test_an_access_beyond_an_array_is_found(tmp_path):
     """One point too many in a loop of the module ends the tests."""
-    wrong = ("outline.cc", "i < n; ++i, points", "i <= n; ++i, points")
+    wrong = ("outline.cc", "i < n; ++i) seen", "i <= n; ++i) seen")
     ended = run_twins(build(tmp_path, wrong))
     assert ended.returncode != 0
     assert "AddressSanitizer" in ended.stderr

@@ -170,8 +170,8 @@ def test_a_planted_overflow_is_found(tmp_path):
 
 def test_a_planted_index_past_an_empty_table_is_found(tmp_path):
     """A map without harmonics has no table, of which nothing may be indexed."""
-    line = "table_.data() + static_cast<size_t>(segment) * blocks_ * size.block()"
-    planted = "&table_[static_cast<size_t>(segment) * blocks_ * size.block()]"
+    line = "table_->data() + static_cast<size_t>(segment) * blocks_ * size.block()"
+    planted = "&(*table_)[static_cast<size_t>(segment) * blocks_ * size.block()]"
     library = build(tmp_path, ("drive_map.cc", line, planted))
     done = run_tests(library, "tests/joint/test_twin.py", "-k", "without_harmonics")
     assert done.returncode != 0
