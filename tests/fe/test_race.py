@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 import pytest
 from messages import naming
+from solved import BEARING
 
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
@@ -35,13 +36,6 @@ from swgjoint.gear.design.design import Design
 
 TORQUE = 20.0
 PITCH = 2.0 * pi / 42
-BEARING = {
-    "wave_generator.bearing.balls": 12,
-    "wave_generator.bearing.ball_diameter_mm": 4.0,
-    "wave_generator.bearing.race_thickness_mm": 1.0,
-    "wave_generator.bearing.clearance_um": 20.0,
-    "wave_generator.bearing.race_width_mm": 8.0,
-}
 FLAWED = {"tolerances.circular_spline_cumulative_pitch_um": 5.0}
 MORE_ERRORS = {
     "tolerances.flexspline_cumulative_pitch_um": 10.0,

@@ -33,6 +33,15 @@ FEW_TEETH = 60
 FEW_PITCH = 2.0 * pi / 62
 """The same of ``few_teeth`` [rad]."""
 
+BEARING = {
+    "wave_generator.bearing.balls": 12,
+    "wave_generator.bearing.ball_diameter_mm": 4.0,
+    "wave_generator.bearing.race_thickness_mm": 1.0,
+    "wave_generator.bearing.clearance_um": 20.0,
+    "wave_generator.bearing.race_width_mm": 8.0,
+}
+"""Changes of a design that put the small gears of the tests on a ball bearing."""
+
 
 def kept(name: str, solve: Callable[[], T]) -> T:
     """The result of ``solve``, from the folder of the run or computed and put there."""

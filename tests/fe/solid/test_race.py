@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 import pytest
 from messages import naming
+from solved import BEARING
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
@@ -19,13 +20,6 @@ from swgjoint.gear.teeth.neutral_line import NeutralLine
 from swgjoint.gear.wave_generators.ellipse import Elliptical
 
 TORQUE = 5.0
-BEARING = {
-    "wave_generator.bearing.balls": 12,
-    "wave_generator.bearing.ball_diameter_mm": 4.0,
-    "wave_generator.bearing.race_thickness_mm": 1.0,
-    "wave_generator.bearing.clearance_um": 20.0,
-    "wave_generator.bearing.race_width_mm": 8.0,
-}
 
 
 @pytest.fixture(scope="module")

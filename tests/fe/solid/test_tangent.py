@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import BEARING
 
 from swgjoint.fe.solid import tangent as module
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -13,14 +14,6 @@ from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.equilibrium import SolidSolver
 from swgjoint.fe.solid.linearise import linearise
 from swgjoint.fe.solid.tangent import SolidTangent, keeps_tangent
-
-BEARING = {
-    "wave_generator.bearing.balls": 12,
-    "wave_generator.bearing.ball_diameter_mm": 4.0,
-    "wave_generator.bearing.race_thickness_mm": 1.0,
-    "wave_generator.bearing.clearance_um": 20.0,
-    "wave_generator.bearing.race_width_mm": 8.0,
-}
 
 
 def with_other_contact(state, bore):

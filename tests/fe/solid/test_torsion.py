@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solved import kept
+from solved import BEARING, kept
 
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.figures.torsion import SMALL, solid_torsion
@@ -12,13 +12,6 @@ from swgjoint.fe.solid.figures.torsion import SMALL, solid_torsion
 pytestmark = pytest.mark.fe
 
 TORQUES = (2.0, 5.0)
-BEARING = {
-    "wave_generator.bearing.balls": 12,
-    "wave_generator.bearing.ball_diameter_mm": 4.0,
-    "wave_generator.bearing.race_thickness_mm": 1.0,
-    "wave_generator.bearing.clearance_um": 20.0,
-    "wave_generator.bearing.race_width_mm": 8.0,
-}
 
 
 @pytest.fixture(scope="module")
