@@ -131,6 +131,23 @@ SWGJOINT_INLINE void Store(double* to, const V& x) {
   std::memcpy(to, &x, sizeof(V));
 }
 #endif
+
+// For a loop over vectors that are used several times: the compiler neither sorts the
+// operations of all passes by their results nor reads a vector again for each use after
+// its place has been hidden. Both would take half as long again.
+#if defined(__GNUC__) && !defined(__clang__)
+#define SWGJOINT_ROLLED _Pragma("GCC unroll 1")
+#else
+#define SWGJOINT_ROLLED
+#endif
+SWGJOINT_INLINE void Hide(const double** place) {
+#if defined(__GNUC__)
+  asm("" : "+r"(*place));
+#else
+  static_cast<void>(place);
+#endif
+}
+
 SWGJOINT_INLINE double Dot(const Pair& a, const Pair& b) {
   const Pair product = a * b;
   return product[0] + product[1];

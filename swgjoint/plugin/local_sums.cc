@@ -45,7 +45,6 @@ void LocalSums::Set(const double* orders, const double* errors, int count,
   waves_ = static_cast<int>(of_theta.size());
   width_ = 2 * kReach / top_psi_;
   const size_t padded = Padded(of_theta.size());
-  blocks_ = static_cast<int>(padded) / kWideLanes;
   place_.resize(count);
   std::iota(place_.begin(), place_.end(), 0);
   std::stable_sort(place_.begin(), place_.end(),
@@ -76,7 +75,6 @@ void LocalSums::Set(const double* orders, const double* errors, int count,
   turned_.assign(2 * m_.size(), 0.0);
   error_z_.assign(2 * kTerms * padded, 0.0);
   base_.assign(2 * padded, 0.0);
-  weights_.assign(kWeights * kTerms * padded, 0.0);
   windows_.assign(segments, Window());
   known_ = false;
 }
@@ -177,86 +175,78 @@ bool LocalSums::Step(double dtheta, double dpsi) {
       !(top_psi_ * std::fabs(dpsi) <= kChange)) {
     return false;
   }
-  StepAll(dtheta, dpsi);
+  dtheta_ = dtheta;
+  dpsi_ = dpsi;
   return true;
 }
 
-// Computes the weights of all amplitudes in the sums of a step from t = 0 to t = 1.
-template <class V>
-SWGJOINT_INLINE void LocalSums::StepWaves(double dtheta, double dpsi) {
-  constexpr int width = sizeof(V) / sizeof(double);
-  // (s + t dpsi)^d is the sum over k of by[d][k] t^k
-  double by[kTerms][kWithin + 1] = {{1}}, begin[kTerms], end[kTerms];
-  begin[0] = end[0] = 0.5;
+LocalSums::Powers LocalSums::PowersOfStep() const {
+  Powers of;
+  of.begin[0] = of.end[0] = 0.5;
   for (int d = 1; d < kTerms; ++d) {
-    by[d][0] = by[d - 1][0] * s_;
+    of.by[d][0] = of.by[d - 1][0] * s_;
     for (int k = 1; k <= std::min(d, kWithin); ++k) {
-      by[d][k] = by[d - 1][k] * s_ + by[d - 1][k - 1] * dpsi;
+      of.by[d][k] = of.by[d - 1][k] * s_ + of.by[d - 1][k - 1] * dpsi_;
     }
-    begin[d] = begin[d - 1] * s_;
-    end[d] = end[d - 1] * (s_ + dpsi);
+    of.begin[d] = of.begin[d - 1] * s_;
+    of.end[d] = of.end[d - 1] * (s_ + dpsi_);
   }
-  const size_t padded = n_.size();
-  for (size_t first = 0; first < padded; first += width) {
-    V n, c0, s0, c, s, sinc;
-    Load(&n_[first], &n);
-    Load(&base_[first], &c0);
-    Load(&base_[padded + first], &s0);
-    const V x = n * dtheta, xx = x * x;
-    SincCos<1>(x, &sinc, &c);
-    s = x * sinc;
-    // integrals of t^k exp(i x t): the last one is a series, the others follow by
-    // integration by parts
-    constexpr int kSeriesTerms = 18;
-    V re[kWithin + 1], im[kWithin + 1];
-    V even = {}, odd = {};
-    double factor[kSeriesTerms] = {1};
-    for (int j = 1; j < kSeriesTerms; ++j) factor[j] = factor[j - 1] / j;
-    for (int j = kSeriesTerms - 2; j >= 0; j -= 2) {
-      const double sign = j % 4 ? -1 : 1;
-      even = even * xx + sign * factor[j] / (j + kWithin + 1);
-      odd = odd * xx + sign * factor[j + 1] / (j + kWithin + 2);
-    }
-    re[kWithin] = even;
-    im[kWithin] = odd * x;
-    for (int k = kWithin; k > 0; --k) {
-      re[k - 1] = (c + x * im[k]) * (1.0 / k);
-      im[k - 1] = (s - x * re[k]) * (1.0 / k);
-    }
-    // turned by the phases at the start
-    const V c1 = c0 * c - s0 * s, s1 = s0 * c + c0 * s;
-    for (int k = 0; k <= kWithin; ++k) {
-      const V before = re[k];
-      re[k] = before * c0 - im[k] * s0;
-      im[k] = before * s0 + im[k] * c0;
-    }
-    V last_re = {}, last_im = {};
-    double* to = &weights_[first / kWideLanes * kTerms * kWeights * kWideLanes +
-                           first % kWideLanes];
-    for (int d = 0; d < kTerms; ++d, to += kWeights * kWideLanes) {
-      V mean_re = {}, mean_im = {};
-      for (int k = 0; k <= std::min(d, kWithin); ++k) {
-        mean_re += re[k] * by[d][k];
-        mean_im += im[k] * by[d][k];
-      }
-      Store(to, c0 * begin[d] + c1 * end[d]);
-      Store(to + kWideLanes, s0 * begin[d] + s1 * end[d]);
-      // derivative by theta, i n
-      Store(to + 2 * kWideLanes, mean_im * n * -1);
-      Store(to + 3 * kWideLanes, mean_re * n);
-      Store(to + 4 * kWideLanes, last_re * d);
-      Store(to + 5 * kWideLanes, last_im * d);
-      last_re = mean_re;
-      last_im = mean_im;
-    }
-  }
+  return of;
 }
 
-SWGJOINT_CLONES void LocalSums::StepAll(double dtheta, double dpsi) {
-  if (kHasWide) {
-    StepWaves<Wide>(dtheta, dpsi);
-  } else {
-    StepWaves<Lanes>(dtheta, dpsi);
+// Computes the weights of the waves from `first` on in the sums of a step from t = 0 to
+// t = 1, as many as the vectors have lanes.
+template <class V>
+SWGJOINT_INLINE void LocalSums::Weigh(const Powers& of, size_t first, double* to) const {
+  const size_t padded = n_.size();
+  V n, c0, s0, c, s, sinc;
+  Load(&n_[first], &n);
+  Load(&base_[first], &c0);
+  Load(&base_[padded + first], &s0);
+  const V x = n * dtheta_, xx = x * x;
+  SincCos<1>(x, &sinc, &c);
+  s = x * sinc;
+  // integrals of t^k exp(i x t): the last one is a series, the others follow by
+  // integration by parts
+  constexpr int kSeriesTerms = 18;
+  V re[kWithin + 1], im[kWithin + 1];
+  V even = {}, odd = {};
+  double factor[kSeriesTerms] = {1};
+  for (int j = 1; j < kSeriesTerms; ++j) factor[j] = factor[j - 1] / j;
+  for (int j = kSeriesTerms - 2; j >= 0; j -= 2) {
+    const double sign = j % 4 ? -1 : 1;
+    even = even * xx + sign * factor[j] / (j + kWithin + 1);
+    odd = odd * xx + sign * factor[j + 1] / (j + kWithin + 2);
+  }
+  re[kWithin] = even;
+  im[kWithin] = odd * x;
+  for (int k = kWithin; k > 0; --k) {
+    re[k - 1] = (c + x * im[k]) * (1.0 / k);
+    im[k - 1] = (s - x * re[k]) * (1.0 / k);
+  }
+  // turned by the phases at the start
+  const V c1 = c0 * c - s0 * s, s1 = s0 * c + c0 * s;
+  for (int k = 0; k <= kWithin; ++k) {
+    const V before = re[k];
+    re[k] = before * c0 - im[k] * s0;
+    im[k] = before * s0 + im[k] * c0;
+  }
+  V last_re = {}, last_im = {};
+  for (int d = 0; d < kTerms; ++d, to += kWeights * kWideLanes) {
+    V mean_re = {}, mean_im = {};
+    for (int k = 0; k <= std::min(d, kWithin); ++k) {
+      mean_re += re[k] * of.by[d][k];
+      mean_im += im[k] * of.by[d][k];
+    }
+    Store(to, c0 * of.begin[d] + c1 * of.end[d]);
+    Store(to + kWideLanes, s0 * of.begin[d] + s1 * of.end[d]);
+    // derivative by theta, i n
+    Store(to + 2 * kWideLanes, mean_im * n * -1);
+    Store(to + 3 * kWideLanes, mean_re * n);
+    Store(to + 4 * kWideLanes, last_re * d);
+    Store(to + 5 * kWideLanes, last_im * d);
+    last_re = mean_re;
+    last_im = mean_im;
   }
 }
 
@@ -316,29 +306,49 @@ SWGJOINT_CLONES void LocalSums::BuildAll(Window* window) const {
   }
 }
 
+// The weights of a block of waves are used while they are in the fastest cache, because
+// reading the polynomials of all waves already takes as long as the arithmetic.
 template <class V>
 SWGJOINT_INLINE void LocalSums::SumWaves(const Window& window, Totals* out) const {
-  constexpr int width = sizeof(V) / sizeof(double);
-  for (int part = 0; part < kColumns; part += width) {
-    // real and imaginary parts in sums that do not wait for each other
-    V sum[kWeights] = {};
-    const double* z = window.z.data() + part;
-    for (int wave = 0; wave < waves_; ++wave) {
-      const double* by = &weights_[wave / kWideLanes * kTerms * kWeights * kWideLanes +
-                                   wave % kWideLanes];
-      for (int d = 0; d < kTerms; ++d, z += 2 * kColumns) {
-        V re, im;
-        Load(z, &re);
-        Load(z + kColumns, &im);
-        for (int q = 0; q < kWeights; q += 2, by += 2 * kWideLanes) {
-          sum[q] += re * by[0];
-          sum[q + 1] += im * by[kWideLanes];
+  constexpr int width = sizeof(V) / sizeof(double), parts = kColumns / width;
+  const Powers of = PowersOfStep();
+  alignas(64) double weights[kTerms * kWeights * kWideLanes];
+  // real and imaginary parts in sums that do not wait for each other
+  V sum[parts][kWeights] = {};
+  const double* block = window.z.data();
+  for (int first = 0; first < waves_; first += kWideLanes) {
+    const int count = std::min(kWideLanes, waves_ - first);
+    for (int lane = 0; lane < kWideLanes; lane += width) {
+      Weigh<V>(of, first + lane, weights + lane);
+    }
+    for (int part = 0; part < parts; ++part) {
+      const double* z = block + part * width;
+      V own[kWeights];
+      std::copy_n(sum[part], kWeights, own);
+      for (int wave = 0; wave < count; ++wave) {
+        const double* by = weights + wave;
+        SWGJOINT_ROLLED
+        for (int d = 0; d < kTerms; ++d) {
+          V re, im;
+          Load(z, &re);
+          Load(z + kColumns, &im);
+          z += 2 * kColumns;
+          Hide(&z);
+          for (int q = 0; q < kWeights; q += 2, by += 2 * kWideLanes) {
+            own[q] += re * by[0];
+            own[q + 1] += im * by[kWideLanes];
+          }
         }
       }
+      std::copy_n(own, kWeights, sum[part]);
     }
-    Store(out->mean + part, sum[0] - sum[1]);
-    Store(out->theta + part, sum[2] - sum[3]);
-    Store(out->psi + part, sum[4] - sum[5]);
+    block += count * kTerms * 2 * kColumns;
+  }
+  for (int part = 0; part < parts; ++part) {
+    const V* own = sum[part];
+    Store(out->mean + part * width, own[0] - own[1]);
+    Store(out->theta + part * width, own[2] - own[3]);
+    Store(out->psi + part * width, own[4] - own[5]);
   }
 }
 

@@ -78,12 +78,18 @@ class LocalSums {
     LaneVector z;          // (waves, kTerms, 2, kColumns)
   };
 
+  // In a step, (s + t dpsi)^d is the sum over k of by[d][k] t^k; halves of its values at
+  // t = 0 and t = 1.
+  struct Powers {
+    double by[kTerms][kWithin + 1] = {{1}}, begin[kTerms], end[kTerms];
+  };
+
   template <class V>
   double BeginWaves(double theta);
   double BeginAll(double theta);
+  Powers PowersOfStep() const;
   template <class V>
-  void StepWaves(double dtheta, double dpsi);
-  void StepAll(double dtheta, double dpsi);
+  void Weigh(const Powers& of, size_t first, double* to) const;
   template <class V>
   void BuildErrors();
   void BuildErrorsAll();
@@ -99,7 +105,7 @@ class LocalSums {
   void SumAll(const Window& window, Totals* out) const;
   void Fill(const double* table, LaneVector* out) const;
 
-  int waves_ = 0, blocks_ = 0;  // different orders in theta, and blocks of them
+  int waves_ = 0;  // number of different orders in theta
   double top_theta_ = 0, top_psi_ = 0, width_ = 0;
   std::vector<int> place_;        // harmonics sorted by their order in theta
   std::vector<int> first_;        // first harmonic of each wave, and their number
@@ -116,8 +122,7 @@ class LocalSums {
   LaneVector turned_;             // (2, orders in psi), cos and sin of m center_
   LaneVector error_z_;            // (kTerms, 2, waves)
   LaneVector base_;               // (2, waves), exp(i n theta)
-  // of the step
-  LaneVector weights_;            // (blocks, kTerms, kWeights, lanes)
+  double dtheta_ = 0, dpsi_ = 0;  // of the step
 };
 
 }  // namespace swgjoint
