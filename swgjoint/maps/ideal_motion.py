@@ -77,6 +77,12 @@ class IdealMotion:
 
     Shape (3, n, 2).
     """
+    known: dict[int, Array] | None
+    """Sums over the potential in an interval of the torsion (3, n, 5), by its number.
+
+    A transform yields them at all positions, so it runs once per interval. None if the
+    harmonics are summed only at the positions that need an interval.
+    """
 
     @classmethod
     def from_map(
@@ -105,7 +111,7 @@ class IdealMotion:
         def sums(amplitudes: Array, there: Index | slice) -> Array:
             return every[:, there] @ amplitudes.reshape(every.shape[2], -1)
 
-        return cls._summed(drive, theta, about, sums)
+        return cls._summed(drive, theta, about, sums, None)
 
     @classmethod
     def over_period(
@@ -141,7 +147,7 @@ class IdealMotion:
             parts = (amplitudes, slope, bend)
             return np.stack([transform(part)[there] for part in parts])
 
-        return cls._summed(drive, theta, theta / drive.ratio - lag, sums)
+        return cls._summed(drive, theta, theta / drive.ratio - lag, sums, {})
 
     @classmethod
     def _summed(
@@ -150,6 +156,7 @@ class IdealMotion:
         theta: Array,
         about: Array,
         sums: Callable[[Array, Index | slice], Array],
+        known: dict[int, Array] | None,
     ) -> IdealMotion:
         """The map with the sums that do not depend on the torsion."""
         return cls(
@@ -159,6 +166,7 @@ class IdealMotion:
             error=sums(drive.kinematic_error[..., None], slice(None))[..., 0],
             sums=sums,
             ends=sums(drive.end_stiffness, slice(None)),
+            known=known,
         )
 
     def polynomials(self, interval: Index, known: Polynomials | None) -> Polynomials:
@@ -171,10 +179,9 @@ class IdealMotion:
             known: Polynomials that are kept where their interval is the same; None if
                 there are none.
         """
-        table = self.drive.potential  # (n_harmonics, 2, n_knots - 1, 5)
         if known is None:
             changed = np.arange(interval.size)
-            coefficients = np.empty((3, interval.size, table.shape[-1]))
+            coefficients = np.empty((3, interval.size, self.drive.potential.shape[-1]))
         else:
             changed = np.flatnonzero(interval != known.interval)
             if not changed.size:
@@ -183,8 +190,17 @@ class IdealMotion:
         order = changed[np.argsort(interval[changed], kind="stable")]
         ends = np.flatnonzero(np.diff(interval[order])) + 1
         for rows in np.split(order, ends):
-            coefficients[:, rows] = self.sums(table[:, :, interval[rows[0]]], rows)
+            coefficients[:, rows] = self._in_interval(int(interval[rows[0]]), rows)
         return Polynomials(interval=interval, coefficients=coefficients)
+
+    def _in_interval(self, number: int, rows: Index) -> Array:
+        """Polynomials in one interval at some positions. Shape (3, n_rows, 5)."""
+        amplitudes = self.drive.potential[:, :, number]
+        if self.known is None:
+            return self.sums(amplitudes, rows)
+        if number not in self.known:
+            self.known[number] = self.sums(amplitudes, slice(None))
+        return self.known[number][:, rows]
 
     def torque(
         self, shift: Array, known: Polynomials | None = None
