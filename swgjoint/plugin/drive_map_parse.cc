@@ -227,28 +227,37 @@ bool DriveMap::Read(const DriveText& text, std::string* error) {
     base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
     if (seg > 0) low_[seg] = knots_[seg - 1];
     if (seg <= m) high_[seg] = knots_[seg];
-    for (int k = 0; k < n_; ++k) {
-      for (int ab = 0; ab < 2; ++ab) {
-        double to[5] = {0, 0, 0, 0, 0};
-        const int j = std::clamp(seg - 1, 0, m - 1);
-        const double* from = &potential[((2 * k + ab) * static_cast<size_t>(m) + j) * 5];
-        if (seg >= 1 && seg <= m) {
-          std::copy(from, from + 5, to);
-        } else {
-          const double d = seg == 0 ? 0.0 : knots_[m] - knots_[m - 1];
-          to[0] = Value(from, d);
-          to[1] = Slope(from, d);
-          to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
+  }
+  // coefficients of A (ab = 0) or B of a harmonic in a segment
+  const auto read = [&](int k, int ab, int seg, double to[5]) {
+    const int j = std::clamp(seg - 1, 0, m - 1);
+    const double* from = &potential[((2 * k + ab) * static_cast<size_t>(m) + j) * 5];
+    if (seg >= 1 && seg <= m) {
+      std::copy(from, from + 5, to);
+    } else {
+      const double d = seg == 0 ? 0.0 : knots_[m] - knots_[m - 1];
+      to[0] = Value(from, d);
+      to[1] = Slope(from, d);
+      to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
+      to[3] = to[4] = 0;
+    }
+  };
+  for (int seg = 0; seg < segments_; ++seg) {
+    double to[5], *mean = &mean_[static_cast<size_t>(seg) * size_.mean()];
+    read(0, 0, seg, to);
+    for (int p = 0; p < 5; ++p) mean[p * lanes] = to[p];
+  }
+  // block by block, because the harmonics of one fit in the fastest cache
+  for (int block = 0; block < blocks_; ++block) {
+    const int first = 1 + block * lanes, count = std::min(lanes, n_ - first);
+    for (int seg = 0; seg < segments_; ++seg) {
+      const size_t place = static_cast<size_t>(seg) * blocks_ + block;
+      double to[5], *row = &(*table)[place * size_.block()];
+      for (int lane = 0; lane < count; ++lane) {
+        for (int ab = 0; ab < 2; ++ab) {
+          read(first + lane, ab, seg, to);
+          for (int p = 0; p < 5; ++p) row[(2 * p + ab) * lanes + lane] = to[p];
         }
-        if (k == 0) {
-          double* mean = &mean_[static_cast<size_t>(seg) * size_.mean()];
-          for (int p = 0; ab == 0 && p < 5; ++p) mean[p * lanes] = to[p];
-          continue;
-        }
-        const int block = (k - 1) / lanes, lane = (k - 1) % lanes;
-        const size_t place = static_cast<size_t>(seg) * blocks_ + block;
-        double* row = &(*table)[place * size_.block()];
-        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * lanes + lane] = to[p];
       }
     }
   }
