@@ -81,7 +81,9 @@ def _solve(
 ) -> Array:
     """Output angles of one chunk [rad]; ``curve`` is torque and torsion of the mean."""
     ideal = theta / drive.ratio
-    e0, _, _ = drive.error_at(drive.phases(theta, ideal))
+    # the points of a loop have one input angle
+    same = slice(1) if (theta == theta[0]).all() else slice(None)
+    e0, _, _ = drive.error_at(drive.phases(theta[same], ideal[same]))
     twist = np.where(torque == 0.0, 0.0, np.interp(torque, *curve))
     psi = ideal + e0 - twist
     span = float(drive.torsion_knots[-1] - drive.torsion_knots[0])
