@@ -131,9 +131,13 @@ class Run:
         return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))
 
     def metrics(self) -> dict[str, Any]:
-        """Figures of the run under the keys of ``swgjoint run --json``."""
-        return deepcopy(self._figures)
+        """Figures of the run under the keys of ``swgjoint run --json``.
+
+        The result is a copy, which may be changed.
+        """
+        return deepcopy(self.figures)
 
     @cached_property
-    def _figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Any]:
+        """The same figures, which must not be changed; reading them takes no copy."""
         return run_metrics(self)

@@ -96,9 +96,9 @@ def gauge_tables(runs: Mapping[str, Run]) -> list[Table]:
             header=GAUGE_COLUMNS,
             rows=[
                 [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                for cells in gauge_grid(run.metrics()["joints"])
+                for cells in gauge_grid(run.figures["joints"])
             ],
-            notes=gauge_notes(run.metrics()["joints"]),
+            notes=gauge_notes(run.figures["joints"]),
         )
         for label, run in runs.items()
         if run.assembly.gauges

@@ -75,7 +75,7 @@ def run_png(run: Run) -> bytes:
         axis.set_xlabel("time [s]   (shaded: used for the figures)")
         axis.margins(x=0)
     _ripple_bars(axes[2, 0], run)
-    metrics = run.metrics()
+    metrics = run.figures
     _spectrum(axes[2, 1], run, metrics["joints"], colors)
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper right", ncols=min(4, len(names)))
@@ -89,7 +89,7 @@ def _ripple_bars(axis: Any, run: Run) -> None:
 
     A joint without a value gets a dash.
     """
-    joints = run.metrics()["joints"]
+    joints = run.figures["joints"]
     places = np.arange(len(joints))
     kinds = {"ripple_pp_percent": "peak to peak", "ripple_rms_percent": "rms"}
     heights = [

@@ -61,7 +61,7 @@ def thermal_tables(runs: Mapping[str, Run]) -> list[Table]:
             header=THERMAL_COLUMNS,
             rows=[
                 [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                for cells in thermal_grid(run.metrics()["joints"])
+                for cells in thermal_grid(run.figures["joints"])
             ],
         )
         for label, run in runs.items()

@@ -31,7 +31,7 @@ def life_picture(run: Run) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    metrics = run.metrics()
+    metrics = run.figures
     figure = Figure(figsize=(13.0, 6.0), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(2.2, 1.0))
     torque = figure.add_subplot(grid[0, 0])

@@ -29,7 +29,7 @@ def bearing_tables(runs: Mapping[str, Run]) -> list[Table]:
     for label, run in runs.items():
         if not run.assembly.bearings:
             continue
-        joints = run.metrics()["joints"]
+        joints = run.figures["joints"]
         tables.append(
             Table(
                 title=f"Output bearings of {label}",
@@ -54,7 +54,7 @@ def life_tables(runs: Mapping[str, Run]) -> list[Table]:
     for label, run in runs.items():
         if not run.cycle:
             continue
-        metrics = run.metrics()
+        metrics = run.figures
         lives = {name: joint["life"] for name, joint in metrics["joints"].items()}
         columns, rows = life_grid(lives)
         tables.append(

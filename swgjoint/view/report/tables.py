@@ -70,7 +70,7 @@ def alerts(runs: Mapping[str, Run]) -> list[str]:
     return [
         f"{label}: {NOT_VALID}: {reason}"
         for label, run in runs.items()
-        for reason in run.metrics()["reasons"]
+        for reason in run.figures["reasons"]
     ]
 
 
@@ -78,7 +78,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
     """Figures of the worst joints and of the tool, one row per run."""
     rows, window = [], ""
     for label, run in runs.items():
-        metrics = run.metrics()
+        metrics = run.figures
         window = metrics["window_of"]
         joints = metrics["joints"].values()
         peaks = [
@@ -123,7 +123,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
             *_legend(
                 joint
                 for run in runs.values()
-                for joint in run.metrics()["joints"].values()
+                for joint in run.figures["joints"].values()
             ),
         ],
     )
@@ -179,7 +179,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
         step: Result of ``swgjoint.view.validity.step_error``; None if not computed.
     """
     simulation = run.assembly.scene.simulation
-    metrics = run.metrics()
+    metrics = run.figures
     limits = [*metrics["reasons"], *warnings_of(metrics["joints"])]
     lines = [Cell(text, "bad") for text in limits]
     lines.append(
@@ -245,7 +245,7 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
     """Figures of one joint in every run."""
     rows, loads = [], ("peak_Nm", "cubed_mean_Nm", "input_speed_rpm")
     for label, run in runs.items():
-        figures = run.metrics()["joints"][joint]
+        figures = run.figures["joints"][joint]
         ratings = figures["ratings"]
         torsion, error = figures["torsion_arcmin"], figures["transmission_error_arcmin"]
         shown = map(above_noise, (torsion["mean"], torsion["pp"], error["mean"]))
@@ -287,7 +287,7 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
         rows=rows,
         notes=[
             "* not an order of this drive: vibration, modulation or another joint.",
-            *_legend(run.metrics()["joints"][joint] for run in runs.values()),
+            *_legend(run.figures["joints"][joint] for run in runs.values()),
         ],
     )
 
