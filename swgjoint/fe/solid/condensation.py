@@ -57,6 +57,7 @@ def condense(
     linear: SolidLinearised,
     tangent: SolidTangent,
     found: ToothRows | None,
+    circular_spline_moved: Array,
     rotation: float | None = None,
 ) -> Condensed:
     """Condense the ring to tooth contacts and rotations.
@@ -67,6 +68,8 @@ def condense(
         linear: The linearised ring.
         tangent: Its factorised tangent, or that of a state nearby.
         found: Tooth contacts; None if there are none.
+        circular_spline_moved: Displacements of the flanks of the circular spline
+            (N_c, n_c) [m].
         rotation: Rotation of the bore of the diaphragm to which its unknown is relative
             [rad]; None for the rotation of the state.
     """
@@ -108,12 +111,8 @@ def condense(
         pushed = loads[near] @ strip.teeth.compliance[:, :flank]
         old = np.einsum("kb,kb->k", found.weight, pushed[place])
         if model.teeth.elastic_circular_spline is not None:
-            moved = model.teeth.elastic_circular_spline.displacement(
-                state.circular_spline_force
-            )
-            old += np.einsum(
-                "kb,kb->k", found.circular_spline_weight, moved[found.contacts.tooth]
-            )
+            facing = circular_spline_moved[found.contacts.tooth]
+            old += np.einsum("kb,kb->k", found.circular_spline_weight, facing)
         gap = found.contacts.gap - old
         free = bore.among_points(bore.free_gap)
         gap -= np.einsum("kp,kp->k", eased, free[sector])

@@ -215,11 +215,12 @@ def _solve_linear(
     """Condense the ring to tooth forces and rotations, solve and expand the result."""
     # candidates of tooth contact, and the condensed problem
     candidates, (reach, thorough, stay) = None, search
+    moved = model.teeth.displace_circular_spline(state.circular_spline_force)
     if load.teeth:
         candidates = model.teeth.find(
             linear.frames[0],
             model.loads(state),
-            state.circular_spline_force,
+            moved,
             reach,
             state.held,
             thorough=thorough,
@@ -227,7 +228,9 @@ def _solve_linear(
             circular_spline_rotation=state.circular_spline_rotation,
             held_force=state.tooth_force,
         )
-    condensed = condense(model, state, linear, tangent, candidates, load.rotation)
+    condensed = condense(
+        model, state, linear, tangent, candidates, moved, load.rotation
+    )
     system, offset = condensed.system, condensed.offset.copy()
     # unknowns: forces of contacts, output rotation under a torque, forces of slopes
     n, slopes = (0, 0) if candidates is None else (len(candidates), candidates.slopes)
@@ -364,11 +367,8 @@ def _finished(
     )
     loads = model.loads(state)
     energy += 0.5 * float(np.sum(loads * (loads @ model.strip.teeth.compliance)))
-    if model.teeth.elastic_circular_spline is not None:
-        moved = model.teeth.elastic_circular_spline.displacement(
-            state.circular_spline_force
-        )
-        energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
+    moved = model.teeth.displace_circular_spline(state.circular_spline_force)
+    energy += 0.5 * float(np.sum(state.circular_spline_force * moved))
     # moments of the bore forces and of the tooth forces about the axis
     turned = frames[0].turn.transpose(0, 2, 1)
     points = model.bore_positions(frames[0], state) @ turned

@@ -94,11 +94,21 @@ class SolidTeeth:
             else self.elastic_circular_spline.flank.shape[1]
         )
 
+    def displace_circular_spline(self, force: Array) -> Array:
+        """Displacements of the flanks of the circular spline (N_c, n_c) [m].
+
+        Args:
+            force: Forces on these flanks (N_c, n_c) [N].
+        """
+        if self.elastic_circular_spline is None:
+            return np.zeros_like(force)
+        return self.elastic_circular_spline.displacement(force)
+
     def find(
         self,
         frame: SolidFrames,
         force: Array,
-        circular_spline_force: Array,
+        circular_spline_moved: Array,
         reach: float,
         held: ToothRows | None,
         *,
@@ -113,8 +123,8 @@ class SolidTeeth:
             frame: Frames of the toothed segments.
             force: Forces at the loaded degrees of freedom of these segments (N, n_b)
                 [N].
-            circular_spline_force: Forces on the flanks of the circular spline
-                (N_c, n_c) [N].
+            circular_spline_moved: Displacements of the flanks of the circular spline,
+                see :meth:`displace_circular_spline` (N_c, n_c) [m].
             reach: Largest gap of a candidate [m].
             held: Contacts of the last iteration that carry force; None if there are
                 none.
@@ -142,17 +152,9 @@ class SolidTeeth:
         centre = flat.mean(axis=2)
         seen = angle - circular_spline_rotation
         # displacements of the circular spline: elastic ones, shifts and tilt
-        displacements = np.zeros((self.circular_spline_teeth, planes, 0))
-        if self.elastic_circular_spline is not None:
-            displacements = self.elastic_circular_spline.displacement(
-                circular_spline_force
-            )
-            displacements = displacements.reshape(
-                self.circular_spline_teeth, planes, -1
-            )
-        displacements = displacements + np.tile(
-            self._circular_spline_offset(circular_spline_rotation),
-            displacements.shape[2] // 2,
+        shape = self.circular_spline_teeth, planes, self.circular_spline_dofs // planes
+        displacements = circular_spline_moved.reshape(shape) + np.tile(
+            self._circular_spline_offset(circular_spline_rotation), shape[2] // 2
         )
         # the 2D search in every plane; between the planes crowned flanks are closer
         z, old = strip.mesh.teeth.z, held if held is not None and len(held) else None

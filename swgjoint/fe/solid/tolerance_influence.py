@@ -19,7 +19,7 @@ from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.tooth_rows import ToothRows
-from swgjoint.typing import Mask
+from swgjoint.typing import Array, Mask
 
 REACH = 0.03
 """Largest gap of a contact that may close, in lobe heights [-]. The 2D model also needs
@@ -51,8 +51,10 @@ def influence(
             " without errors"
         )
     linear = linearise(model, state)
-    contacts, carries = _tooth_contacts(model, linear, state)
-    condensed = condense(model, state, linear, SolidTangent(model, linear), contacts)
+    moved = teeth.displace_circular_spline(state.circular_spline_force)
+    contacts, carries = _tooth_contacts(model, linear, state, moved)
+    tangent = SolidTangent(model, linear)
+    condensed = condense(model, state, linear, tangent, contacts, moved)
     # the member that is not the output is fixed, and slopes follow the contacts
     every, n = len(contacts), len(carries)
     used = np.append(np.arange(n), every + 1 if circular_spline_is_output else every)
@@ -99,7 +101,10 @@ def _gaps(
 
 
 def _tooth_contacts(
-    model: SolidSectorModel, linear: SolidLinearised, state: SolidState
+    model: SolidSectorModel,
+    linear: SolidLinearised,
+    state: SolidState,
+    circular_spline_moved: Array,
 ) -> tuple[ToothRows, Mask]:
     """Contacts within reach, and a mask of those that carry force, without slopes."""
     held = state.held
@@ -108,7 +113,7 @@ def _tooth_contacts(
     possible = model.teeth.find(
         linear.frames[0],
         model.loads(state),
-        state.circular_spline_force,
+        circular_spline_moved,
         REACH * model.lobe_height,
         held,
         thorough=True,

@@ -78,7 +78,7 @@ def test_rows_of_the_teeth(small_ring, loaded, moved, crowned):
         return model.teeth.find(
             model.frames(state)[0],
             model.loads(state),
-            state.circular_spline_force,
+            model.teeth.displace_circular_spline(state.circular_spline_force),
             (0.4 if crowned else 0.2) * model.lobe_height,
             None,
             thorough=False,

@@ -24,7 +24,7 @@ def candidates(model, state, *, held=True, reach=0.1):
     return model.teeth.find(
         model.frames(state)[0],
         model.loads(state),
-        state.circular_spline_force,
+        model.teeth.displace_circular_spline(state.circular_spline_force),
         reach * model.lobe_height,
         state.held if held else None,
         thorough=True,
