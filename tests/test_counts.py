@@ -8,6 +8,7 @@ fifth of the count.
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,7 +35,8 @@ PLANE_ACTIVE_SETS = 55
 PLANE_PEAK_MB = 3.22
 RANDOM_ACTIVE_SETS = 179
 SOLID_FACTORISATIONS = 13
-SOLID_ACTIVE_SETS = 13
+SOLID_ACTIVE_SETS = 15
+SOLID_ITERATIONS = 19
 
 
 class Counter:
@@ -171,8 +173,21 @@ def small_solid():
 
 @pytest.mark.slow
 @pytest.mark.fe
+def test_bore_contact_changes_within_a_linearisation(small_solid):
+    """The same equilibrium as with one change of the bore contact per linearisation."""
+    once = replace(small_solid, solver=solid_equilibrium.SolidSolver(exchanges=0))
+    ours, theirs = small_solid.deflect(), once.deflect()
+    assert ours.outcome.ok and theirs.outcome.ok
+    assert len(ours.history) < len(theirs.history)
+    assert np.array_equal(ours.touching, theirs.touching)
+    # the solver's tolerance, 1e-10 m
+    assert np.abs(ours.faces - theirs.faces).max() < 1e-10
+
+
+@pytest.mark.slow
+@pytest.mark.fe
 def test_solid_iterations_and_factorisations(small_solid, counter):
-    """Fewer factorisations than iterations, one complementarity problem in each."""
+    """Fewer factorisations than iterations, and problems of changed bore contacts."""
     counter.watch(solid_equilibrium, "SolidTangent")
     counter.watch(solid_equilibrium, "condense")
     counter.watch(solid_equilibrium, "solve_mixed")
@@ -181,6 +196,7 @@ def test_solid_iterations_and_factorisations(small_solid, counter):
     made = counter.taken()
     assert near(made["SolidTangent"], SOLID_FACTORISATIONS)
     assert near(made["_solve_active"], SOLID_ACTIVE_SETS)
+    assert near(sum(iterations), SOLID_ITERATIONS)
     # the deflection has no tooth contact, the search knows no other system
-    assert made["condense"] - made["solve_mixed"] == iterations[0]
+    assert made["condense"] - made["solve_mixed"] >= iterations[0]
     assert made["condense"] >= sum(iterations)

@@ -6,13 +6,85 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.corotation import SolidFrames, about_z
 from swgjoint.fe.solid.linearise import SolidLinearised
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent, TangentResponse
 from swgjoint.fe.solid.tooth_rows import ToothRows
 from swgjoint.typing import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidates:
+    """Tooth contacts of one state, with what does not depend on the wave generator."""
+
+    rows: ToothRows
+    """The n contacts."""
+    compliance: Array
+    """Compliance between them through the teeth of both members (n, n) [m/N]."""
+    eased: Array
+    """Changes of their gaps by the previous tooth forces (n,) [m]."""
+
+    @classmethod
+    def find(
+        cls,
+        model: SolidSectorModel,
+        state: SolidState,
+        frame: SolidFrames,
+        search: tuple[float, bool, bool],
+    ) -> Candidates:
+        """Candidates near a state.
+
+        Args:
+            model: The 3D model.
+            state: The state.
+            frame: Frames of the toothed segments.
+            search: Largest gap [m], and the options ``thorough`` and ``stay`` of
+                :meth:`swgjoint.fe.solid.teeth.SolidTeeth.find`.
+        """
+        reach, thorough, stay = search
+        moved = model.teeth.displace_circular_spline(state.circular_spline_force)
+        rows = model.teeth.find(
+            frame,
+            model.loads(state),
+            moved,
+            reach,
+            state.held,
+            thorough=thorough,
+            stay=stay,
+            circular_spline_rotation=state.circular_spline_rotation,
+            held_force=state.tooth_force,
+        )
+        return cls.from_rows(model, state, rows, moved)
+
+    @classmethod
+    def from_rows(
+        cls,
+        model: SolidSectorModel,
+        state: SolidState,
+        rows: ToothRows,
+        circular_spline_moved: Array,
+    ) -> Candidates:
+        """Candidates of a state.
+
+        Args:
+            model: The 3D model.
+            state: The state.
+            rows: The contacts.
+            circular_spline_moved: Displacements of the flanks of the circular spline
+                (N_c, n_c) [m].
+        """
+        # few sectors have candidates
+        strip = model.strip
+        near, place = np.unique(rows.contacts.sector, return_inverse=True)
+        flank = strip.flank_dofs
+        pushed = model.loads(state)[near] @ strip.teeth.compliance[:, :flank]
+        eased = np.einsum("kb,kb->k", rows.weight, pushed[place])
+        if model.teeth.elastic_circular_spline is not None:
+            facing = circular_spline_moved[rows.contacts.tooth]
+            eased += np.einsum("kb,kb->k", rows.circular_spline_weight, facing)
+        return cls(rows=rows, compliance=model.teeth.compliance(rows), eased=eased)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,8 +128,7 @@ def condense(
     state: SolidState,
     linear: SolidLinearised,
     tangent: SolidTangent,
-    found: ToothRows | None,
-    circular_spline_moved: Array,
+    candidates: Candidates | None,
     rotation: float | None = None,
 ) -> Condensed:
     """Condense the ring to tooth contacts and rotations.
@@ -67,15 +138,14 @@ def condense(
         state: State at which the ring is linearised.
         linear: The linearised ring.
         tangent: Its factorised tangent, or that of a state nearby.
-        found: Tooth contacts; None if there are none.
-        circular_spline_moved: Displacements of the flanks of the circular spline
-            (N_c, n_c) [m].
+        candidates: Tooth contacts; None if there are none.
         rotation: Rotation of the bore of the diaphragm to which its unknown is relative
             [rad]; None for the rotation of the state.
     """
     masters, bore, strip = model.strip.masters, linear.bore, model.strip
     teeth_dofs, held = model.dofs(strip.teeth.masters), model.dofs(masters.held)
     n_sectors, size = linear.gradient.shape
+    found = None if candidates is None else candidates.rows
     n = 0 if found is None else len(found)
     # two prescribed motions of the diaphragm's bore: to that rotation, and by a unit
     # rotation from there
@@ -90,9 +160,8 @@ def condense(
     # derivatives of the tooth gaps, with the contact of the wave generator condensed
     rows, local, gap = np.zeros((n, size)), np.zeros((n, n)), np.zeros(n)
     coupling = np.zeros((n, bore.gap.shape[1]))
-    if found is not None and n:
+    if candidates is not None and found is not None and n:
         sector = found.contacts.sector
-        loads = model.loads(state)
         flank = strip.flank_dofs
         at_bore = found.weight @ strip.teeth.compliance[:flank, flank:]
         at_bore = at_bore.reshape(n, -1, 3)
@@ -104,16 +173,8 @@ def condense(
         rows[:, into] = -(eased[:, None] @ bore.rows[sector])[:, 0]
         rows[:, teeth_dofs] += found.rows
         same = sector[:, None] == sector[None, :]
-        local = model.teeth.compliance(found)
-        local -= np.where(same, eased @ at_points.T, 0.0)
-        # change of the gaps by the previous forces; few sectors have candidates
-        near, place = np.unique(sector, return_inverse=True)
-        pushed = loads[near] @ strip.teeth.compliance[:, :flank]
-        old = np.einsum("kb,kb->k", found.weight, pushed[place])
-        if model.teeth.elastic_circular_spline is not None:
-            facing = circular_spline_moved[found.contacts.tooth]
-            old += np.einsum("kb,kb->k", found.circular_spline_weight, facing)
-        gap = found.contacts.gap - old
+        local = candidates.compliance - np.where(same, eased @ at_points.T, 0.0)
+        gap = found.contacts.gap - candidates.eased
         free = bore.among_points(bore.free_gap)
         gap -= np.einsum("kp,kp->k", eased, free[sector])
 

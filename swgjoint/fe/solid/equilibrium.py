@@ -21,9 +21,9 @@ from swgjoint.fe.common.complementarity import (
     solve_mixed,
 )
 from swgjoint.fe.common.cyclic import SingularCyclicError
-from swgjoint.fe.solid.condensation import condense
+from swgjoint.fe.solid.condensation import Candidates, condense
 from swgjoint.fe.solid.corotation import energies
-from swgjoint.fe.solid.linearise import SolidLinearised, linearise
+from swgjoint.fe.solid.linearise import BoreContact, SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent, keeps_tangent
@@ -81,6 +81,10 @@ class SolidSolver:
     slowest: float = 0.5
     """Ratio of the displacement increments of two iterations above which the tangent
     is computed anew [-]."""
+    exchanges: int = 8
+    """Largest number of updates of the bore contact per linearisation. Without them
+    most iterations would repeat the search for tooth contacts although only the bore
+    contact changes, which recedes by a line of nodes at a time."""
     stride: float = 0.2
     """Limit of the displacement increment of an iteration, in lobe heights [-]; larger
     increments are damped because the contacts change on the way."""
@@ -114,16 +118,24 @@ class SolidSolver:
             for _ in range(self.max_iterations):
                 keep = self.keep_below, self.slowest
                 anew = not keeps_tangent(history, since, keep, settled=settled)
-                linear = linearise(
-                    model, state, kept=released >= RELEASES, tangent=anew
-                )
+                kept = released >= RELEASES
+                linear = linearise(model, state, kept=kept, tangent=anew)
                 if tangent is None or anew:
                     tangent, since = SolidTangent(model, linear), len(history)
                 # once the search is thorough it remains so: contacts that only this
                 # search finds would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
                 search = reach, thorough, stay
-                step = _solve_linear(model, state, linear, tangent, load, search)
+                found = None
+                if load.teeth:
+                    found = Candidates.find(model, state, linear.frames[0], search)
+                step = _solve_linear(model, state, linear, tangent, load, found)
+                for _ in range(self.exchanges):
+                    bad = _wrong_points(linear.bore, step) > 0.0
+                    if not (step.largest < self.keep_below and bad.any()):
+                        break
+                    linear = linear.exchange(model, state, step.pressure, bad, kept)
+                    step = _solve_linear(model, state, linear, tangent, load, found)
                 history.append(step.largest)
                 limits = NARROW * model.lobe_height, WIDE * model.lobe_height
                 reach = min(max(step.largest, limits[0]), limits[1])
@@ -138,8 +150,9 @@ class SolidSolver:
                 last = step.increment
                 # a contact set that occurs again would recur for ever if all its
                 # contacts changed as before: then only the worst one changes
-                repeats = state.touching.tobytes() in tried
-                tried.add(state.touching.tobytes())
+                touching = linear.bore.active.tobytes()
+                repeats = touching in tried
+                tried.add(touching)
                 shared = state.shared
                 state, settled = _advance(
                     model, state, linear, step, damping, one_at_a_time=repeats
@@ -204,33 +217,26 @@ class _Step:
         return float(np.abs(self.increment).max())
 
 
+def _wrong_points(bore: BoreContact, step: _Step) -> Array:
+    """Violation of the contact state of each point of the bore (N, p) [m].
+
+    Touching points under tension have to open, and open points that overlap to close.
+    """
+    wrong = np.where(bore.active, -step.pressure * bore.own_compliance, -step.after)
+    return np.where(bore.present & (wrong > 1e-15), wrong, 0.0)
+
+
 def _solve_linear(
     model: SolidSectorModel,
     state: SolidState,
     linear: SolidLinearised,
     tangent: SolidTangent,
     load: SolidLoad,
-    search: tuple[float, bool, bool],
+    found: Candidates | None,
 ) -> _Step:
     """Condense the ring to tooth forces and rotations, solve and expand the result."""
-    # candidates of tooth contact, and the condensed problem
-    candidates, (reach, thorough, stay) = None, search
-    moved = model.teeth.displace_circular_spline(state.circular_spline_force)
-    if load.teeth:
-        candidates = model.teeth.find(
-            linear.frames[0],
-            model.loads(state),
-            moved,
-            reach,
-            state.held,
-            thorough=thorough,
-            stay=stay,
-            circular_spline_rotation=state.circular_spline_rotation,
-            held_force=state.tooth_force,
-        )
-    condensed = condense(
-        model, state, linear, tangent, candidates, moved, load.rotation
-    )
+    condensed = condense(model, state, linear, tangent, found, load.rotation)
+    candidates = None if found is None else found.rows
     system, offset = condensed.system, condensed.offset.copy()
     # unknowns: forces of contacts, output rotation under a torque, forces of slopes
     n, slopes = (0, 0) if candidates is None else (len(candidates), candidates.slopes)
@@ -299,13 +305,11 @@ def _advance(
     Returns:
         The new state, and whether the contact set of the bore remained the same.
     """
-    # touching points under tension open, and open points that overlap close
     bore, masters = linear.bore, model.strip.masters
-    own = bore.own_compliance
-    wrong = np.where(bore.active, -step.pressure * own, -step.after)
-    bad = bore.present & (wrong > 1e-15)
+    wrong = _wrong_points(bore, step)
+    bad = wrong > 0.0
     if bad.any() and one_at_a_time:
-        bad &= wrong == wrong[bad].max()
+        bad = wrong == wrong.max()
     touching = bore.active ^ bad
     # a line shares its contact if it has no vertex or also touches far from it
     nodes, lines = bore.normal.shape[1], bore.found.shape[1]

@@ -15,15 +15,11 @@ The result is a ring of small matrices.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.race import RaceForces
-from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     SolidFrames,
     dead_load_tangent,
@@ -37,6 +33,7 @@ from swgjoint.fe.solid.sector_matrices import SectorMatrices
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.wave_generator.turning import sliding_tangent
+from swgjoint.fe.solid.wave_generator.vertices import find_vertices
 from swgjoint.typing import Array, Index, Mask
 
 
@@ -176,6 +173,28 @@ class SolidLinearised:
     race: RaceForces | None = None
     """Forces of a race, already included in gradient and tangent; None without."""
 
+    def exchange(
+        self,
+        model: SolidSectorModel,
+        state: SolidState,
+        pressure: Array,
+        switched: Mask,
+        kept: Mask,
+    ) -> SolidLinearised:
+        """The same ring with the contact of some points of the bore inverted.
+
+        Args:
+            model: The 3D model.
+            state: State at which the ring is linearised.
+            pressure: Latest forces at the contact points (N, p) [N].
+            switched: Points whose contact is inverted (N, p).
+            kept: See :func:`linearise`.
+        """
+        touching = self.bore.active ^ switched
+        touched = replace(state, pressure=pressure, touching=touching)
+        bore = bore_contact(model, touched, self.frames[0], kept=kept)
+        return replace(self, bore=bore, pushed=_pushed(model, bore))
+
 
 def linearise(
     model: SolidSectorModel,
@@ -196,7 +215,7 @@ def linearise(
     """
     frames = model.frames(state)
     n = model.size
-    gradient, pushed = np.zeros((2, model.sectors, n))
+    gradient = np.zeros((model.sectors, n))
     terms = list[tuple[Index, Array]]()
     bore = bore_contact(model, state, frames[0], kept=kept)
     loads = model.loads(state)
@@ -217,10 +236,8 @@ def linearise(
                 force += moment
             local = stiffness(segment, frame, force) + turned
             terms.append((dofs, matrices_in_global(frame, local)))
-    into, held = model.contact_dofs, bore.inverse @ bore.rows
-    free = bore.among_points(bore.free_gap)
-    pushed[:, into] += (free[:, None] @ held)[:, 0]
     if tangent:
+        into, held = model.contact_dofs, bore.inverse @ bore.rows
         pressed = bore.rows.transpose(0, 2, 1) @ held
         if model.nonlinear and bore.active.any():
             pressed += sliding_tangent(
@@ -240,10 +257,18 @@ def linearise(
         frames=frames,
         gradient=gradient,
         hessian=SectorMatrices(size=n, terms=tuple(terms)) if tangent else None,
-        pushed=pushed,
+        pushed=_pushed(model, bore),
         bore=bore,
         race=race,
     )
+
+
+def _pushed(model: SolidSectorModel, bore: BoreContact) -> Array:
+    """Negative forces of the wave generator if the coordinates do not move (N, n)."""
+    pushed = np.zeros((model.sectors, model.size))
+    free = bore.inverse @ bore.among_points(bore.free_gap)[:, :, None]
+    pushed[:, model.contact_dofs] = (free.transpose(0, 2, 1) @ bore.rows)[:, 0]
+    return pushed
 
 
 def bore_contact(
@@ -275,7 +300,7 @@ def bore_contact(
         )
         gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
     normal = normal.reshape(n, b, 3) @ frame.turn
-    vertex, found, bend, covered = _vertices(model, gap, state, kept)
+    vertex, found, bend, covered = find_vertices(model, gap, state.shared, kept)
     # points that can touch, and points that do; slopes follow their vertices
     p, lines = b + vertex.shape[1], found.shape[1]
     at, rolls = np.arange(b, b + lines), np.arange(b + lines, p)
@@ -346,45 +371,4 @@ def bore_contact(
         place=place,
         arm=arm,
         by_race=by_race,
-    )
-
-
-def _vertices(
-    model: SolidSectorModel, gap: Array, state: SolidState, kept: Mask | None
-) -> tuple[Array, Mask, Array, Mask]:
-    """Vertices of the gap along the axis.
-
-    Returns:
-        Weights of the bore nodes in the gaps at the vertices and in the slopes there
-        (N, 2 L, b); mask of the lines that have a vertex (N, L); second derivative of
-        the gap at the vertex by the plane number (N, L) [m]; mask of the nodes that the
-        vertices replace (N, b).
-    """
-    n, b = gap.shape
-    planes = model.strip.planes
-    lines = b // planes
-    crown = crown_bend(model.wave_generator.crowning, model.strip.mesh.teeth.z)
-
-    def over(nodal: NDArray[Any]) -> NDArray[Any]:
-        return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
-
-    flat = np.full(n * lines, crown * FLAT if crown else inf)
-    # lines with a shared contact need a larger bend before they get a vertex
-    shared = state.shared.ravel()
-    flat[shared] *= WIDE
-    flat[shared & (True if kept is None else kept.ravel())] = inf
-    seen = vertices(over(gap), flat)
-    if model.race is not None:  # no vertex outside the width of the race
-        beside = ~model.race.covers(model.strip.mesh.teeth.z @ seen.weight)
-        seen.found[beside], seen.covered[:, beside] = False, False
-    means = np.zeros((n, 2, lines, planes, lines))
-    line = np.arange(lines)
-    for k, weight in enumerate((seen.weight, seen.slope)):
-        spread = weight.reshape(planes, n, lines).transpose(2, 1, 0)
-        means[:, k, line, :, line] = spread
-    return (
-        means.reshape(n, 2 * lines, b),
-        seen.found.reshape(n, lines),
-        seen.bend.reshape(n, lines),
-        seen.covered.reshape(planes, n, lines).transpose(1, 0, 2).reshape(n, b),
     )

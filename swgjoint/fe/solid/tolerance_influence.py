@@ -12,7 +12,7 @@ import numpy as np
 
 from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.solid.condensation import condense
+from swgjoint.fe.solid.condensation import Candidates, condense
 from swgjoint.fe.solid.flank_points import FlankPoints
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.sector_model import SolidSectorModel
@@ -54,7 +54,8 @@ def influence(
     moved = teeth.displace_circular_spline(state.circular_spline_force)
     contacts, carries = _tooth_contacts(model, linear, state, moved)
     tangent = SolidTangent(model, linear)
-    condensed = condense(model, state, linear, tangent, contacts, moved)
+    candidates = Candidates.from_rows(model, state, contacts, moved)
+    condensed = condense(model, state, linear, tangent, candidates)
     # the member that is not the output is fixed, and slopes follow the contacts
     every, n = len(contacts), len(carries)
     used = np.append(np.arange(n), every + 1 if circular_spline_is_output else every)
