@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.angle_columns import AngleColumn
+from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.clearance import FAINT
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import Ripple, no_ripple, unseen_places
@@ -118,7 +118,7 @@ def solve_mesh_cycle(
     symmetric: bool,
     tick: Callable[[], None],
     keep: UnfinishedSeries | None = None,
-    ripple: Callable[[float], Ripple] = lambda top: no_ripple,
+    ripple: Callable[[SolvedColumns[AnyState]], Ripple] = lambda solved: no_ripple,
 ) -> Pattern[AnyState]:
     """Pattern of a drive, sampled at as many angles and torques as it needs.
 
@@ -144,9 +144,9 @@ def solve_mesh_cycle(
         tick: Called after every solve.
         keep: Store of equilibria, from which an interrupted run resumes; None stores
             none.
-        ripple: Function that takes the largest torque that was solved at all initial
-            angles [N·m] and returns lower bounds of the peak-to-peak values by which
-            the errors between samples are divided.
+        ripple: Function that takes the columns at all initial angles and returns lower
+            bounds of the peak-to-peak values by which the errors between samples are
+            divided.
 
     Returns:
         The sampled pattern.
@@ -169,7 +169,7 @@ def solve_mesh_cycle(
             f"no equilibrium under the smallest torque, {min(torques, key=abs):g} N·m"
             f" (largest: {max(torques, key=abs):g} N·m)"
         )
-    grid.ripple = ripple(max(abs(t) for t in grid.levels))
+    grid.ripple = ripple(grid)
     info = _checks(grid, effort.angles, rated, symmetric=symmetric)
     # validation angles, which are not sampled
     places = unseen_places(effort.unseen[1], effort.most_angles)

@@ -10,6 +10,7 @@ from math import pi
 from typing import Any
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.angle_columns import SolvedColumns
 from swgjoint.fe.common.clearance import FAINT, HELD
 from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
 from swgjoint.fe.common.torque_choice import Ripple
@@ -157,7 +158,7 @@ def sample_map(
 
     found: dict[float, ToleranceSamples] = {}
 
-    def with_errors(top: float) -> Ripple:
+    def with_errors(top: float, solved: SolvedColumns[Any] | None = None) -> Ripple:
         nonlocal stage
         found[top] = sample_tolerances(
             design,
@@ -166,11 +167,15 @@ def sample_map(
             model=model,
             progress=progress,
             keep=keep,
+            solved=solved,
         )
         stage = stage_name(design, -1)
         return ripple_with_errors(found[top], design.periodicity)
 
-    options: dict[str, Any] = {"ripple": with_errors} if flawed else {}
+    def ripple(solved: SolvedColumns[Any]) -> Ripple:
+        return with_errors(max(abs(t) for t in solved.levels), solved)
+
+    options: dict[str, Any] = {"ripple": ripple} if flawed else {}
     pattern, shown, surface = _solved(design, model, effort, tick, keep, **options)
     _check_torques(design, pattern)
     # springs in series: the cup that the 2D model lacks, boss and housing

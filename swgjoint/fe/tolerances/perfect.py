@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swgjoint.fe.common.angle_columns import SolvedColumns
 from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
@@ -29,6 +30,8 @@ class PerfectSolid:
     """Solver of the drive."""
     positions: Sequence[Unloaded[SolidState]]
     """The drive without load."""
+    loaded: Sequence[Mapping[float, SolidState]] = ()
+    """States of all positions by torque [N·m] that are known; empty for none."""
 
     @classmethod
     def from_design(
@@ -51,6 +54,36 @@ class PerfectSolid:
             tick()
         return cls(follow=follow, positions=positions)
 
+    @classmethod
+    def from_columns(
+        cls,
+        solved: SolvedColumns[SolidState],
+        phases: int,
+        tick: Callable[[], None] = lambda: None,
+    ) -> PerfectSolid | None:
+        """The drive at positions within a pitch that are solved already.
+
+        Args:
+            solved: Equilibria over a pitch.
+            phases: Number of positions, equally spaced over a pitch.
+            tick: Called after every position.
+
+        Returns:
+            None if a position is missing.
+        """
+        places = [solved.finest * k / phases for k in range(phases)]
+        if not solved.columns.keys() >= set(places):
+            return None
+        columns = [solved.columns[place] for place in places]
+        for _ in columns:
+            tick()
+        assert isinstance(solved.follow, SolidContinuation)
+        return cls(
+            follow=solved.follow,
+            positions=[column.rest for column in columns],
+            loaded=[column.states for column in columns],
+        )
+
     def under_both_signs(
         self, levels: Array, tick: Callable[[int], None] = lambda parts: None
     ) -> list[dict[float, SolidState]]:
@@ -61,10 +94,12 @@ class PerfectSolid:
             tick: Called with the number of torques that are done or left out.
         """
         found = list[dict[float, SolidState]]()
-        for rest in self.positions:
+        for k, rest in enumerate(self.positions):
             starts = rest.sides or (rest.state, rest.state)
             before = found[-1] if found else None
-            found.append(dict(loaded_states(self.follow, starts, levels, tick, before)))
+            known = self.loaded[k] if self.loaded else {}
+            states = loaded_states(self.follow, starts, levels, tick, before, known)
+            found.append(dict(states))
         return found
 
     def table(

@@ -127,6 +127,7 @@ def loaded_states(
     levels: Array,
     tick: Callable[[int], None] = lambda parts: None,
     before: Mapping[float, Any] | None = None,
+    known: Mapping[float, Any] | None = None,
 ) -> Iterator[tuple[float, Any]]:
     """Equilibria of one position under torques of both signs.
 
@@ -137,20 +138,25 @@ def loaded_states(
         levels: Magnitudes of the torques, increasing (n,) [N·m].
         tick: Called with the number of torques that are done or left out.
         before: States of other positions by torque, which are turned to this one.
+        known: States of this position by torque, which are not solved again.
 
     Yields:
         Torques [N·m] and states, up to the first failure of each sign.
     """
-    angle = follow.input_angle(starts[0])
+    angle, known = follow.input_angle(starts[0]), known or {}
     for sign, start in zip((1.0, -1.0), starts, strict=True):
         state = start
         for k, torque in enumerate((sign * levels).tolist()):
             if isclose(start.torque, torque, rel_tol=1e-9):
                 state = start
+            elif torque in known:
+                state = known[torque]
             elif before is not None and torque in before:
                 state = follow.to_angle(before[torque], angle)
             else:
-                state = follow.to_torque(state, torque)
+                same = [s for s in known.values() if s.torque * sign > 0.0]
+                near = min([state, *same], key=lambda s: abs(s.torque - torque))
+                state = follow.to_torque(near, torque)
             if not state.outcome.ok:
                 tick(levels.size - k)
                 break

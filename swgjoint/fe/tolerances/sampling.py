@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.angle_columns import SolvedColumns
 from swgjoint.fe.common.clearance import with_mean_clearance
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
@@ -86,6 +87,7 @@ def sample_tolerances(
     model: str = "2d",
     progress: Progress = silent,
     keep: Unfinished | None = None,
+    solved: SolvedColumns[Any] | None = None,
 ) -> ToleranceSamples:
     """Equilibria with superposed errors over the cycle of the teeth.
 
@@ -99,6 +101,8 @@ def sample_tolerances(
         model: Fidelity, ``2d`` or ``3d``.
         progress: Called with the stage, the number of finished parts and their total.
         keep: Store of finished positions, which a resumed run reads; None stores none.
+        solved: Equilibria of the 3D drive without errors, as
+            :func:`swgjoint.fe.common.sampling.sample_map` has them; None for none.
 
     Returns:
         Samples with errors and, for reference, those of the drive without errors.
@@ -116,7 +120,9 @@ def sample_tolerances(
     options: dict[str, Any] = {"phases": phases, "model": model, "tick": tick}
     solid: PerfectSolid | None = None
     if own_reference and model == "3d":
-        solid = PerfectSolid.from_design(design, phases, tick)
+        if solved is not None:
+            solid = PerfectSolid.from_columns(solved, phases, tick)
+        solid = solid or PerfectSolid.from_design(design, phases, tick)
         options["start"] = solid.whole(solid.positions[0].state)
     follow, linear = influences(design, **options)
     ideal_drive, reference = follow, linear
@@ -193,7 +199,7 @@ def sample_tolerances(
     if model == "2d":
         chosen, signs = unseen_positions(table[0], torque, chosen)
         torques = unseen_torques(levels, rated_torque, has_play=has_play)
-    solved = full_solves(
+    checks = full_solves(
         design,
         follow,
         linear if model == "2d" else under_load,
@@ -216,7 +222,7 @@ def sample_tolerances(
         perfect=flawless_table,
         onsets=has_play,
         free=free,
-        solved=solved,
+        solved=checks,
     )
 
 

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from solved import kept
 
+from swgjoint.errors import Outcome
+from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
+from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
 from swgjoint.fe.tolerances.perfect import PerfectSolid
-from swgjoint.fe.tolerances.rest import SMALL, influences, perfect_drive
+from swgjoint.fe.tolerances.rest import (
+    SMALL,
+    influences,
+    loaded_states,
+    perfect_drive,
+)
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.fit import fit_map
@@ -84,6 +94,63 @@ def test_half_of_the_perfect_drive_is_the_linearised_one(small_design, at_both_e
         )
         apart = np.abs(found[:, :, k] - wanted[:, :, 0]).max(axis=1)
         assert (apart < 1e-5 * np.ptp(wanted[:, :, 0], axis=1)).all()
+
+
+def test_perfect_drive_takes_what_a_map_has_solved(small_design, small_drive):
+    """No equilibrium twice: those of the pattern, and others from their neighbours."""
+    rest = [Unloaded(state=object(), small=0.1) for _ in range(4)]
+    states = [{5.0: object(), 20.0: object()} for _ in range(4)]
+    columns = {
+        place: AngleColumn(theta=0.1 * place, rest=one, states=loaded)
+        for place, one, loaded in zip(range(0, 8, 2), rest, states, strict=True)
+    }
+    solved = SolvedColumns(
+        follow=small_drive,
+        period=1.0,
+        finest=8,
+        levels=[5.0, 20.0],
+        small=0.1,
+        tick=lambda: None,
+        keep=None,
+        columns=columns,
+    )
+    perfect = PerfectSolid.from_columns(solved, 2)
+    assert perfect.follow is small_drive
+    assert list(perfect.positions) == rest[::2]
+    assert list(perfect.loaded) == states[::2]
+    assert PerfectSolid.from_columns(solved, 8) is None
+
+
+class Loads:
+    """Drive that records from which torque each torque was solved."""
+
+    def __init__(self):
+        self.solved = []
+
+    def input_angle(self, state):
+        """At rest [rad]."""
+        return 0.0
+
+    def to_torque(self, state, torque):
+        """A state that has the torque [N·m]."""
+        self.solved.append((state.torque, torque))
+        return SimpleNamespace(torque=torque, outcome=state.outcome)
+
+
+def test_loading_starts_from_the_nearest_known_torque():
+    """Known ones are not solved again, and those of the other sign do not count."""
+    follow = Loads()
+
+    def at(torque):
+        return SimpleNamespace(torque=torque, outcome=Outcome.CONVERGED)
+
+    known = {3.0: at(3.0), 7.0: at(7.0)}
+    levels = np.array([3.0, 8.0, 20.0])
+    found = dict(loaded_states(follow, (at(0.0),) * 2, levels, known=known))
+    assert sorted(found) == [-20.0, -8.0, -3.0, 3.0, 8.0, 20.0]
+    assert found[3.0] is known[3.0]
+    wanted = [(7.0, 8.0), (8.0, 20.0), (0.0, -3.0), (-3.0, -8.0), (-8.0, -20.0)]
+    assert follow.solved == wanted
 
 
 @pytest.mark.slow
