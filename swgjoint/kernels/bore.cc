@@ -82,6 +82,7 @@ void bore_forces(const Stations& stations, const double* stiffness, const bool* 
         const std::size_t first = 2 * (i / p);
         for (std::size_t j = 0; j < width; ++j) {
           force[first + j] += push * along[j];
+          if (!tangent) continue;
           const double a = stiffness[i] * along[j], b = bend * across[j];
           double* row = matrix.data() + (first + j) * size + first;
           for (std::size_t l = 0; l < width; ++l) row[l] += a * along[l] + b * across[l];
@@ -90,7 +91,7 @@ void bore_forces(const Stations& stations, const double* stiffness, const bool* 
       for (std::size_t i = 0; i < size; ++i) {
         const auto row = static_cast<std::size_t>(into[i]);
         gradient[row] += force[i];
-        for (std::size_t j = 0; j < size; ++j) {
+        for (std::size_t j = 0; tangent && j < size; ++j) {
           tangent[row * n + static_cast<std::size_t>(into[j])] += matrix[i * size + j];
         }
       }
@@ -100,7 +101,7 @@ void bore_forces(const Stations& stations, const double* stiffness, const bool* 
     normal += 2 * q;
     curvature += q;
     gradient += n;
-    tangent += n * n;
+    if (tangent) tangent += n * n;
   }
 }
 

@@ -38,6 +38,7 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
                double* curvature);
 
 // Adds energy gradient (count, n) and tangent (count, n, n) of the stations that touch.
+// Without a tangent (null) only the gradient.
 // into: degrees of freedom of the nodes (2 m,).
 void bore_forces(const Stations& stations, const double* stiffness, const bool* touching,
                  const double* gap, const double* normal, const double* curvature,

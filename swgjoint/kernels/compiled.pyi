@@ -102,7 +102,7 @@ class Bore:
         curvature: Array,
         into: Index,
         gradient: Array,
-        tangent: Array,
+        tangent: Array | None,
     ) -> None: ...
     def gaps_after(
         self, gap: Array, normal: Array, into: Index, increment: Array, result: Array
@@ -131,7 +131,7 @@ class Sector:
         kinematics: Array,
         flank: Array,
         gradient: Array,
-        tangent: Array,
+        tangent: Array | None,
     ) -> None: ...
 
 class StripProblems:

@@ -139,6 +139,7 @@ SWGJOINT_WIDE void sector_tangents(const Sector& e, const double* place, const d
     rotate(beside.data(), cos, sin, e.nodes, turned.data());
     for (std::size_t i = 0; i < m; ++i) gradient[dofs[i]] += turned[i];
     gradient += n;
+    if (!tangent) continue;
 
     // vectors of the tangent, whose products are added to the turned stiffness
     const double tension = sum_of_products(k.deformation, stretched.data(), m);

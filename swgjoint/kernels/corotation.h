@@ -34,7 +34,7 @@ struct Kinematics {
 // Fills the kinematics and adds gradient (count, n) and tangent (count, n, n).
 // place: angles in the undeformed ring (count,); positions (count, nodes, 2) in the
 // global frame; force: tooth forces on the flanks (count, flank); dofs: degrees of freedom
-// of the coordinates (m,).
+// of the coordinates (m,). tangent: null to leave it out.
 void sector_tangents(const Sector& sector, const double* place, const double* positions,
                      const double* force, const std::int64_t* dofs, std::size_t count,
                      std::size_t n, const Kinematics& result, double* gradient,

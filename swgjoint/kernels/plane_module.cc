@@ -20,6 +20,19 @@ void check_dofs(const Index& dofs, std::size_t n) {
   }
 }
 
+// Checks the arrays to which sectors add; none for the tangent omits it.
+void check_assembly(std::size_t count, std::size_t n, const Out<2>& gradient,
+                    const Out<3>& tangent) {
+  require(gradient.shape(0) == count, "gradient: (n, dofs)");
+  require(!tangent.is_valid() || (tangent.shape(0) == count && tangent.shape(1) == n &&
+                                  tangent.shape(2) == n),
+          "tangent: (n, dofs, dofs)");
+}
+
+double* data_of(const Out<3>& tangent) {
+  return tangent.is_valid() ? tangent.data() : nullptr;
+}
+
 // Contact stations of the bore. It holds references to the arrays that it reads.
 class Bore {
  public:
@@ -58,14 +71,12 @@ class Bore {
     require(touching.shape(0) == count && touching.shape(1) == stations_.count(),
             "touching: (n, q)");
     require(into.shape(0) == 2 * stations_.nodes(), "into: (2 m,)");
-    require(gradient.shape(0) == count && tangent.shape(0) == count &&
-                tangent.shape(1) == n && tangent.shape(2) == n,
-            "gradient: (n, dofs), tangent: (n, dofs, dofs)");
+    check_assembly(count, n, gradient, tangent);
     check_dofs(into, n);
     const nb::gil_scoped_release release;
     swgjoint::bore_forces(stations_, stiffness_.data(), touching.data(), gap.data(),
                           normal.data(), curvature.data(), into.data(), count, n,
-                          gradient.data(), tangent.data());
+                          gradient.data(), data_of(tangent));
   }
 
   void gaps_after(In<2> gap, In<3> normal, Index into, In<2> increment,
@@ -146,9 +157,7 @@ class Sector {
     require(kinematics.shape(0) == 5 && kinematics.shape(1) == count &&
                 kinematics.shape(2) == m,
             "kinematics: (5, n, m)");
-    require(gradient.shape(0) == count && tangent.shape(0) == count &&
-                tangent.shape(1) == n && tangent.shape(2) == n,
-            "gradient: (n, dofs), tangent: (n, dofs, dofs)");
+    check_assembly(count, n, gradient, tangent);
     check_dofs(dofs, n);
     const std::size_t part = count * m;
     double* k = kinematics.data();
@@ -158,7 +167,7 @@ class Sector {
     const nb::gil_scoped_release release;
     swgjoint::sector_tangents(sector_, place.data(), positions.data(), force.data(),
                               dofs.data(), count, n, result, gradient.data(),
-                              tangent.data());
+                              data_of(tangent));
   }
 
  private:
@@ -293,7 +302,7 @@ void bind_plane(nb::module_& m) {
       .def("forces", &Bore::forces, nb::arg("touching").noconvert(),
            nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
            nb::arg("curvature").noconvert(), nb::arg("into").noconvert(),
-           nb::arg("gradient").noconvert(), nb::arg("tangent").noconvert())
+           nb::arg("gradient").noconvert(), nb::arg("tangent").noconvert().none())
       .def("gaps_after", &Bore::gaps_after, nb::arg("gap").noconvert(),
            nb::arg("normal").noconvert(), nb::arg("into").noconvert(),
            nb::arg("increment").noconvert(), nb::arg("result").noconvert());
@@ -309,7 +318,7 @@ void bind_plane(nb::module_& m) {
            nb::arg("dofs").noconvert(), nb::arg("angle").noconvert(),
            nb::arg("gyration").noconvert(), nb::arg("kinematics").noconvert(),
            nb::arg("flank").noconvert(), nb::arg("gradient").noconvert(),
-           nb::arg("tangent").noconvert());
+           nb::arg("tangent").noconvert().none());
   m.def("add_banded", &add_banded, nb::arg("rows").noconvert(),
         nb::arg("parts").noconvert(), nb::arg("columns").noconvert());
   m.def("solve_banded", &solve_banded, nb::arg("columns").noconvert(),

@@ -73,7 +73,7 @@ class CompiledBore:
         curvature: Array,
         into: Index,
         gradient: Array,
-        hessian: Array,
+        hessian: Array | None,
     ) -> None:
         """Add the forces and tangents of the stations in contact.
 
@@ -85,7 +85,7 @@ class CompiledBore:
                 [1/m].
             into: Degrees of freedom of the nodes that the stations follow (2 m,).
             gradient: Gradient to add to (N, n) [N].
-            hessian: Tangent to add to (N, n, n) [N/m].
+            hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
         """
         self.bore.forces(
             np.ascontiguousarray(touching),
@@ -126,7 +126,7 @@ def add_sector_tangents(
     flank_force: Array,
     dofs: Index,
     gradient: Array,
-    hessian: Array,
+    hessian: Array | None,
 ) -> tuple[Frames, Array]:
     """Add elastic forces and tangents of sectors, with compiled loops.
 
@@ -137,7 +137,7 @@ def add_sector_tangents(
         flank_force: Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N].
         dofs: Degrees of freedom of the skeleton within a sector (2 n_a,).
         gradient: Gradient to add to (N, n) [N].
-        hessian: Tangent to add to (N, n, n) [N/m].
+        hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
 
     Returns:
         Frames of the sectors, and displacements of the flank nodes in these frames

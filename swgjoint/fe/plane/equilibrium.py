@@ -68,6 +68,10 @@ class NewtonSolver:
     bore contact changes."""
     exchange_below: float = 1e-5
     """Increment below which a linearisation is accurate enough for such updates [m]."""
+    keep_below: float = 0.0
+    """Increment below which the next iteration keeps the tangent and its factor, unless
+    the contact of the bore changes [m]; zero computes every tangent. The remaining error
+    is then that of the last increment times the relative change of the tangent."""
     stride: float = 0.1
     """Largest increment that is applied in one iteration, in lobe heights [-]; the
     contacts would change within a larger one."""
@@ -90,12 +94,19 @@ class NewtonSolver:
             set of the teeth was found, ``start``.
         """
         state, history = start, list[float]()
-        settled = False
+        settled, problem = False, None
         tried: set[bytes] = set()
         near, searched_reach = np.ones((model.sectors, 2), dtype=bool), 0.0
         try:
             for iteration in range(self.max_iterations):
-                linear = linearise(model, state, load.on_flexspline)
+                keeps = settled and history[-1] < self.keep_below
+                kept = problem if keeps else None
+                linear = linearise(
+                    model,
+                    state,
+                    load.on_flexspline,
+                    kept=None if kept is None else kept.linear,
+                )
                 thorough = bool(history) and history[-1] < self.thorough_below
                 # after three iterations or a small step only close candidates matter
                 close = thorough or iteration > 2
@@ -117,7 +128,12 @@ class NewtonSolver:
                     near[:], searched_reach = False, reach
                     near[contacts.sector, contacts.side] = True
                 problem = NewtonProblem.from_candidates(
-                    model, state, linear, load, contacts
+                    model,
+                    state,
+                    linear,
+                    load,
+                    contacts,
+                    None if kept is None else kept.factor,
                 )
                 step = problem.solve()
                 for _ in range(self.exchanges):
@@ -166,7 +182,10 @@ class NewtonSolver:
 
 
 MAP_SOLVER = NewtonSolver(
-    step_tolerance=1e-9, conforming_tolerance=1e-10, thorough_below=1e-6
+    step_tolerance=1e-9,
+    conforming_tolerance=1e-10,
+    thorough_below=1e-6,
+    keep_below=1e-7,
 )
 """Solver of 2D maps. Compared with the default tolerances, its tolerances change the
 output error by less than 1.5e-9 rad and the input torque by about 3e-6 N·m and save

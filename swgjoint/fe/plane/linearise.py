@@ -203,7 +203,13 @@ class _Bore:
     rows: Array | None = None
 
 
-def linearise(model: SectorModel, state: State, torque: float | None) -> Linearised:
+def linearise(
+    model: SectorModel,
+    state: State,
+    torque: float | None,
+    *,
+    kept: Linearised | None = None,
+) -> Linearised:
     """Linearise the ring at a state.
 
     Args:
@@ -211,10 +217,13 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
         state: Positions, contact state of the bore, and tooth forces.
         torque: Torque of the flexspline on its load, whole drive [N·m]; None if the
             rotation of the flexspline is prescribed.
+        kept: The ring linearised at a near state with the same contact of the bore,
+            whose tangent is kept; None computes the tangent of the state.
     """
     sign, dofs, x = model.signs, model.dofs, model.skeleton(state)
     n_a = x.shape[1]
-    gradient, hessian = np.zeros(sign.shape), np.zeros((*sign.shape, sign.shape[1]))
+    gradient = np.zeros(sign.shape)
+    hessian = np.zeros((*sign.shape, sign.shape[1])) if kept is None else None
     frames, flank = _add_sectors(model, state, x, gradient, hessian)
     bore = _add_bore(model, state, x, gradient, hessian)
     fixed = np.zeros(sign.shape, dtype=bool)
@@ -228,8 +237,12 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
     if torque is not None:
         gradient += torque / model.copies * rotation_gradient
 
-    # signs other than 1 occur in the last sector only
-    hessian[-1] *= np.outer(sign[-1], sign[-1])
+    if hessian is None:
+        assert kept is not None
+        hessian = kept.hessian
+    else:
+        # signs other than 1 occur in the last sector only
+        hessian[-1] *= np.outer(sign[-1], sign[-1])
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
@@ -269,7 +282,7 @@ def linearise(model: SectorModel, state: State, torque: float | None) -> Lineari
 
 
 def _add_sectors(
-    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array
+    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array | None
 ) -> tuple[Frames, Array]:
     """Add the elastic forces and tangents of the sectors.
 
@@ -281,7 +294,7 @@ def _add_sectors(
         state: State at which to linearise.
         x: Skeleton nodes (N, n_a, 2) [m].
         gradient: Gradient to add to (N, n) [N].
-        hessian: Tangent to add to (N, n, n) [N/m].
+        hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
 
     Returns:
         Frames of the sectors, and displacements of the flank nodes in these frames
@@ -294,16 +307,17 @@ def _add_sectors(
         )
     frames = model.frames(state)
     elastic = elastic_force(element, frames)
-    total = elastic - force @ element.flank_from_skeleton
     seen = project_to_frames(frames, elastic).reshape(x.shape)
     gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(len(x), -1)
-    hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
+    if hessian is not None:
+        total = elastic - force @ element.flank_from_skeleton
+        hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
     flank = frames.displacement @ element.flank_from_skeleton.T
     return frames, flank + force @ element.flank_compliance
 
 
 def _add_bore(
-    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array
+    model: SectorModel, state: State, x: Array, gradient: Array, hessian: Array | None
 ) -> _Bore:
     """Add the forces and tangents of the contact of the bore, see `_add_sectors`."""
     into = model.contact_dofs
@@ -315,7 +329,8 @@ def _add_bore(
             state.touching,
         )
         gradient[:, into] += race.gradient
-        hessian[:, into[:, None], into] += race.hessian
+        if hessian is not None:
+            hessian[:, into[:, None], into] += race.hessian
         return _Bore(gap=race.gap, normal=race.normal, rows=race.rows, fixed=race.fixed)
     # a rigid wave generator supports the bore through the compliant layer
     stations, touching = model.stations, state.touching
@@ -326,13 +341,14 @@ def _add_bore(
     # only sectors in contact exert a force
     on = np.flatnonzero(touching.any(axis=1))
     k = np.where(touching[on], stations.stiffness, 0.0)
-    # sliding over a curved outline turns the contact force
-    bend = k * gap[on] * curvature[on]
     push = (k * gap[on])[..., None] * normal[on]
-    springs = stations.stiffness_of(normal[on], k)
-    springs += stations.stiffness_of(rotate_right_angle(normal[on]), bend)
     gradient[on[:, None], into] += stations.forces_of(push).reshape(on.size, -1)
-    hessian[on[:, None, None], into[:, None], into] += springs
+    if hessian is not None:
+        # sliding over a curved outline turns the contact force
+        bend = k * gap[on] * curvature[on]
+        springs = stations.stiffness_of(normal[on], k)
+        springs += stations.stiffness_of(rotate_right_angle(normal[on]), bend)
+        hessian[on[:, None, None], into[:, None], into] += springs
     return _Bore(gap=gap, normal=normal)
 
 

@@ -139,6 +139,7 @@ class NewtonProblem:
         linear: Linearised,
         load: Load,
         contacts: Contacts,
+        factor: RingFactor | None = None,
     ) -> NewtonProblem:
         """Newton problem of a linearised ring.
 
@@ -148,19 +149,22 @@ class NewtonProblem:
             linear: The linearised ring.
             load: Prescribed torque or rotation.
             contacts: Candidates for tooth contact, m of them.
+            factor: Factorised tangent of ``linear`` if it was kept; None factorises it.
 
         Raises:
             SingularCyclicError: If the tangent of the ring is singular.
         """
+        if factor is None:
+            factor = RingFactor(
+                linear.anchor_tangent(), linear.face_dofs, np.unique(contacts.sector)
+            )
         return cls(
             model=model,
             load=load,
             state=state,
             linear=linear,
             lines=ForceLines.from_candidates(model, state, linear, contacts),
-            factor=RingFactor(
-                linear.anchor_tangent(), linear.face_dofs, np.unique(contacts.sector)
-            ),
+            factor=factor,
         )
 
     def exchange(self, stations: Mask) -> NewtonProblem:
