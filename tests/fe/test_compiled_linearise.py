@@ -78,6 +78,23 @@ def test_linearisations_are_those_of_numpy(loaded, monkeypatch):
 
 
 @pytest.mark.fe
+@pytest.mark.parametrize("loops", ["compiled", "numpy"])
+def test_a_kept_tangent_leaves_everything_else_as_it_is(loaded, monkeypatch, loops):
+    """Only the tangent is that of the other state."""
+    model, state = loaded
+    if loops == "numpy":
+        monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    wanted = linearise(model, state, 5.0)
+    other = linearise(model, replace(state, wave_generator_angle=0.31), 5.0)
+    before = other.hessian.copy()
+    ours = linearise(model, state, 5.0, kept=other)
+    assert np.array_equal(ours.hessian, before)
+    assert not np.array_equal(ours.hessian, wanted.hessian)
+    for name in FIELDS.replace("hessian ", "").split():
+        near(getattr(ours, name), getattr(wanted, name))
+
+
+@pytest.mark.fe
 def test_gaps_after_a_step_are_those_of_numpy(loaded, monkeypatch):
     """Also in the last sector of a half model, whose end has the opposite sign."""
     model, state = loaded

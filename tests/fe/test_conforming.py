@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from swgjoint.fe.common.ring_factor import RingFactor
 from swgjoint.fe.common.sampling import follower_in_plane
 from swgjoint.fe.plane import equilibrium
 from swgjoint.fe.plane.equilibrium import MAP_SOLVER, NewtonSolver
@@ -67,3 +68,32 @@ def test_a_short_reach_after_small_steps_omits_no_contact(name, monkeypatch):
     output, moment = np.abs(found - exact).max(axis=0)
     assert output < 1e-12
     assert moment < 1e-8
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("name", ["dca-80-to-1", "reference-2d", "size-25-100"])
+def test_kept_tangents_lead_to_the_same_equilibria(name, monkeypatch):
+    """Every step ends with fewer factors, within a tenth of the error of maps."""
+    design = Design.load(name)
+    theta = 2.0 * pi / design.periodicity * PLACES[:3]
+    torque, factors = PART * ratings_of(design).repeated_peak, [0]
+    make = RingFactor.__init__
+
+    def count(self, *given):
+        factors[0] += 1
+        make(self, *given)
+
+    monkeypatch.setattr(RingFactor, "__init__", count)
+    found = []
+    for keep in (MAP_SOLVER.keep_below, 0.0):
+        factors[0] = 0
+        follow = follower_in_plane(design)
+        solver = replace(MAP_SOLVER, keep_below=keep)
+        found.append(
+            (followed(replace(follow, solver=solver), [torque], theta), factors[0])
+        )
+    (kept, few), (renewed, many) = found
+    output, moment = np.abs(kept - renewed).max(axis=0)
+    assert output < 1e-10
+    assert moment < 5e-7
+    assert few < many

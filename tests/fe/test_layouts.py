@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import pi
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from solved import coarse
 
+from swgjoint.errors import Outcome
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
@@ -108,3 +110,27 @@ def test_tangent_compliance(layout):
     slope = -(f.output_angle(high) - f.output_angle(low)) / 0.02
     # contact points that slide along their flanks are left out of the tangent
     assert state.compliance == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("failing", [False, True])
+def test_torque_and_angle_may_change_at_once(layout, failing, monkeypatch):
+    """The equilibrium does not depend on the order; a failing step is divided."""
+    f, angle = follow(layout), 0.1 * pi / 122
+    by_steps = f.to_angle(f.to_torque(loaded(layout), 0.5 * TORQUE), angle)
+    solve, tried = Continuation.load, []
+
+    def load(self, start, torque, at):
+        tried.append(torque)
+        state = solve(self, start, torque, at)
+        outcome = Outcome.DIVERGED if failing and len(tried) == 1 else state.outcome
+        return replace(state, outcome=outcome)
+
+    monkeypatch.setattr(Continuation, "load", load)
+    at_once = f.to_position(loaded(layout), 0.5 * TORQUE, angle)
+    assert len(tried) == (3 if failing else 1) and at_once.outcome.ok
+    assert f.input_angle(at_once) == pytest.approx(angle)
+    apart = f.output_angle(at_once) - f.output_angle(by_steps)
+    # step tolerance of the solver by the radius of the bore: 2e-12 m / 0.058 m
+    assert abs(apart) < 4e-11
+    assert f.input_torque(at_once) == pytest.approx(f.input_torque(by_steps), rel=1e-6)

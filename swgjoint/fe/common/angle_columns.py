@@ -296,9 +296,8 @@ class SolvedColumns(Generic[AnyState]):
     def _between(
         self, column: AngleColumn[AnyState], torque: float, theta: float
     ) -> AnyState:
-        """Equilibrium near a column, first under the torque, then at the angle."""
-        state = self.follow.to_torque(column.nearest(torque), torque)
-        return self.follow.to_angle(state, theta) if state.outcome.ok else state
+        """Equilibrium near a column, under the torque and at the angle."""
+        return self.follow.to_position(column.nearest(torque), torque, theta)
 
     def count(self) -> None:
         """Count one more solve and report it."""

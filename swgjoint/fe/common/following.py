@@ -114,6 +114,10 @@ class Follower(ABC, Generic[AnyState]):
             angle: Input angle [rad].
         """
 
+    def load_from_afar(self, start: AnyState, torque: float, angle: float) -> AnyState:
+        """Equilibrium like that of :meth:`load`, as accurate as from a near start."""
+        return self.load(start, torque, angle)
+
     @abstractmethod
     def hold_output(self, state: AnyState) -> AnyState:
         """Equilibrium with the output held in place; the torque is a result."""
@@ -233,6 +237,27 @@ class Follower(ABC, Generic[AnyState]):
         if again.outcome.ok:
             again = self.to_torque(again, state.torque)
         return again if again.outcome.ok else turned
+
+    def to_position(self, state: AnyState, torque: float, angle: float) -> AnyState:
+        """Equilibrium under another torque at another input angle, without friction.
+
+        Torque and angle change at once, which takes half of the solves. If that fails,
+        the torque changes first.
+
+        Args:
+            state: Equilibrium to start from.
+            torque: New output torque, not zero [N·m].
+            angle: New input angle [rad].
+
+        Returns:
+            The equilibrium, or a state with the outcome of the failed attempt.
+        """
+        if not is_free(state):
+            reached = self.load_from_afar(self.predict(state, angle), torque, angle)
+            if reached.outcome.ok:
+                return reached
+        loaded = self.to_torque(state, torque)
+        return self.to_angle(loaded, angle) if loaded.outcome.ok else loaded
 
     def unload(self, state: AnyState, small: float) -> Unloaded[AnyState]:
         """Equilibrium without torque at the same input angle.

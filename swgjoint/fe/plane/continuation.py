@@ -91,6 +91,16 @@ class Continuation(Follower[State]):
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.model, start, Load(torque=torque, rotation=held))
 
+    def load_from_afar(self, start: State, torque: float, angle: float) -> State:
+        """Equilibrium like that of :meth:`load`, as accurate as from a near start.
+
+        The tolerances of maps are those of starts whose last increment is much smaller.
+        """
+        solver = self.solver
+        closest = min(solver.step_tolerance, solver.conforming_tolerance)
+        careful = replace(solver, step_tolerance=closest)
+        return replace(self, solver=careful).load(start, torque, angle)
+
     def hold_output(self, state: State) -> State:
         """Equilibrium with the output held in place; the torque is a result."""
         held = self.solver(self.model, state, Load(rotation=state.rotation))

@@ -37,12 +37,18 @@ def rotate(vectors: Array, angle: Array | float) -> Array:
     """
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    first = cos * x - sin * y
+    rotated = np.empty((*first.shape, 2))
+    rotated[..., 0], rotated[..., 1] = first, sin * x + cos * y
+    return rotated
 
 
 def rotate_right_angle(vectors: Array) -> Array:
     """Rotate 2D vectors (..., 2) counter-clockwise by a right angle: J v."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+    rotated = np.empty(vectors.shape)
+    np.negative(vectors[..., 1], out=rotated[..., 0])
+    rotated[..., 1] = vectors[..., 0]
+    return rotated
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

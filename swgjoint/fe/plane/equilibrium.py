@@ -70,8 +70,8 @@ class NewtonSolver:
     """Increment below which a linearisation is accurate enough for such updates [m]."""
     keep_below: float = 0.0
     """Increment below which the next iteration keeps the tangent and its factor, unless
-    the contact of the bore changes [m]; zero computes every tangent. The remaining error
-    is then that of the last increment times the relative change of the tangent."""
+    the contact of the bore changes [m]; zero computes every tangent. The remaining
+    error is the last increment times the relative change of the tangent."""
     stride: float = 0.1
     """Largest increment that is applied in one iteration, in lobe heights [-]; the
     contacts would change within a larger one."""
