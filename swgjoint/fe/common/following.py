@@ -115,7 +115,13 @@ class Follower(ABC, Generic[AnyState]):
         """
 
     def load_from_afar(self, start: AnyState, torque: float, angle: float) -> AnyState:
-        """Equilibrium like that of :meth:`load`, as accurate as from a near start."""
+        """Equilibrium like that of :meth:`load`, as accurate as from a near start.
+
+        Args:
+            start: State from which the search starts, with its input at ``angle``.
+            torque: Output torque T [N·m].
+            angle: Input angle [rad].
+        """
         return self.load(start, torque, angle)
 
     @abstractmethod

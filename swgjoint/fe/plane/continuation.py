@@ -94,7 +94,12 @@ class Continuation(Follower[State]):
     def load_from_afar(self, start: State, torque: float, angle: float) -> State:
         """Equilibrium like that of :meth:`load`, as accurate as from a near start.
 
-        The tolerances of maps are those of starts whose last increment is much smaller.
+        The tolerances of maps suit near starts, whose last increment is far smaller.
+
+        Args:
+            start: State from which the search starts, with its input at ``angle``.
+            torque: Output torque T [N·m].
+            angle: Input angle [rad].
         """
         solver = self.solver
         closest = min(solver.step_tolerance, solver.conforming_tolerance)
