@@ -83,13 +83,12 @@ def contact_compliance(
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
     for offset, block in zip(offsets, blocks, strict=True):
+        if offset < 0:
+            continue  # added as the transpose of the opposite offset
         pairs = apart == offset % teeth
         responds = np.flatnonzero(pairs.any(axis=1))
-        if offset < 0 or not responds.size:
-            continue
         added = np.where(pairs[responds], weight[responds] @ block @ weight.T, 0.0)
         result[responds] += added
         if offset > 0:
-            # the opposite offset
             result[:, responds] += added.T
     return result

@@ -32,7 +32,8 @@ CHUNK = 256
 """Number of positions evaluated at once in a period of more than :data:`WHOLE`."""
 WHOLE = 500_000
 """Largest number of positions of a period that are evaluated at once, by Fourier
-transforms. Their coefficients take 80 bytes each."""
+transforms. Each takes 80 bytes for its coefficients, and 120 for its sums in every
+interval of the torsion that occurs, usually two to five of them."""
 MAX_SAMPLES = 10_000_000
 """Largest number of samples per period."""
 LINES = 12
