@@ -81,7 +81,7 @@ def few_first(request, monkeypatch) -> Iterator[int]:
 def test_guesses_change_no_result(monkeypatch, few_first, how):
     """Angle, potential and compliance at two torques are those chunk by chunk."""
     monkeypatch.setenv("SWGJOINT_KERNELS", how)
-    change, ticks, before = errors(), [], None
+    change, ticks, before = errors(), [], []
     options = {"chunk": CHUNK, "tick": lambda: ticks.append(1)}
     for torque in (5.0, 8.0):
         at = influence(torque=torque)
@@ -90,7 +90,7 @@ def test_guesses_change_no_result(monkeypatch, few_first, how):
         ticks.clear()
         found = superpose_many(at, change, torque + 1.0, before, **options)
         assert len(ticks) == SETS // CHUNK
-        before = found.features
+        before = [found.features]
         assert np.array_equal(found.active, wanted.active)
         for key in ("output_angle", "potential", "compliance"):
             ours, theirs = getattr(found, key), getattr(wanted, key)
@@ -127,12 +127,11 @@ def test_the_solution_before_makes_better_guesses():
     at = replace(before, slack=before.slack * 1.1)
     margin = at.respond(change, 2.0).margin
     learn, other = slice(0, SETS // 5), slice(SETS // 5, None)
-    features = StateGuess.fit(change[learn], None, earlier[learn]).features(earlier)
+    features = StateGuess.fit(change[learn], [], earlier[learn]).features(earlier)
     wrong = []
-    for known in (None, features):
-        first = None if known is None else known[learn]
+    for known in ([], [features]):
+        first, rest = ([one[part] for one in known] for part in (learn, other))
         guess = StateGuess.fit(change[learn], first, margin[learn])
-        rest = None if known is None else known[other]
         active = guess.active(change[other], rest)
         wrong.append((active != (margin[other] > 0.0)).sum(axis=1).mean())
     usual = (margin[learn] > 0.0).mean(axis=0) > 0.5

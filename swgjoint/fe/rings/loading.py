@@ -29,6 +29,9 @@ load that Newton's method takes longer."""
 NEARBY = 5e-3
 """Largest gap of teeth that a free rotation may close, as a fraction of the radius of
 the rim [-]."""
+TURNS = 3
+"""Largest number of rotations to the teeth: the rim deforms while it turns, so that the
+first one may end before them."""
 HALVINGS = 5
 """Largest number of times that failing torque steps are halved."""
 
@@ -105,6 +108,9 @@ def _turned_free(model: ThinRing, state: ThinRingState) -> ThinRingState:
 def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRingState:
     """Equilibrium under a torque, reached in halved steps if the full step fails.
 
+    If the torque changes its sign, the output is freed first and then turned across the
+    clearance: Newton's method at a prescribed torque can fail there.
+
     Args:
         model: The rings.
         state: State from which the search starts. If no tooth carries load in it, its
@@ -114,9 +120,11 @@ def solve_loaded(model: ThinRing, state: ThinRingState, torque: float) -> ThinRi
     Returns:
         The equilibrium, or the state of the last failed step.
     """
-    solver = ThinRingSolver()
-    if not state.loaded_teeth:
-        touched = _turned_to_teeth(model, state, torque)
+    solver, apart = ThinRingSolver(), state
+    if state.loaded_teeth and state.torque * torque < 0.0:
+        apart = solver(model, state, rotation=state.rotation, teeth=False)
+    if not apart.loaded_teeth and apart.outcome.ok:
+        touched = _turned_to_teeth(model, apart, torque)
         if touched is not None:
             tried = solver(model, touched, torque=torque)
             if tried.outcome.ok:
@@ -218,6 +226,28 @@ def _turned_to_teeth(
         state: Equilibrium in which no tooth carries load.
         torque: Torque T that turns the output [N·m].
     """
+    for _ in range(TURNS):
+        free = _free_rotation(model, state, torque)
+        if free is None:
+            return None
+        state = ThinRingSolver()(model, state, rotation=state.rotation + TOUCH * free)
+        if not state.outcome.ok:
+            return None
+        if state.loaded_teeth:
+            return state
+    return None
+
+
+def _free_rotation(
+    model: ThinRing, state: ThinRingState, torque: float
+) -> float | None:
+    """Rotation of the rim at which the first tooth touches [rad]; None without any.
+
+    Args:
+        model: The rings.
+        state: Equilibrium in which no tooth carries load.
+        torque: Torque T that turns the output [N·m].
+    """
     nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
     reach = NEARBY * model.rim.radius
@@ -230,8 +260,4 @@ def _turned_to_teeth(
     some = closing > 1e-3 * np.abs(closing).max(initial=0.0)
     if not some.any():
         return None
-    free = float((contacts.gap[some] / closing[some]).min())
-    touched = ThinRingSolver()(
-        model, state, rotation=state.rotation + way * TOUCH * free
-    )
-    return touched if touched.outcome.ok and touched.loaded_teeth else None
+    return float(way * (contacts.gap[some] / closing[some]).min())

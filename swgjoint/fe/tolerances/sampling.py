@@ -24,6 +24,7 @@ from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.perfect import PerfectSolid, midway
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
+from swgjoint.fe.tolerances.state_guess import NearbyPositions
 from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
 from swgjoint.fe.tolerances.unseen import (
     spread_positions,
@@ -145,7 +146,7 @@ def sample_tolerances(
     # a linearisation under load takes about as long as a chunk
     linearised = 2 * levels.size * (2 if own_reference else 1)
     tick = _stage(progress, design, 2, phases * (steps + linearised))
-    before, under_load = None, list[Rest]()
+    before, under_load, nearby = None, list[Rest](), NearbyPositions()
     if solid is not None:
         perfect_states = solid.under_both_signs(levels, tick)
         perfect = list(solid.table(perfect_states, levels).transpose(2, 0, 1))
@@ -165,7 +166,7 @@ def sample_tolerances(
             flawless = reference[k].under_both_signs(ideal_drive, levels, tick)
         if there is None:
             phase_table, count = respond_over_torque(
-                loaded, by_errors, levels, small, tick
+                loaded, by_errors, levels, small, tick, nearby
             )
         else:
             phase_table, count = there
@@ -232,6 +233,7 @@ def respond_over_torque(
     levels: Array,
     small: float,
     tick: Callable[..., None] = lambda parts=1: None,
+    nearby: NearbyPositions | None = None,
 ) -> tuple[Array, int]:
     """Output angle, strain energy and compliance at all torques of both signs.
 
@@ -243,13 +245,16 @@ def respond_over_torque(
         small: Torque that takes up the clearance [N·m].
         tick: Called with the number of chunks that are done, one by default, of
             :data:`CHUNK` sets of errors at a torque.
+        nearby: What is known of the same sets at positions before, to which this one is
+            added; None for nothing.
 
     Returns:
         Output angle [rad], strain energy [J] and compliance [rad/(N·m)]
         (3, n_torques, n_sets), and the number of sets whose unloaded output is free.
     """
     latest: dict[int, Array] = {}
-    features: dict[bool, Array | None] = {}
+    nearby = NearbyPositions() if nearby is None else nearby
+    features: dict[bool, Array] = {}  # under the torque before of either sign
 
     def changes(at: Influence) -> Array:
         """Gap changes, kept for the latest linearisation only: they fill 50 MB."""
@@ -265,13 +270,17 @@ def respond_over_torque(
         change, sign = changes(at)[chosen], torque < 0.0
         options: dict[str, Any] = {"chunk": CHUNK, "tick": tick}
         if start is None and len(change) > CHUNK:
-            before = features.get(sign)
-            if before is not None and len(before) != len(change):
-                before = None
-            found = superpose_many(at, change, torque, before, **options)
+            known = nearby.features(torque)
+            if sign in features:
+                known.append(features[sign])
+            # those of the free sets tell nothing about all of them
+            known = [one for one in known if len(one) == len(change)]
+            found = superpose_many(at, change, torque, known, **options)
+            assert found.features is not None
+            features[sign] = found.features
+            nearby.store(torque, found.features)
         else:
             found = superpose_plainly(at, change, torque, start, **options)
-        features[sign] = found.features
         # the potential of a response is relative to the linearised equilibrium
         potential = found.potential + state.energy + at.torque * at.angle
         energy = potential - torque * found.output_angle
@@ -287,7 +296,8 @@ def respond_over_torque(
         free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
     ends: dict[float, tuple[Array, Any]] = {}
     if free.any():
-        ends = {t: row(t, free, None, lambda: None) for t in (small, -small)}
+        some = slice(None) if free.all() else free
+        ends = {t: row(t, some, None, lambda: None) for t in (small, -small)}
         up, down = ends[small][0], ends[-small][0]
         unloaded[:, free] = midway(up, down, small)
     chunks = -(-count // CHUNK)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,7 +75,7 @@ def superpose_many(
     at: Influence,
     gap_change: Array,
     torque: float,
-    before: Array | None,
+    known: Sequence[Array],
     *,
     chunk: int,
     tick: Callable[[], None],
@@ -83,14 +83,13 @@ def superpose_many(
     """The same results, with guesses and without the contacts that never change.
 
     The first sets show which contacts change their state at all and how their state
-    depends on the gap changes and on the solution under the torque before. Similar sets
-    are solved together.
+    depends on the gap changes and on solutions nearby. Similar sets are solved together.
 
     Args:
         at: The linearised drive.
         gap_change: Gap changes (n_sets, n) [m].
         torque: Torque T [N·m].
-        before: Features under the torque before (n_sets, n_before), or None.
+        known: Features of solutions nearby, each (n_sets, n_features).
         chunk: Number of sets of a chunk; there must be several chunks.
         tick: Called after every chunk.
     """
@@ -123,15 +122,13 @@ def superpose_many(
     change = gap_change[:, near.teeth]
     sound = np.isfinite(margin).all(axis=1)
     learn = first[sound]
-    guess = StateGuess.fit(
-        change[learn], None if before is None else before[learn], margin[sound]
-    )
+    guess = StateGuess.fit(change[learn], [one[learn] for one in known], margin[sound])
     features = np.empty((count, int(guess.varied.sum())))
     features[first] = guess.features(margin)
     sets, order = None, np.arange(others.size)
-    if before is not None:
-        # without a torque before, similar problems are a better guess
-        sets = guess.active(change[others], before[others])
+    if known:
+        # without solutions nearby, similar problems are a better guess
+        sets = guess.active(change[others], [one[others] for one in known])
         order = np.concatenate(similar_sets(sets, chunk))
     for part in np.array_split(order, -(-count // chunk)):
         rows = others[part]

@@ -9,7 +9,7 @@ import pytest
 from messages import naming
 from solved import RING_TORQUES, hundred_elements, ring_path
 
-from swgjoint.errors import DesignError
+from swgjoint.errors import DesignError, Outcome
 from swgjoint.fe.rings.contacts import linearise, race_on_balls
 from swgjoint.fe.rings.equilibrium import ThinRingSolver, rim_rotation
 from swgjoint.fe.rings.friction import friction_path
@@ -133,6 +133,29 @@ def test_input_torque_is_in_the_mean_the_torque_over_the_ratio(model):
         found.append(one.wave_generator_torque)
     # the ripple of ball passage and teeth is 0.6 % of it
     assert np.mean(found) == pytest.approx(TORQUE / model.ratio, rel=2e-3)
+
+
+def test_a_torque_may_change_its_sign(monkeypatch):
+    """Across the clearance, like from the unloaded rings, and without a failing search.
+
+    In size-25-100-bought, Newton's method at a prescribed torque found no equilibrium.
+    """
+    outcomes = []
+    solve = ThinRingSolver.__call__
+
+    def watched(*args, **kwargs):
+        state = solve(*args, **kwargs)
+        outcomes.append(state.outcome)
+        return state
+
+    monkeypatch.setattr(ThinRingSolver, "__call__", watched)
+    rings = thin_ring(Design.load("size-25-100-bought"))
+    rest = solve_unloaded(rings, positions(rings, 4)[0])
+    crossed = solve_loaded(rings, solve_loaded(rings, rest, 1.0), -1.0)
+    assert crossed.rotation == pytest.approx(
+        solve_loaded(rings, rest, -1.0).rotation, abs=1e-12
+    )
+    assert set(outcomes) == {Outcome.CONVERGED}
 
 
 def test_mirror(model, state):
