@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from swgjoint.fe.common.indentation import Indentation, Strips
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.common.pivot_base import similar_sets
 from swgjoint.fe.common.pivoting import exchange
-from swgjoint.fe.tolerances import superposition
+from swgjoint.fe.tolerances import sampling, superposition
 from swgjoint.fe.tolerances.near_contacts import NearContacts
-from swgjoint.fe.tolerances.state_guess import StateGuess
+from swgjoint.fe.tolerances.rest import Rest
+from swgjoint.fe.tolerances.state_guess import NearbyPositions, StateGuess
 from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
 
 LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)
@@ -137,6 +139,56 @@ def test_the_solution_before_makes_better_guesses():
     usual = (margin[learn] > 0.0).mean(axis=0) > 0.5
     plain = (usual != (margin[other] > 0.0)).sum(axis=1).mean()
     assert wrong[1] < 0.7 * wrong[0] < 0.7 * plain
+
+
+def test_positions_nearby_are_those_before_and_of_the_next_pitch():
+    """Features of the latest position and, one pitch on, of the first one."""
+    rng = np.random.default_rng(3)
+    stored = [rng.uniform(-1.0, 1.0, size=(7, 4)) for _ in range(3)]
+    nearby = NearbyPositions()
+    assert nearby.features(5.0) == []
+    for features in stored:
+        nearby.store(5.0, features)
+    before, next_pitch = nearby.features(5.0)
+    assert np.abs(before - stored[2]).max() < 1e-2
+    assert np.abs(next_pitch[:-1] - stored[0][1:]).max() < 1e-2
+    assert np.abs(next_pitch[-1] - stored[0][0]).max() < 1e-2
+    assert nearby.features(8.0) == []
+
+
+def position(slack: float) -> Rest:
+    """A position of the drive, linearised at 0, 1 and 2 N·m of either sign."""
+    state, at = SimpleNamespace(energy=0.0), influence()
+
+    def under(torque: float) -> Influence:
+        wider = slack * (1.0 + 0.05 * torque)
+        return replace(at, torque=torque, slack=at.slack * wider)
+
+    loaded = {t: (state, under(t)) for t in (-2.0, -1.0, 1.0, 2.0)}
+    return Rest(state=state, at=under(0.0), loaded=loaded)
+
+
+def test_positions_nearby_change_no_result(monkeypatch):
+    """Superposition at a second position, with and without solutions of the first."""
+    monkeypatch.setattr(sampling, "CHUNK", CHUNK)
+    monkeypatch.setattr(superposition, "FIRST", 64)
+    change, levels, nearby = errors(), np.array([1.0, 2.0]), NearbyPositions()
+    rest = position(1.1)
+    sampling.respond_over_torque(
+        position(1.0), lambda _: change, levels, 0.1, nearby=nearby
+    )
+    assert {-2.0, -1.0, 0.0, 1.0, 2.0} <= set(nearby.latest)
+    tables = [
+        sampling.respond_over_torque(rest, lambda _: change, levels, 0.1, nearby=known)[
+            0
+        ]
+        for known in (None, nearby)
+    ]
+    # without load, differences of nearly equal energies are left
+    plain, guessed = (table[:, [0, 1, 3, 4]] for table in tables)
+    apart = np.abs(guessed - plain).max(axis=-1)
+    assert (apart < 1e-7 * np.ptp(plain, axis=-1)).all()
+    assert nearby.latest[2.0] is not nearby.first[2.0]
 
 
 def test_similar_sets_are_parts_of_all_rows():

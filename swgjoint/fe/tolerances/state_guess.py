@@ -50,7 +50,9 @@ class StateGuess:
     """Features by the inputs (n_inputs, n_varied)."""
 
     @classmethod
-    def fit(cls, gap_change: Array, known: Sequence[Array], margin: Array) -> StateGuess:
+    def fit(
+        cls, gap_change: Array, known: Sequence[Array], margin: Array
+    ) -> StateGuess:
         """Regression through the solutions of some problems.
 
         Args:

@@ -83,7 +83,8 @@ def superpose_many(
     """The same results, with guesses and without the contacts that never change.
 
     The first sets show which contacts change their state at all and how their state
-    depends on the gap changes and on solutions nearby. Similar sets are solved together.
+    depends on the gap changes and on solutions nearby. Similar sets are solved
+    together.
 
     Args:
         at: The linearised drive.
