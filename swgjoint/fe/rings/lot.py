@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from swgjoint.fe.rings.passage import ball_passage
 from swgjoint.fe.rings.race_on_balls import RaceOnBalls
 from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.fe.rings.tolerances import RingErrors, superpose
-from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of
 from swgjoint.fe.tolerances.lot import POSITIONS, stratified_numbers
 from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.catalogue import ratings_of
@@ -139,7 +140,7 @@ def sample_turn(
     levels = _levels(design, torques)
     turn = round(2.0 * np.pi * abs(design.ratio) / pitch_of(design))
     pitch = stratified_numbers(turn, positions)
-    errors = gap_errors(design, pitch)
+    changes = partial(gap_changes, design=design, pitches=pitch)
     if perfect is None:
         model = with_shifting_teeth(thin_ring(with_perfect_teeth(design)))
     else:
@@ -148,8 +149,8 @@ def sample_turn(
     rings = _rings_of(design, model, levels)
     tables = []
     for phase in rings.phases.tolist():
-        rest = rings.linearise(model, phase, levels, errors, nearby.get(phase))
-        tables.append(superpose(rest, errors, levels, rings.small)[0])
+        rest = rings.linearise(model, phase, levels, nearby.get(phase))
+        tables.append(superpose(rest, changes, levels, rings.small)[0])
     table = np.mean(tables, axis=0)
     torque = np.concatenate([-levels[::-1], [0.0], levels])
     series = series_compliance(design, cup=True)

@@ -9,7 +9,7 @@ lobes, because the map contains the passage of balls separately.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import with_mean_clearance
+from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.drive2d import in_plane
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
@@ -30,13 +31,17 @@ from swgjoint.fe.rings.loading import (
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.passage import BallPassage
 from swgjoint.fe.rings.state import ThinRingState
-from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.cycle import MEMBERS, gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.main_harmonics import main_harmonics
 from swgjoint.fe.tolerances.rest import Rest
 from swgjoint.fe.tolerances.sampling import respond_over_torque
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.design.tolerances import has_errors, with_perfect_teeth
+from swgjoint.gear.design.tolerances import (
+    has_errors,
+    tooth_errors,
+    with_perfect_teeth,
+)
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
@@ -105,7 +110,6 @@ class RingErrors:
         name, phases = self.design.drive.name, self.phases
         stage = f"{name}: manufacturing errors"
         pitches = np.arange(pitches_of(self.design), dtype=np.int64)
-        errors = gap_errors(self.design, pitches)
         model = with_shifting_teeth(thin_ring(with_perfect_teeth(self.design)))
         total = len(phases) + CHECKS
         # positions of the balls alternate from pitch to pitch if the cycle permits:
@@ -114,8 +118,7 @@ class RingErrors:
         spectra = []
         for k, phase in enumerate(phases.tolist()):
             first = k if shares > 1 else 0
-            some = tuple(one[first::shares] for one in errors)
-            found = self._over_cycle(k, model, phase, levels, some)
+            found = self._over_cycle(k, model, phase, levels, pitches[first::shares])
             spectra.append(_spectrum(found, first, pitches.size))
             self.progress(stage, k + 1, total)
         turns = pitches.size / self.design.drive.teeth_circular_spline
@@ -183,30 +186,30 @@ class RingErrors:
         model: ThinRing,
         phase: float,
         levels: Array,
-        errors: tuple[Array, ...],
+        pitches: Index,
     ) -> Array:
-        """Output angle, energy and compliance at all pitches (3, n_torques, n).
+        """Output angle, energy and compliance at some pitches (3, n_torques, n).
 
         Args:
             number: Number of the position of the balls.
             model: Rings with perfect teeth and with errors of the wave generator.
             phase: Angle of ball 0 from the major axis [rad].
             levels: Torques of both signs, increasing (n_levels,) [N·m].
-            errors: Shifts of the teeth by pitch, see
-                :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+            pitches: Numbers of the pitches (n,).
         """
-        name, shape = _POSITION.format(number), (3, 2 * levels.size + 1, len(errors[0]))
+        name, shape = _POSITION.format(number), (3, 2 * levels.size + 1, pitches.size)
         if self.keep is not None:
             stored = self.keep.read(name, partial(_stored_table, shape))
             if stored is not None:
                 return stored
-        rest = self.linearise(model, phase, levels, errors)
-        table = superpose(rest, errors, levels, self.small)
+        rest = self.linearise(model, phase, levels)
+        changes = partial(gap_changes, design=self.design, pitches=pitches)
+        table = superpose(rest, changes, levels, self.small)
         if not np.isfinite(table).all():
             lost = int(np.isnan(table).any(axis=(0, 1)).sum())
             raise ComputationError(
                 f"{self.design.drive.name}: no equilibrium of the thin rings with the"
-                f" errors of the teeth at {lost} of {len(errors[0])} pitches; try"
+                f" errors of the teeth at {lost} of {pitches.size} pitches; try"
                 " smaller tolerances"
             )
         if self.keep is not None:
@@ -218,7 +221,6 @@ class RingErrors:
         model: ThinRing,
         phase: float,
         levels: Array,
-        errors: tuple[Array, ...],
         nearby: Mapping[float, ThinRingState] | None = None,
     ) -> Rest:
         """The rings at a position of the balls, linearised under torques of both signs.
@@ -227,15 +229,13 @@ class RingErrors:
             model: Rings with perfect teeth and with errors of the wave generator.
             phase: Angle of ball 0 from the major axis [rad].
             levels: Torques of both signs, increasing (n_levels,) [N·m].
-            errors: Shifts of the teeth by pitch; the largest gap that they may close
-                limits the contacts.
             nearby: Equilibria of the drive without errors at this position by torque
                 [N·m], see :func:`swgjoint.fe.rings.loading.solve_over_torque`.
 
         Raises:
             ComputationError: If an equilibrium cannot be found.
         """
-        reach = _largest_change(errors)
+        reach = _largest_change(self.design)
         loaded = {}
         found = solve_over_torque(model, phase, levels, nearby)
         for torque, state in found.items():
@@ -301,7 +301,7 @@ class RingErrors:
 
 
 def superpose(
-    rest: Rest, errors: tuple[Array, ...], levels: Array, small: float
+    rest: Rest, changes_of: Callable[[Influence], Array], levels: Array, small: float
 ) -> Array:
     """Output angle, energy and compliance with errors (3, n_torques, n_sets).
 
@@ -310,13 +310,12 @@ def superpose(
 
     Args:
         rest: Rings linearised under torques of both signs.
-        errors: Sets of errors, see :func:`swgjoint.fe.tolerances.cycle.gap_errors`.
+        changes_of: Changes of the gaps of linearised rings, one set of errors per row
+            (n_sets, n) [m].
         levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
         small: Torque that takes up the clearance [N·m].
     """
-    table, _ = respond_over_torque(
-        rest, lambda at: at.gap_change(*errors), levels, small
-    )
+    table, _ = respond_over_torque(rest, changes_of, levels, small)
     return np.where(table[2] > 0.0, table, np.nan)
 
 
@@ -365,12 +364,10 @@ def _over_passage(spectra: Sequence[Array], passages: float, count: int) -> Arra
     return np.asarray(0.5 * (first + second) + np.fft.rfft(change * wave))
 
 
-def _largest_change(errors: tuple[Array, ...]) -> float:
+def _largest_change(design: Design) -> float:
     """Upper bound of the gap that errors of the teeth close [m]."""
-    flexspline, circular_spline, _ = errors
-    return float(
-        sum(np.hypot(*one[0].T).max() for one in (flexspline, circular_spline))
-    )
+    shifts = (tooth_errors(design, member).shift for member in MEMBERS)
+    return float(sum(np.hypot(*shift.T).max() for shift in shifts))
 
 
 def _stored_table(shape: tuple[int, ...], arrays: Mapping[str, Any]) -> Array:
