@@ -19,6 +19,9 @@ constexpr double kResidual = 1e-4;  // error of an active equation, in tolerance
 // search would go around in circles.
 constexpr double kViolated = 0.05, kMostViolated = 0.5;
 
+// The number of numbers in whole vectors that hold n
+std::size_t padded(std::size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
+
 }  // namespace
 
 double StripLaw::excess(std::size_t strip, double force, double* derivative) const {
@@ -34,9 +37,11 @@ StripSolver::StripSolver(const Problem& problem, const StripLaw& law)
     : p_(problem), law_(law), members_(law.strips), force_row_(problem.size, -1),
       seat_(problem.size, -1), seen_(new double[problem.size * problem.size]),
       seen_strips_(new double[problem.size * law.strips]), row_(problem.size, -1),
-      extra_of_(problem.size, -1), place_(law.strips, -1), work_(problem.size),
-      rows_(problem.size), force_(law.strips), excess_(law.strips), slope_(law.strips),
-      at_rest_(law.strips) {
+      extra_of_(problem.size, -1), place_(law.strips, -1),
+      stride_(padded(law.strips + kFewest + problem.size / kShare + 1)),
+      moved_(problem.size * stride_), across_(problem.size * stride_),
+      x_(stride_), work_(problem.size), rows_(problem.size), line_(stride_),
+      force_(law.strips), excess_(law.strips), slope_(law.strips), at_rest_(law.strips) {
   for (std::size_t j = 0; j < law_.strips; ++j) law_.excess(j, 0.0, &at_rest_[j]);
   for (std::size_t k = 0; k < p_.size; ++k) {
     if (p_.strip[k] < 0) continue;
@@ -46,6 +51,7 @@ StripSolver::StripSolver(const Problem& problem, const StripLaw& law)
     forces_.push_back(k);
     watch(k);
   }
+  forced_.resize(forces_.size() * stride_);
 }
 
 bool StripSolver::solve(const double* offset, double tolerance, bool* active,
@@ -189,33 +195,32 @@ bool StripSolver::refer(const double* offset, const bool* active) {
   }
   pivots_.resize(a);
   if (!eliminate(system_.data(), a, width, stride, pivots_.data())) return false;
+  const std::size_t forces = forces_.size();
   factors_.resize(a * a);
-  into_forces_.resize(a * forces_.size());
+  into_forces_.resize(forces * a);
   for (std::size_t i = 0; i < a; ++i) {
-    std::copy_n(system_.data() + i * stride, a, factors_.data() + i * a);
+    const double* row = system_.data() + i * stride;
+    for (std::size_t c = 0; c < a; ++c) factors_[c * a + i] = row[c];
+    std::copy_n(row + a, count, moved_.data() + i * stride_);
     const double* column = p_.columns + n * inside_[i];
-    double* row = into_forces_.data() + i * forces_.size();
-    for (std::size_t f = 0; f < forces_.size(); ++f) row[f] = column[forces_[f]];
+    for (std::size_t f = 0; f < forces; ++f) into_forces_[f * a + i] = column[forces_[f]];
   }
+  for (std::size_t f = 0; f < forces; ++f) {
+    double* row = forced_.data() + f * stride_;
+    for (std::size_t t = 0; t < count; ++t) row[t] = coupling(forces_[f], extra_[t]);
+  }
+  subtract_product(forced_.data(), into_forces_.data(), moved_.data(), forces, a, wide(),
+                   stride_);
   for (std::size_t load = 0; load < 2; ++load) {
     value_[load].resize(a);
     for (std::size_t i = 0; i < a; ++i) {
       value_[load][i] = system_[i * stride + width - 1 - load];
     }
-  }
-  moved_.resize(std::max(moved_.size(), count));
-  forced_.resize(moved_.size());
-  across_.resize(moved_.size());
-  for (std::size_t t = 0; t < count; ++t) {
-    moved_[t].resize(a);
-    for (std::size_t i = 0; i < a; ++i) moved_[t][i] = system_[i * stride + a + t];
-    finish(t);
-  }
-  for (std::size_t load = 0; load < 2; ++load) {
     const double* q = load ? p_.direction : offset;
-    slack_[load].resize(forces_.size());
-    for (std::size_t f = 0; f < forces_.size(); ++f) slack_[load][f] = q[forces_[f]];
-    add_into_forces(value_[load].data(), 1.0, slack_[load].data());
+    slack_[load].resize(forces);
+    for (std::size_t f = 0; f < forces; ++f) slack_[load][f] = q[forces_[f]];
+    add_products(slack_[load].data(), 1.0, into_forces_.data(), forces, a,
+                 value_[load].data(), a);
   }
   offset_ = offset;
   return referred_ = true;
@@ -226,7 +231,8 @@ void StripSolver::start(const double* offset) {
   for (std::size_t i = 0; i < a; ++i) value_[0][i] = -offset[inside_[i]];
   substitute(factors_.data(), pivots_.data(), a, value_[0].data());
   for (std::size_t f = 0; f < forces_.size(); ++f) slack_[0][f] = offset[forces_[f]];
-  add_into_forces(value_[0].data(), 1.0, slack_[0].data());
+  add_products(slack_[0].data(), 1.0, into_forces_.data(), forces_.size(), a,
+               value_[0].data(), a);
   offset_ = offset;
 }
 
@@ -252,41 +258,22 @@ bool StripSolver::follow(const bool* active) {
 }
 
 void StripSolver::add(Kind kind, std::size_t index) {
-  const std::size_t a = inside_.size(), t = extra_.size();
-  extra_.push_back({kind, index});
+  const std::size_t a = inside_.size(), forces = forces_.size(), t = extra_.size();
+  const Extra extra{kind, index};
+  extra_.push_back(extra);
   (kind == Kind::kStrip ? place_ : extra_of_)[index] = static_cast<std::int64_t>(t);
-  if (moved_.size() <= t) {
-    moved_.resize(t + 1);
-    forced_.resize(t + 1);
-    across_.resize(t + 1);
-  }
-  moved_[t].resize(a);
-  for (std::size_t i = 0; i < a; ++i) moved_[t][i] = coupling(inside_[i], extra_[t]);
-  substitute(factors_.data(), pivots_.data(), a, moved_[t].data());
+  column_.resize(a + forces);
+  for (std::size_t i = 0; i < a; ++i) column_[i] = coupling(inside_[i], extra);
+  substitute(factors_.data(), pivots_.data(), a, column_.data());
+  double* forced = column_.data() + a;
+  for (std::size_t f = 0; f < forces; ++f) forced[f] = coupling(forces_[f], extra);
+  add_products(forced, -1.0, into_forces_.data(), forces, a, column_.data(), a);
+  for (std::size_t i = 0; i < a; ++i) moved_[i * stride_ + t] = column_[i];
+  for (std::size_t f = 0; f < forces; ++f) forced_[f * stride_ + t] = forced[f];
   if (kind == Kind::kActive) {
-    across_[t].resize(a);
-    for (std::size_t i = 0; i < a; ++i) {
-      across_[t][i] = p_.columns[p_.size * inside_[i] + index];
-    }
+    double* row = across_.data() + t * p_.size;
+    for (std::size_t i = 0; i < a; ++i) row[i] = p_.columns[p_.size * inside_[i] + index];
   }
-  finish(t);
-}
-
-void StripSolver::finish(std::size_t t) {
-  const std::size_t count = forces_.size();
-  forced_[t].resize(count);
-  for (std::size_t f = 0; f < count; ++f) forced_[t][f] = coupling(forces_[f], extra_[t]);
-  add_into_forces(moved_[t].data(), -1.0, forced_[t].data());
-}
-
-void StripSolver::add_into_forces(const double* value, double sign, double* slack) {
-  columns_.clear();
-  parts_.clear();
-  for (std::size_t i = 0; i < inside_.size(); ++i) {
-    columns_.push_back(into_forces_.data() + i * forces_.size());
-    parts_.push_back(sign * value[i]);
-  }
-  add_columns(slack, columns_.data(), parts_.data(), parts_.size(), forces_.size());
 }
 
 void StripSolver::drop(std::size_t t) {
@@ -294,9 +281,14 @@ void StripSolver::drop(std::size_t t) {
   extra_of_[extra_[t].index] = -1;
   if (t != last) {
     extra_[t] = extra_[last];
-    std::swap(moved_[t], moved_[last]);
-    std::swap(forced_[t], forced_[last]);
-    std::swap(across_[t], across_[last]);
+    for (std::size_t i = 0; i < inside_.size(); ++i) {
+      moved_[i * stride_ + t] = moved_[i * stride_ + last];
+    }
+    for (std::size_t f = 0; f < forces_.size(); ++f) {
+      forced_[f * stride_ + t] = forced_[f * stride_ + last];
+    }
+    std::copy_n(across_.data() + last * p_.size, inside_.size(),
+                across_.data() + t * p_.size);
     (extra_[t].kind == Kind::kStrip ? place_ : extra_of_)[extra_[t].index] =
         static_cast<std::int64_t>(t);
   }
@@ -309,12 +301,51 @@ double StripSolver::coupling(std::size_t k, const Extra& extra) const {
   return extra.index == k ? -1.0 : 0.0;
 }
 
+double StripSolver::equation(std::size_t r, const bool* active, bool by_load) {
+  const std::size_t a = inside_.size(), count = extra_.size(), k = extra_[r].index;
+  const std::vector<double>&value = value_[by_load], &slack = slack_[by_load];
+  double* row = line_.data();
+  if (extra_[r].kind == Kind::kActive) {
+    // its slack is zero
+    const double* across = across_.data() + r * p_.size;
+    for (std::size_t t = 0; t < count; ++t) row[t] = coupling(k, extra_[t]);
+    subtract_product(row, across, moved_.data(), 1, a, wide(), stride_);
+    double known = (by_load ? p_.direction : offset_)[k];
+    add_products(&known, 1.0, across, 1, a, value.data(), a);
+    return -known;
+  }
+  if (extra_[r].kind == Kind::kInactive) {
+    // its value is zero
+    std::copy_n(moved_.data() + row_[k] * stride_, count, row);
+    return value[row_[k]];
+  }
+  // its approach follows the tangent of the law at the last force
+  const double d = slope_[k];
+  double right = by_load ? 0.0 : excess_[k] - d * std::max(force_[k], 0.0);
+  std::fill_n(row, count, 0.0);
+  for (const std::size_t j : members_[k]) {
+    if (active[j] == p_.closed[j]) continue;
+    const double unit = d * p_.force_unit[j];
+    if (extra_of_[j] >= 0) {
+      row[extra_of_[j]] -= unit;
+    } else if (active[j]) {
+      const double* moved = moved_.data() + row_[j] * stride_;
+      for (std::size_t t = 0; t < count; ++t) row[t] += unit * moved[t];
+      right += unit * value[row_[j]];
+    } else {
+      const double* forced = forced_.data() + force_row_[j] * stride_;
+      for (std::size_t t = 0; t < count; ++t) row[t] -= unit * forced[t];
+      right += unit * slack[force_row_[j]];
+    }
+  }
+  row[r] += 1.0;
+  return right;
+}
+
 bool StripSolver::solve_extra(const bool* active, bool by_load) {
   const std::size_t a = inside_.size(), count = extra_.size();
-  const std::vector<double>&value = value_[by_load], &slack = slack_[by_load];
-  const double* q = by_load ? p_.direction : offset_;
   // a strip without force is known: as far apart as its law says
-  x_.assign(count, 0.0);
+  std::fill(x_.begin(), x_.end(), 0.0);
   unknown_.clear();
   for (std::size_t r = 0; r < count; ++r) {
     bool known = extra_[r].kind == Kind::kStrip;
@@ -330,59 +361,20 @@ bool StripSolver::solve_extra(const bool* active, bool by_load) {
     }
   }
   const std::size_t size = unknown_.size(), stride = size + 1 + kPadding;
-  system_.assign(size * stride, 0.0);
-  line_.resize(count + 1);
+  system_.resize(size * stride);
   for (std::size_t u = 0; u < size; ++u) {
-    const std::size_t r = unknown_[u];
-    std::fill(line_.begin(), line_.end(), 0.0);
-    double* row = line_.data();
-    const std::size_t k = extra_[r].index;
-    if (extra_[r].kind == Kind::kActive) {
-      // its slack is zero
-      products(moved_.data(), count, across_[r].data(), a, row);
-      for (std::size_t t = 0; t < count; ++t) row[t] = coupling(k, extra_[t]) - row[t];
-      products(&value, 1, across_[r].data(), a, row + count);
-      row[count] = -q[k] - row[count];
-    } else if (extra_[r].kind == Kind::kInactive) {
-      // its value is zero
-      for (std::size_t t = 0; t < count; ++t) row[t] = moved_[t][row_[k]];
-      row[count] = value[row_[k]];
-    } else {
-      // its approach follows the tangent of the law at the last force
-      const double d = slope_[k];
-      row[count] = by_load ? 0.0 : excess_[k] - d * std::max(force_[k], 0.0);
-      for (const std::size_t j : members_[k]) {
-        if (active[j] == p_.closed[j]) continue;
-        const double unit = d * p_.force_unit[j];
-        if (extra_of_[j] >= 0) {
-          row[extra_of_[j]] -= unit;
-        } else if (active[j]) {
-          for (std::size_t t = 0; t < count; ++t) row[t] += unit * moved_[t][row_[j]];
-          row[count] += unit * value[row_[j]];
-        } else {
-          const std::int64_t f = force_row_[j];
-          for (std::size_t t = 0; t < count; ++t) row[t] -= unit * forced_[t][f];
-          row[count] += unit * slack[f];
-        }
-      }
-      row[r] += 1.0;
-    }
-    for (std::size_t t = 0; t < count; ++t) row[count] -= row[t] * x_[t];
+    double right = equation(unknown_[u], active, by_load);
+    add_products(&right, -1.0, line_.data(), 1, count, x_.data(), count);
     double* reduced = system_.data() + u * stride;
-    for (std::size_t v = 0; v < size; ++v) reduced[v] = row[unknown_[v]];
-    reduced[size] = row[count];
+    for (std::size_t v = 0; v < size; ++v) reduced[v] = line_[unknown_[v]];
+    reduced[size] = right;
+    std::fill_n(reduced + size + 1, kPadding, 0.0);
   }
   order_.resize(size);
   if (!eliminate(system_.data(), size, size + 1, stride, order_.data())) return false;
   for (std::size_t u = 0; u < size; ++u) x_[unknown_[u]] = system_[u * stride + size];
-  std::copy(value.begin(), value.end(), work_.begin());
-  columns_.clear();
-  parts_.clear();
-  for (std::size_t t = 0; t < count; ++t) {
-    columns_.push_back(moved_[t].data());
-    parts_.push_back(-x_[t]);
-  }
-  add_columns(work_.data(), columns_.data(), parts_.data(), count, a);
+  std::copy(value_[by_load].begin(), value_[by_load].end(), work_.begin());
+  add_products(work_.data(), -1.0, moved_.data(), a, stride_, x_.data(), count);
   return true;
 }
 

@@ -11,6 +11,8 @@
 #include <memory>
 #include <vector>
 
+#include "dense_factors.h"
+
 namespace swgjoint {
 
 // The law h(F) = softness / 2 F ln(1 + widest / (narrowest + growth F)) of every strip
@@ -77,14 +79,14 @@ class StripSolver {
   bool follow(const bool* active);
   void add(Kind kind, std::size_t index);
   void drop(std::size_t t);
-  // Effect of an extra unknown on the slacks of the closed strip contacts
-  void finish(std::size_t t);
-  // slack += sign times the effect of the values of inside_ on forces_
-  void add_into_forces(const double* value, double sign, double* slack);
+  // Number of extra unknowns, rounded up to whole vectors
+  std::size_t wide() const { return (extra_.size() + kLanes - 1) / kLanes * kLanes; }
   // Derivative of the slack of a contact by an extra unknown
   double coupling(std::size_t k, const Extra& extra) const;
   // Values of the extra unknowns; by_load solves for the derivatives by the load.
   bool solve_extra(const bool* active, bool by_load);
+  // Equation of one extra unknown: coefficients line_ and right-hand side, returned
+  double equation(std::size_t r, const bool* active, bool by_load);
   // Unknowns and slacks of the watched contacts or, with all, of all contacts; returns
   // the largest error of an active equation.
   double spread(const double* offset, const bool* active, bool all, double* result);
@@ -104,17 +106,20 @@ class StripSolver {
   const double* offset_ = nullptr;        // of the problem that is being solved
   std::vector<std::size_t> inside_, pivots_;
   std::vector<std::int64_t> row_;         // number of a contact in inside_, or -1
-  std::vector<double> factors_;           // LU factors
-  std::vector<double> into_forces_;       // matrix from inside_ to forces_
+  std::vector<double> factors_;           // LU factors, one column after another
+  std::vector<double> into_forces_;       // matrix from inside_ to forces_, row by row
   // values of inside_ and slacks of forces_ for the offset and for the load
   std::vector<double> value_[2], slack_[2];
   // the extra unknowns
   std::vector<Extra> extra_;
   std::vector<std::int64_t> extra_of_;    // number of the extra unknown of a contact
   std::vector<std::int64_t> place_;       // that of a strip
-  std::vector<std::vector<double>> moved_, forced_;  // their effect on values and slacks
-  std::vector<std::vector<double>> across_;  // row of the matrix of an active contact
-  std::vector<double> system_, x_, work_, rows_;
+  // their effect on the values of inside_ and on the slacks of forces_, one column each;
+  // rows begin stride_ numbers after the one before, for as many as there can be
+  std::size_t stride_;
+  std::vector<double> moved_, forced_;
+  std::vector<double> across_;  // row of the matrix of an active contact (stride_, size)
+  std::vector<double> system_, x_, work_, rows_, column_;
   std::vector<double> line_;                 // row of the small system
   std::vector<std::size_t> order_, unknown_;
   std::vector<const double*> columns_;

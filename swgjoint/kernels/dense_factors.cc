@@ -46,8 +46,6 @@ inline Lanes operator*(double a, Lanes x) {
   return x;
 }
 #endif
-constexpr std::size_t kLanes = 8;
-
 // Rows from end on, less the multiples of the kPanel rows from first = end - kPanel on.
 SWGJOINT_WIDE void subtract_panel(double* matrix, std::size_t rows, std::size_t width,
                                   std::size_t stride, std::size_t end) {
@@ -211,9 +209,39 @@ SWGJOINT_WIDE void add_columns(double* y, const double* const* x, const double* 
   for (; c < count; ++c) add_multiple(y, x[c], a[c], n);
 }
 
-SWGJOINT_WIDE void products(const std::vector<double>* rows, std::size_t count,
-                            const double* x, std::size_t n, double* results) {
-  for (std::size_t t = 0; t < count; ++t) results[t] = product(rows[t].data(), x, n);
+SWGJOINT_WIDE void add_products(double* y, double sign, const double* rows,
+                                std::size_t count, std::size_t stride, const double* x,
+                                std::size_t n) {
+  for (std::size_t r = 0; r < count; ++r) y[r] += sign * product(rows + r * stride, x, n);
+}
+
+SWGJOINT_WIDE void subtract_product(double* c, const double* a, const double* b,
+                                    std::size_t count, std::size_t inner,
+                                    std::size_t width, std::size_t stride) {
+  for (std::size_t k = 0; k < width; k += kLanes) {
+    std::size_t r = 0;
+    for (; r + kRows <= count; r += kRows) {
+      const double* left = a + r * inner;
+      Lanes tile[kRows];
+      for (std::size_t t = 0; t < kRows; ++t) {
+        tile[t] = *reinterpret_cast<const Lanes*>(c + (r + t) * stride + k);
+      }
+      for (std::size_t i = 0; i < inner; ++i) {
+        const Lanes row = *reinterpret_cast<const Lanes*>(b + i * stride + k);
+        for (std::size_t t = 0; t < kRows; ++t) tile[t] -= left[t * inner + i] * row;
+      }
+      for (std::size_t t = 0; t < kRows; ++t) {
+        *reinterpret_cast<Lanes*>(c + (r + t) * stride + k) = tile[t];
+      }
+    }
+    for (; r < count; ++r) {
+      Lanes sum = *reinterpret_cast<const Lanes*>(c + r * stride + k);
+      for (std::size_t i = 0; i < inner; ++i) {
+        sum -= a[r * inner + i] * *reinterpret_cast<const Lanes*>(b + i * stride + k);
+      }
+      *reinterpret_cast<Lanes*>(c + r * stride + k) = sum;
+    }
+  }
 }
 
 bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t stride,
@@ -244,13 +272,15 @@ bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t 
 SWGJOINT_WIDE void substitute(const double* factors, const std::size_t* pivots,
                               std::size_t rows, double* right) {
   for (std::size_t c = 0; c < rows; ++c) std::swap(right[c], right[pivots[c]]);
-  for (std::size_t i = 1; i < rows; ++i) {
-    right[i] -= product(factors + i * rows, right, i);
+  for (std::size_t c = 0; c < rows; ++c) {
+    const double* column = factors + c * rows;
+    const double known = right[c];
+    for (std::size_t i = c + 1; i < rows; ++i) right[i] -= known * column[i];
   }
-  for (std::size_t i = rows; i-- > 0;) {
-    const double* row = factors + i * rows;
-    right[i] -= product(row + i + 1, right + i + 1, rows - i - 1);
-    right[i] /= row[i];
+  for (std::size_t c = rows; c-- > 0;) {
+    const double* column = factors + c * rows;
+    const double known = right[c] /= column[c];
+    for (std::size_t i = 0; i < c; ++i) right[i] -= known * column[i];
   }
 }
 

@@ -13,9 +13,16 @@ namespace swgjoint {
 void add_columns(double* y, const double* const* x, const double* a, std::size_t count,
                  std::size_t n);
 
-// Scalar products of rows with x (n,), one result per row.
-void products(const std::vector<double>* rows, std::size_t count, const double* x,
-              std::size_t n, double* results);
+// y[r] += sign times the scalar product of row r with x (n,); a row begins stride numbers
+// after the one before it.
+void add_products(double* y, double sign, const double* rows, std::size_t count,
+                  std::size_t stride, const double* x, std::size_t n);
+
+// c -= a b for matrices c (count, width), a (count, inner) and b (inner, width). Rows of
+// c and b begin stride numbers after the one before; width is a multiple of kLanes.
+constexpr std::size_t kLanes = 8;
+void subtract_product(double* c, const double* a, const double* b, std::size_t count,
+                      std::size_t inner, std::size_t width, std::size_t stride);
 
 // LU factors of the first columns of a matrix (rows, width), with partial pivoting. The
 // columns after the first rows ones are replaced by their solutions. A row begins stride
@@ -25,7 +32,8 @@ constexpr std::size_t kPadding = 7;
 bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t stride,
                std::size_t* pivots);
 
-// Replace one right-hand side by its solution, given the factors (rows, rows).
+// Replace one right-hand side by its solution, given the factors (rows, rows), one column
+// after another.
 void substitute(const double* factors, const std::size_t* pivots, std::size_t rows,
                 double* right);
 
