@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -31,28 +30,21 @@ class SectorMatrices:
 
     def __getitem__(self, sector: int) -> Array:
         """Matrix of a sector (n, n), a new array."""
-        matrix = np.zeros((self.size, self.size))
-        for (_, blocks), runs in zip(self.terms, self._runs, strict=True):
-            block = blocks[sector]
-            for row, i in runs:
-                for column, j in runs:
-                    matrix[row, column] += block[i, j]
-        return matrix
+        matrix = np.zeros(self.size**2)
+        for place, (_, blocks) in zip(self._places, self.terms, strict=True):
+            matrix[place] += blocks[sector].ravel()
+        return matrix.reshape(self.size, self.size)
 
     def __iter__(self) -> Iterator[Array]:
         return (self[sector] for sector in range(len(self)))
 
     @cached_property
-    def _runs(self) -> list[list[tuple[slice, slice]]]:
-        """Runs of the degrees of freedom of each term, for which slices are faster."""
-        runs = []
-        for dofs, _ in self.terms:
-            breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
-            ends = pairwise([0, *breaks.tolist(), len(dofs)])
-            runs.append(
-                [(slice(dofs[i], dofs[j - 1] + 1), slice(i, j)) for i, j in ends]
-            )
-        return runs
+    def _places(self) -> list[Index]:
+        """Place of each entry of the terms in a flattened matrix (k^2,).
+
+        One addition per term takes half of the time of additions to its parts.
+        """
+        return [(dofs[:, None] * self.size + dofs).ravel() for dofs, _ in self.terms]
 
     def columns(self, dofs: Index) -> Array:
         """Columns of the matrices (N, n, h).
