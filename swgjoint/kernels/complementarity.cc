@@ -240,13 +240,14 @@ bool StripSolver::follow(const bool* active) {
   std::size_t changes = 0;
   for (const std::size_t k : watched_) changes += active[k] != (row_[k] >= 0);
   if (changes > kFewest + inside_.size() / kShare) return false;
+  // first those that have changed back, so that all others find room
+  const auto changed = [&](std::size_t k) { return active[k] != (row_[k] >= 0); };
   for (const std::size_t k : watched_) {
-    const bool changed = active[k] != (row_[k] >= 0);
-    if (changed == (extra_of_[k] >= 0)) continue;
-    if (changed) {
+    if (extra_of_[k] >= 0 && !changed(k)) drop(static_cast<std::size_t>(extra_of_[k]));
+  }
+  for (const std::size_t k : watched_) {
+    if (extra_of_[k] < 0 && changed(k)) {
       add(active[k] ? Kind::kActive : Kind::kInactive, k);
-    } else {
-      drop(static_cast<std::size_t>(extra_of_[k]));
     }
   }
   for (std::size_t j = 0; j < law_.strips; ++j) {
