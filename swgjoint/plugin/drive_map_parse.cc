@@ -106,14 +106,14 @@ bool ParseNumbers(const char* text, std::vector<double>* out) {
   }
 }
 
-// A map of many harmonics as it was read, and its texts, which end with zeros.
+// A map as it was read, and its texts, which end with zeros.
 struct DriveMap::Origin {
   std::string texts;
   DriveMap map;
 };
 
 // The joints of an arm often have the same map, and an engine makes its data several
-// times. A map of many harmonics, which takes long to read and has a large table, is
+// times. A map with long texts, which takes long to read and has a large table, is
 // therefore copied from one in use that has the same texts, and shares its table.
 bool DriveMap::Parse(const DriveText& text, std::string* error) {
   static std::mutex mutex;
@@ -148,7 +148,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     }
   }
   if (!Read(text, error)) return false;
-  if (!many() || size <= kLongTexts) return true;
+  if (size <= kLongTexts) return true;
   auto origin = std::make_shared<Origin>();
   origin->texts.reserve(size);
   for (const char* part : parts) origin->texts.append(part, std::strlen(part) + 1);
