@@ -285,3 +285,34 @@ def test_a_path_of_contacts_that_hold_nothing_is_refused():
     )
     with pytest.raises(np.linalg.LinAlgError):
         same.changes(-1.0, 1.0, np.arange(30))
+
+
+def test_contacts_change_back_while_as_many_others_change(monkeypatch):
+    """Five contacts become active in the place of five others, and back again."""
+    rng = np.random.default_rng(4)
+    count, kept, moved = 44, 12, 5
+    mixed = rng.normal(size=(count, count))
+    none = np.zeros((count, 0))
+    problems = StripProblems(
+        matrix=np.eye(count) + 1e-3 * mixed @ mixed.T,
+        closed=np.zeros(count, dtype=bool),
+        by_load=rng.normal(size=count),
+        by_value=rng.normal(size=count),
+        strips=None,
+        by_gap=none,
+        output_by_gap=none[0],
+    )
+    both, first, second = (np.zeros(count, dtype=bool) for _ in range(3))
+    both[:kept] = True
+    second[kept : kept + moved] = True
+    first[kept + moved : kept + 2 * moved] = True
+    active = np.array([both | first, both | second, both | first])
+    offset = np.where(active, -1.0, 1.0) * rng.uniform(0.9, 1.0, size=active.shape)
+    start = active.copy()
+    start[0] = both
+    ours = problems.solve(offset, start)
+    assert np.array_equal(ours.active, active)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    theirs = problems.solve(offset, start)
+    assert ours.value == pytest.approx(theirs.value, rel=1e-12)
+    assert ours.slope == pytest.approx(theirs.slope, rel=1e-12)
