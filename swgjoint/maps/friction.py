@@ -173,22 +173,6 @@ class FrictionCourse:
         )
 
 
-def play_friction(
-    friction: Friction, rotation: Array, speed: Array, input_torque: Array
-) -> Array:
-    """Friction torque F along a history that begins with a relaxed bristle [N·m].
-
-    The result has the shape (n,).
-
-    Args:
-        friction: Friction parameters.
-        rotation: Relative rotation beta [rad]. Shape (n,).
-        speed: Relative speed nu [rad/s]. Shape (n,).
-        input_torque: Elastic torque on the input, T/i [N·m]. Shape (n,).
-    """
-    return continue_friction(friction, rotation, speed, input_torque)[0]
-
-
 def continue_friction(
     friction: Friction | FrictionCourse,
     rotation: Array,

@@ -35,8 +35,6 @@ from math import pi
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
-from swgjoint.maps.fit.friction_fit import PRESLIDING, RELAXATION
-from swgjoint.maps.friction import Friction
 from swgjoint.units import mm
 
 STEEL_LOSS_FACTOR = 1e-3
@@ -87,24 +85,6 @@ def bending_torque(design: Design, loss_factor: float = STEEL_LOSS_FACTOR) -> fl
         loss_factor: Loss factor eta of the flexspline [-].
     """
     return 2.0 * design.lobes * loss_factor * rim_bending_energy(design)
-
-
-def bending_friction(
-    design: Design, loss_factor: float = STEEL_LOSS_FACTOR
-) -> Friction:
-    """Friction due to rim bending alone, without bearing, seals and grease.
-
-    Args:
-        design: The drive.
-        loss_factor: Loss factor eta of the flexspline [-].
-    """
-    torque = bending_torque(design, loss_factor)
-    return Friction(
-        stiffness=torque / PRESLIDING,
-        damping=RELAXATION * torque / PRESLIDING,
-        bending=torque,
-        source=f"bending of the plain rim, loss factor {loss_factor:g} (assumed)",
-    )
 
 
 def without_friction(design: Design) -> str:

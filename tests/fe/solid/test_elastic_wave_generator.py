@@ -141,12 +141,6 @@ def test_outside_the_range_is_refused(cup):
         InputError, match=naming("deflection", "0.495 mm", "0.49 mm", "teeth")
     ):
         cup.tooth_force_at(0.495e-3)
-    with pytest.raises(
-        InputError,
-        match=naming("lobe force", "99 N", "0", f"{cup.force_at(0.5e-3):.4g} N"),
-    ):
-        cup.deflection_at(99.0)
-    assert cup.deflection_at(cup.force_at(0.33e-3)) == pytest.approx(0.33e-3, rel=1e-4)
 
 
 @pytest.mark.fe

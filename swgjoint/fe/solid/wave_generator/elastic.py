@@ -105,18 +105,6 @@ class LobeCharacteristic:
         self._check(deflection)
         return float(CubicSpline(self.deflection, self.force)(deflection))
 
-    def deflection_at(self, force: float) -> float:
-        """Deflection of a lobe without tooth contact [m] under a force [N].
-
-        Raises:
-            InputError: If the force is outside the solved range.
-        """
-        if not self.force[0] <= force <= self.force[-1]:
-            raise InputError(
-                f"lobe force = {force:.4g} N: expected 0 to {self.force[-1]:.4g} N"
-            )
-        return float(CubicSpline(self.force, self.deflection)(force))
-
     def play_at(self, deflection: float) -> float:
         """Play of the output [rad] at a deflection [m]; NaN where it is not finite.
 
