@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from swgjoint.pictures import png
@@ -15,8 +15,19 @@ STYLES = {
     "3d": ("C3", "o", "3D"),
 }
 """Colour, marker and name by kind of model."""
+TITLES = {
+    "torsional_stiffness_Nm_rad": "torsional stiffness",
+    "kinematic_error_pp_arcsec": "kinematic error without load, peak to peak",
+    "tensile_MPa": "largest tensile stress",
+    "rim_shape_mm": "shape of the rim",
+}
+"""Titles of the panels by quantity."""
 LEAST = 1e-3
 """Smaller errors are drawn at this value [%]."""
+PLACES = ((6, 4), (6, -11), (-6, 4), (-6, -11))
+"""Offsets of a label from its point, in the order in which they are tried [points]."""
+LETTER, LINE = 4.0, 7.0
+"""Width of a letter and height of a label [points]."""
 
 
 def cost_picture(
@@ -43,17 +54,16 @@ def cost_picture(
     for ax, quantity in zip(panels.flat, quantities, strict=True):
         here = [row for row in rows if row["quantity"] == quantity]
         shown = [r for r in here if f"{r['model']}, {r['setting']}" != r["reference"]]
+        labels = []
         for kind, (colour, marker, name) in STYLES.items():
             of_kind = [row for row in shown if row["kind"] == kind]
             x = [seconds(row) for row in of_kind]
             y = [max(row["error_percent"], LEAST) for row in of_kind]
             ax.plot(x, y, marker, color=colour, label=name, ms=7)
-            for row, a, b in zip(of_kind, x, y, strict=True):
-                short = row["setting"].removeprefix("thin rings, ")
-                short = short.removeprefix("refinement ").removesuffix(", linear")
-                ax.annotate(
-                    short, (a, b), xytext=(5, 4), textcoords="offset points", fontsize=7
-                )
+            labels += [
+                (_short(row["setting"]), a, b)
+                for row, a, b in zip(of_kind, x, y, strict=True)
+            ]
         front = sorted((row for row in shown if row["pareto"]), key=seconds)
         ax.plot(
             [seconds(row) for row in front],
@@ -68,9 +78,49 @@ def cost_picture(
                 ax.axvline(seconds(row), color="0.6", ls=":", label="reference")
         for bound in bounds:
             ax.axhline(bound, color="0.9", zorder=0)
-        ax.set(xscale="log", yscale="log", title=quantity)
+        ax.set(xscale="log", yscale="log", title=TITLES.get(quantity, quantity))
         ax.set(xlabel="CPU time [s]", ylabel="error [%]")
         ax.margins(x=0.12, y=0.1)
+        _label(ax, labels)
     panels[0, 0].legend(fontsize="small")
     figure.suptitle(f"{result['design']}; reference: {reference}")
     return png(figure, dpi=100)
+
+
+def _short(setting: str) -> str:
+    """Refinement of a setting, and whether all teeth are solved."""
+    short = setting.removeprefix("thin rings, ").removeprefix("refinement ")
+    return short.removesuffix(", linear")
+
+
+def _label(ax: Any, labels: Sequence[tuple[str, float, float]]) -> None:
+    """Write texts next to their points, unless they would cover others.
+
+    Args:
+        ax: Axes with their final limits.
+        labels: Texts with the coordinates of their points.
+    """
+    points = 72.0 / ax.figure.dpi
+    at = [ax.transData.transform((a, b)) * points for _, a, b in labels]
+    taken = [(x - 3.0, x + 3.0, y - 3.0, y + 3.0) for x, y in at]
+    for (text, a, b), (x, y) in zip(labels, at, strict=True):
+        for right, up in PLACES:
+            left = x + right - (LETTER * len(text) if right < 0 else 0.0)
+            box = (left, left + LETTER * len(text), y + up, y + up + LINE)
+            if any(_overlap(box, other) for other in taken):
+                continue
+            ax.annotate(
+                text,
+                (a, b),
+                xytext=(right, up),
+                textcoords="offset points",
+                ha="left" if right > 0 else "right",
+                fontsize=7,
+            )
+            taken.append(box)
+            break
+
+
+def _overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether two boxes (left, right, low, high) overlap."""
+    return a[0] < b[1] and b[0] < a[1] and a[2] < b[3] and b[2] < a[3]
