@@ -15,6 +15,8 @@ from swgjoint.typing import Array, Index
 
 MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 """Members with teeth."""
+ROWS = 1024
+"""Number of pitches whose gap changes are added at once."""
 
 
 def pitches_of(design: Design) -> int:
@@ -77,7 +79,9 @@ def gap_changes(at: Influence, design: Design, pitches: Index) -> Array:
         count = len(errors.shift)
         shifts = shift_errors(errors, np.arange(count), design.drive.layout)
         own = np.einsum("pki,ki->pk", shifts[:, contact], by_shift)
-        change += own[pitches % count]
+        # part by part: copies of all rows would take longer than the sums
+        for k in range(0, len(pitches), ROWS):
+            change[k : k + ROWS] += own[pitches[k : k + ROWS] % count]
     if (slope := axis_slope(design, pitches)).any():
         change += slope @ at.by_tilt.T
     return change
