@@ -26,8 +26,8 @@ LEAST = 1e-3
 """Smaller errors are drawn at this value [%]."""
 PLACES = ((6, 4), (6, -11), (-6, 4), (-6, -11))
 """Offsets of a label from its point, in the order in which they are tried [points]."""
-LETTER, LINE = 4.0, 7.0
-"""Width of a letter and height of a label [points]."""
+LETTER, LINE, APART = 4.2, 7.0, 3.0
+"""Width of a letter, height of a label, and distance between two labels [points]."""
 
 
 def cost_picture(
@@ -106,7 +106,7 @@ def _label(ax: Any, labels: Sequence[tuple[str, float, float]]) -> None:
     for (text, a, b), (x, y) in zip(labels, at, strict=True):
         for right, up in PLACES:
             left = x + right - (LETTER * len(text) if right < 0 else 0.0)
-            box = (left, left + LETTER * len(text), y + up, y + up + LINE)
+            box = (left, left + LETTER * len(text) + APART, y + up, y + up + LINE)
             if any(_overlap(box, other) for other in taken):
                 continue
             ax.annotate(
