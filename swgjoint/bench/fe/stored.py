@@ -15,8 +15,8 @@ from swgjoint.provenance import provenance
 from swgjoint.store import json_content, read_kept
 
 LONG = ("3d, refinement 1, linear", "3d, refinement 1.4")
-"""Keys of the settings that take up to one hour. They are read from the file, or left
-out if the file does not contain them; only ``recompute`` solves them."""
+"""Keys of the settings that take most of the time and up to 5 GB. They are read from
+the file, or left out if it does not contain them; only ``recompute`` solves them."""
 WITNESS = "3d, refinement 0.5"
 """Key of a setting that is stored and also solved in every run, to detect changes."""
 DRIFT = 1e-3
