@@ -19,12 +19,10 @@ from swgjoint.bench.fe.cost import run_fe_cost
 from swgjoint.bench.fe.rows import cheapest
 from swgjoint.bench.fe.setting import POSITIONS, RIM, FeSetting, Found, rim_shape
 from swgjoint.bench.fe.solve import SettingTask, solve_in_process, solve_setting
-from swgjoint.bench.fe.stored import FILE, LONG, WITNESS, load_stored, to_store
 from swgjoint.cli.bench import fe_text
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design.design import Design
-from swgjoint.store import json_file
 
 CUP = Design.load("reference-3d")
 SMALL = small_cup()
@@ -54,7 +52,6 @@ def solve(monkeypatch):
             return {setting.key: table[setting.key] for setting in settings}
 
         monkeypatch.setattr(fe_cost, "_solve_all", all_of)
-        monkeypatch.setattr(fe_cost, "load_stored", lambda design: {})
 
     return given
 
@@ -156,62 +153,6 @@ def test_a_design_without_cup_is_refused():
         run_fe_cost(design=Design.load("reference-2d"))
 
 
-def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatch):
-    """Written and read again; of another design nothing; a moved witness is told.
-
-    So is one that takes another time here.
-    """
-    table = {key: found(0.0) for key in (*LONG, WITNESS)}
-    path = tmp_path / FILE
-    path.write_bytes(json_file(to_store(CUP, table)))
-    kept = load_stored(CUP, path)
-    assert set(kept["settings"]) == set(table)
-    again = kept["settings"][WITNESS]
-    assert np.array_equal(again.kinematic_error, table[WITNESS].kinematic_error)
-    assert load_stored(CUP.with_changes({"flexspline.rim_mm": 1.1}), path) == {}
-
-    linear = FeSetting(model="3d", refinement=1, nonlinear=False)
-    settings = [linear, *(FeSetting(model="3d", refinement=n) for n in (0.5, 1.4))]
-    del kept["settings"][linear.key]
-
-    def now(design, wanted, **keys):
-        was = kept["settings"][WITNESS]
-        assert [setting.key for setting in wanted] == [WITNESS]
-        return {WITNESS: replace(was, stiffness=1.01e5, cpu_s=1.5 * was.cpu_s)}
-
-    monkeypatch.setattr(fe_cost, "_solve_all", now)
-    monkeypatch.setattr(fe_cost, "load_stored", lambda design: kept)
-    result = run_fe_cost(design=CUP, settings=settings)
-    assert result["rows"][0]["outcome"].startswith("left out")
-    assert not result["rows"][0]["stored"] and result["rows"][-1]["stored"]
-    told = result["stored"]
-    assert told["drift"] == pytest.approx(0.01) and not told["of_this_code"]
-    assert told["pace"] == pytest.approx(1.5)
-    assert "times measured on a machine 1.5 times as fast" in fe_text.report(result)
-
-
-def test_what_is_long_and_not_stored_is_left_out(solve):
-    """Of a design without a file an hour is not spent unasked; the rows say so."""
-    long = [
-        FeSetting(model="3d", refinement=1, nonlinear=False),
-        FeSetting(model="3d", refinement=1.4),
-    ]
-    short = [FeSetting(model="3d", refinement=n) for n in (0.5, 1.0)]
-    assert [setting.key for setting in long] == list(LONG)
-    # of the long ones nothing is known: to solve one would be a KeyError
-    solve({s.key: found(part) for s, part in zip(short, (0.1, 0.0), strict=True)})
-    result = run_fe_cost(design=CUP, settings=[long[0], *short, long[1]])
-    assert result["left_out"] == list(LONG)
-    rows = {(r["setting"], r["quantity"]): r for r in result["rows"]}
-    stiffness = "torsional_stiffness_Nm_rad"
-    for setting in long:
-        assert "--recompute" in rows[setting.name, stiffness]["outcome"]
-    row = rows["refinement 0.5", stiffness]
-    assert row["reference"] == "3d, refinement 1"
-    assert row["error"] == pytest.approx(10.0)
-    assert f"{row['reference']}" in fe_text.report(result).splitlines()[0]
-
-
 def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
     """No error of its kind instead of none."""
     settings = [
@@ -293,21 +234,6 @@ def test_the_kinematic_error_says_at_how_many_positions(solve):
     text = fe_text.report(result)
     assert "kinematic error at 4 positions of a pitch, first harmonic" in text
     assert text.count("first harmonic") == 1
-
-
-def test_the_bundled_file_is_of_the_default_design():
-    """The default run needs no reference of its own, and can check the file."""
-    kept = load_stored(Design.load("reference-3d-modified"))
-    reference = fe_cost.SETTINGS[-1].key
-    assert {reference, WITNESS} <= set(kept["settings"])
-    assert kept["positions"] == POSITIONS
-    assert kept["provenance"]["commit"] and "--recompute" in kept["command"]
-    keys = {setting.key for setting in fe_cost.SETTINGS}
-    assert set(kept["settings"]) <= keys
-    # solids: stiffer than the cup alone never, and no stress below that of the lobe
-    best = kept["settings"][reference]
-    assert best.stiffness < cup_torsional_stiffness(CUP)
-    assert best.tensile > 2e8 and best.rim_shape.shape == (RIM,)
 
 
 def test_rim_shape_folds_half_turns():

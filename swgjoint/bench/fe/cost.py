@@ -2,9 +2,7 @@
 
 Every setting is compared with three references: the finest 3D model, the finest mesh of
 its own kind, and the finest mesh of the next more accurate kind (ring, 2D, 3D; linear,
-nonlinear). Results of long settings come from a stored file; long settings that are not
-stored are left out. The file also contains one short setting, which every run solves
-again to check whether the file matches the present code.
+nonlinear).
 """
 
 from __future__ import annotations
@@ -26,7 +24,6 @@ from typing import Any
 from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, cheapest, rows_of, seconds
 from swgjoint.bench.fe.setting import POSITIONS, FeSetting, Found
 from swgjoint.bench.fe.solve import SettingTask, solve_in_process
-from swgjoint.bench.fe.stored import FILE, LONG, describe_stored, load_stored, to_store
 from swgjoint.csv_text import csv_text
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.drive3d import check_modelled
@@ -35,7 +32,6 @@ from swgjoint.gear.design.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
 from swgjoint.provenance import provenance
-from swgjoint.store import json_file
 from swgjoint.view.plots.bench_fe import cost_picture
 
 SETTINGS = (
@@ -60,8 +56,6 @@ SETTINGS = (
 )
 """Settings, from coarse to fine within each kind; the last one is the reference."""
 
-LEFT_OUT = "left out: long run, not in a stored file; --recompute solves it"
-"""Outcome of a long setting that is not stored."""
 LOST = "process died: out of memory or killed"
 """Outcome of a setting whose process died."""
 
@@ -73,11 +67,10 @@ def run_fe_cost(
     folder: Path | None = None,
     progress: Progress = silent,
     jobs: int = 2,
-    recompute: bool = False,
 ) -> dict[str, Any]:
     """Solve every setting and compare the results.
 
-    The reference is the last setting that is not left out.
+    The reference is the last setting.
 
     Args:
         design: Design with a cup.
@@ -85,17 +78,14 @@ def run_fe_cost(
         folder: Folder for table, JSON and picture; None writes nothing.
         progress: Called after every setting.
         jobs: Number of settings solved at the same time, each in a fresh process.
-        recompute: Whether long settings are solved too, and a new stored file is
-            written into ``folder``.
 
     Returns:
         ``rows``, see :func:`swgjoint.bench.fe.rows.rows_of`; ``cheapest``: cheapest
         setting by quantity and bound; ``cheapest_in_the_plane``: the same among the
-        nonlinear 2D settings, compared with their finest mesh; ``design``; ``stored``:
-        provenance and drift of the stored settings; ``left_out``: keys of the settings
-        left out; ``kinematic_error_positions``: number of positions per pitch at which
-        the kinematic error is evaluated, enough for its first harmonic;
-        ``provenance``, ``files``, ``wall_s``.
+        nonlinear 2D settings, compared with their finest mesh; ``design``;
+        ``kinematic_error_positions``: number of positions per pitch at which the
+        kinematic error is evaluated, enough for its first harmonic; ``provenance``,
+        ``files``, ``wall_s``.
 
     Raises:
         DesignError: If the design has no cup, or a feature that the 3D model lacks.
@@ -108,30 +98,17 @@ def run_fe_cost(
             " [cup]; accepted: a design with a cup, such as reference-3d-modified"
         )
     check_modelled(design)
-    kept = {} if recompute else load_stored(design)
-    stored = kept.get("settings", {})
-    found: dict[str, Found | str] = {
-        s.key: stored.get(s.key, LEFT_OUT)
-        for s in settings
-        if s.key in LONG and not recompute
-    }
-    left_out = [key for key, one in found.items() if one == LEFT_OUT]
-    missing = [setting for setting in settings if setting.key not in found]
-    stage = f"{design.drive.name}: settings"
-    found |= _solve_all(design, missing, jobs=jobs, stage=stage, progress=progress)
-    best = [s for s in settings if s.key not in left_out][-1]
+    stage, best = f"{design.drive.name}: settings", settings[-1]
+    found = _solve_all(design, settings, jobs=jobs, stage=stage, progress=progress)
     last = found[best.key]
     if isinstance(last, str):
         raise ComputationError(f"reference {best.key!r}: {last}")
-    from_file = set(LONG) & set(stored)
-    rows = rows_of(settings, found, best=best, stored=from_file)
+    rows = rows_of(settings, found, best=best)
     result = {
         "design": design.drive.name,
         "rows": rows,
         "cheapest": cheapest(rows),
         "cheapest_in_the_plane": cheapest(rows, "2d"),
-        "stored": describe_stored(kept, found) if kept else None,
-        "left_out": left_out,
         "kinematic_error_positions": POSITIONS,
         "provenance": provenance(),
     }
@@ -141,8 +118,6 @@ def run_fe_cost(
         outputs.write("bench-fe.json", lambda: json_text(result) + "\n")
         outputs.write("bench-fe.csv", lambda: csv_text(rows))
         outputs.write("bench-fe.png", lambda: _picture(result))
-        if recompute:
-            outputs.write(FILE, lambda: json_file(to_store(design, found)))
         files = outputs.files
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
 

@@ -32,7 +32,6 @@ def rows_of(
     found: Mapping[str, Found | str],
     *,
     best: FeSetting,
-    stored: set[str],
 ) -> list[dict[str, Any]]:
     """Rows of the settings: one per quantity, or one for a setting without solution.
 
@@ -40,7 +39,6 @@ def rows_of(
         settings: Settings, from coarse to fine within each kind.
         found: Results by key of the setting, or the reason for missing results.
         best: Setting that is the reference.
-        stored: Keys of the settings that come from the stored file.
 
     Returns:
         ``bench``, ``model``, ``setting``, ``kind``, ``quantity``, ``value``; ``unit``
@@ -51,7 +49,7 @@ def rows_of(
         relative to the peak to peak of the reference; ``pareto`` and
         ``pareto_of_kind``: whether no other setting, or no other one of its kind, is
         both cheaper and closer to the reference; ``wall_s``, ``cpu_s``, ``peak_MB``,
-        ``cores``, ``nodes`` of a sector, ``stored``, ``outcome``. Errors without a
+        ``cores``, ``nodes`` of a sector, ``outcome``. Errors without a
         reference, such as those of the only mesh of a kind, are None.
         ``kinematic_error_pp_arcsec`` contains only the first harmonic over a pitch,
         because four positions resolve no more.
@@ -70,7 +68,6 @@ def rows_of(
             "model": setting.model,
             "setting": setting.name,
             "kind": setting.kind,
-            "stored": setting.key in stored,
             "cores": 1,
         }
         if isinstance(one, str):
@@ -123,7 +120,7 @@ _ORDER = (
     *("error", "reference", "error_percent"),
     *("error_of_kind", "reference_of_kind", "error_of_kind_percent"),
     *("error_next_level", "reference_next_level", "pareto", "pareto_of_kind"),
-    *("wall_s", "cpu_s", "peak_MB", "cores", "nodes", "stored", "outcome"),
+    *("wall_s", "cpu_s", "peak_MB", "cores", "nodes", "outcome"),
 )
 
 

@@ -1,4 +1,4 @@
-"""Settings of ``swgjoint bench fe``, and the results stored for each.
+"""Settings of ``swgjoint bench fe``, and the results of each.
 
 Every setting solves the same positions over one pitch: unloaded for the kinematic
 error, and at rated torque for stiffness, stress and rim shape.

@@ -20,7 +20,7 @@ PARTS = {
 """Parts of the benchmark, in the order in which ``all`` runs them."""
 DESIGN = "reference-3d-modified"
 """Default design of part ``fe``."""
-OPTIONS = {"design": "fe", "recompute": "fe", "only": "joint"}
+OPTIONS = {"design": "fe", "only": "joint"}
 """Part to which each option belongs."""
 
 
@@ -37,15 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--design",
         metavar="DESIGN",
-        help=f"fe: design with a cup; default: {DESIGN}; for other designs the slow"
-        " settings are skipped",
-    )
-    parser.add_argument(
-        "--recompute",
-        action="store_true",
-        help="fe: also solve the slowest settings, such as the reference (about an"
-        " hour), instead of reading their stored results, and write a new file of"
-        " stored results to --out",
+        help=f"fe: design with a cup; default: {DESIGN}",
     )
     parser.add_argument(
         "--only",
@@ -68,8 +60,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         of each part, ``files``, ``wall_s``.
 
     Raises:
-        InputError: Before any part runs, if an option does not belong to the part,
-            ``--recompute`` lacks ``--out``, or ``--only`` names an unknown scene.
+        InputError: Before any part runs, if an option does not belong to the part, or
+            ``--only`` names an unknown scene.
     """
     _check(args)
     folder = output_folder(args.out) if args.out else None
@@ -89,19 +81,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Reject bad options before the first part runs, not after an hour of work."""
+    """Reject bad options before the first part runs, not after minutes of work."""
     for option, part in OPTIONS.items():
-        is_set = getattr(args, option) not in (None, False)
-        if is_set and args.part not in (part, "all"):
+        if getattr(args, option) is not None and args.part not in (part, "all"):
             raise InputError(
                 f"--{option} does not apply to bench {args.part}; accepted with bench"
                 f" {part} or bench all"
             )
-    if args.recompute and not args.out:
-        raise InputError(
-            "--recompute writes a new file of stored results and needs a folder;"
-            " accepted: with --out DIR"
-        )
     if args.only is not None:
         from swgjoint.bench.joint.cost import check_scenes
 
@@ -118,12 +104,7 @@ def _run_part(
         design = Design.load(args.design or DESIGN)
         from swgjoint.bench.fe.cost import run_fe_cost
 
-        return run_fe_cost(
-            design=design,
-            folder=folder,
-            progress=args.progress,
-            recompute=args.recompute,
-        )
+        return run_fe_cost(design=design, folder=folder, progress=args.progress)
     if name == "joint":
         from swgjoint.bench.joint.cost import run_joint_cost
 

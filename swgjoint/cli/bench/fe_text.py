@@ -41,7 +41,6 @@ def report(result: dict[str, Any]) -> str:
                 row["cpu_s"],
                 row["wall_s"],
                 None if row["peak_MB"] is None else round(row["peak_MB"]),
-                "stored" if row["stored"] else "",
             )
             for row in here
         ]
@@ -54,7 +53,6 @@ def report(result: dict[str, Any]) -> str:
             "CPU [s]",
             "wall [s]",
             "memory [MB]",
-            "",
         )
         text += ["", table(body, header=header)]
     for row in rows:
@@ -62,31 +60,8 @@ def report(result: dict[str, Any]) -> str:
             text.append(f"{row['model']}, {row['setting']}: {row['outcome']}")
     text += ["", _cheapest(result["cheapest"], "cheapest within")]
     text += ["", _cheapest(result["cheapest_in_the_plane"], "2D models only")]
-    if result["stored"] is not None:
-        text.append(_stored(result["stored"]))
     text += [f"wrote {name}" for name in result["files"]]
     return "\n".join([*text, f"{result['wall_s']:.0f} s"])
-
-
-def _stored(stored: dict[str, Any]) -> str:
-    """State where the stored settings come from and whether they are still valid."""
-    drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
-    state = (
-        "valid for this code"
-        if stored["of_this_code"]
-        else "NOT confirmed for this code"
-    )
-    pace = stored["pace"]
-    times = (
-        ""
-        if pace is None
-        else f", times measured on a machine {pace:.2g} times as fast"
-    )
-    return (
-        f"read from the stored file: {'; '.join(stored['settings'])}, commit"
-        f" {stored['provenance']['commit']}, {state} (relative change of"
-        f" {stored['witness']}: {drift}){times}; to recompute: {stored['command']}"
-    )
 
 
 def _cheapest(picks: list[dict[str, Any]], title: str) -> str:
