@@ -19,9 +19,6 @@ constexpr double kResidual = 1e-4;  // error of an active equation, in tolerance
 // search would go around in circles.
 constexpr double kViolated = 0.05, kMostViolated = 0.5;
 
-// The number of numbers in whole vectors that hold n
-std::size_t padded(std::size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
-
 }  // namespace
 
 double StripLaw::excess(std::size_t strip, double force, double* derivative) const {

@@ -80,7 +80,7 @@ class StripSolver {
   void add(Kind kind, std::size_t index);
   void drop(std::size_t t);
   // Number of extra unknowns, rounded up to whole vectors
-  std::size_t wide() const { return (extra_.size() + kLanes - 1) / kLanes * kLanes; }
+  std::size_t wide() const { return padded(extra_.size()); }
   // Derivative of the slack of a contact by an extra unknown
   double coupling(std::size_t k, const Extra& extra) const;
   // Values of the extra unknowns; by_load solves for the derivatives by the load.
