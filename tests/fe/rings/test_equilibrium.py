@@ -140,22 +140,24 @@ def test_a_torque_may_change_its_sign(monkeypatch):
 
     In size-25-100-bought, Newton's method at a prescribed torque found no equilibrium.
     """
-    outcomes = []
+    states = []
     solve = ThinRingSolver.__call__
 
     def watched(*args, **kwargs):
         state = solve(*args, **kwargs)
-        outcomes.append(state.outcome)
+        states.append(state)
         return state
 
     monkeypatch.setattr(ThinRingSolver, "__call__", watched)
     rings = thin_ring(Design.load("size-25-100-bought"))
     rest = solve_unloaded(rings, positions(rings, 4)[0])
     crossed = solve_loaded(rings, solve_loaded(rings, rest, 1.0), -1.0)
+    # the state before has turned to the flanks that carry the load
+    assert states[-2].torque < 0.0 and states[-2].loaded_teeth
     assert crossed.rotation == pytest.approx(
         solve_loaded(rings, rest, -1.0).rotation, abs=1e-12
     )
-    assert set(outcomes) == {Outcome.CONVERGED}
+    assert {state.outcome for state in states} == {Outcome.CONVERGED}
 
 
 def test_mirror(model, state):
