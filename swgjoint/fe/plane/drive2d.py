@@ -238,6 +238,7 @@ def sector_model(
         wave_generator=flawed_wave_generator(design),
         circular_spline=circular_spline,
         lobe_height=height,
+        lobes=design.lobes,
         half=half,
         nonlinear=nonlinear,
         layer=design.material_of("flexspline").youngs_modulus

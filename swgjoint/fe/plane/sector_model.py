@@ -48,6 +48,8 @@ class SectorModel:
     """Teeth of the circular spline, elastic or rigid."""
     lobe_height: float
     """Radial deflection of the rim at the lobes [m]."""
+    lobes: int = 2
+    """Number of lobes of the wave generator."""
     half: bool = False
     """Whether the model is half of the ring, which a rotation by 180 deg completes."""
     nonlinear: bool = True
@@ -221,11 +223,11 @@ class SectorModel:
         )
 
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
-        """Start of a search: the inextensional two-lobe shape of a thin ring.
+        """Start of a search: the inextensional shape of a thin ring on n lobes.
 
-        With the angle phi from the major axis, the radial displacement is w0 cos 2 phi,
-        the tangential one is -w0/2 sin 2 phi, and cross-sections rotate by
-        3 w0 sin 2 phi/(2 r).
+        With the angle phi from the major axis, the radial displacement is w0 cos n phi,
+        the tangential one is -w0/n sin n phi, and cross-sections rotate by
+        (n - 1/n) w0 sin n phi/r.
 
         Args:
             alpha: Wave-generator angle [rad].
@@ -236,16 +238,13 @@ class SectorModel:
         radius = np.hypot(x[..., 0], x[..., 1])
         bore = float(radius.min())
         phi = np.arctan2(-x[..., 0], x[..., 1]) - (alpha - rotation)
-        w0 = self.lobe_height
-        turn = 1.5 * w0 * np.sin(2 * phi) / bore
-        radial = w0 * np.cos(2 * phi)
-        tangential = -0.5 * w0 * np.sin(2 * phi) + (radius - bore) * turn
+        w0, n = self.lobe_height, self.lobes
+        turn = (n - 1 / n) * w0 * np.sin(n * phi) / bore
+        radial = w0 * np.cos(n * phi)
+        tangential = -w0 / n * np.sin(n * phi) + (radius - bore) * turn
         unit = x / radius[..., None]
-        moved = (
-            x
-            + radial[..., None] * unit
-            + tangential[..., None] * rotate_right_angle(unit)
-        )
+        moved = x + radial[..., None] * unit
+        moved += tangential[..., None] * rotate_right_angle(unit)
         moved = rotate(moved, rotation)
         size, inside = element.face_size, element.bore_size
         race = None
@@ -256,7 +255,7 @@ class SectorModel:
         else:
             race = self.race.initial_guess(alpha, rotation)
             # only the rim presses the race on its balls: start in contact at the lobes
-            touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
+            touching = np.cos(n * phi[:, self.bore_nodes]) > AT_LOBE
         return State(
             race=race,
             faces=moved[:, :size],

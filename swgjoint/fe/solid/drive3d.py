@@ -119,6 +119,7 @@ def solid_sector_model(
             **errors,
         ),
         lobe_height=lobe_height(design),
+        lobes=design.lobes,
         half=half,
         nonlinear=nonlinear,
         race=None

@@ -30,6 +30,8 @@ class SolidSectorModel:
     teeth: SolidTeeth
     lobe_height: float
     """Radial deflection of the flexspline at the lobes [m]."""
+    lobes: int = 2
+    """Number of lobes of the wave generator."""
     half: bool = False
     """Whether the model is half of the ring; the other half is a copy rotated by
     180 deg."""
@@ -162,12 +164,12 @@ class SolidSectorModel:
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
         """Approximate state of the deflected cup, from which a search can start.
 
-        The generatrices of the wall remain straight, and the wall does not stretch. At
-        the angle phi from the major axis the radial displacement is w0 s cos 2 phi and
-        the tangential one is -(w0 s/2) sin 2 phi. The factor s decreases linearly along
-        the axis; it is one at mid-face and zero at the closed end. Without a cup it is
-        one everywhere. The axial displacement follows from zero shear strain in the
-        wall.
+        The generatrices of the wall remain straight, and the wall does not stretch.
+        With n lobes, at the angle phi from the major axis, the radial displacement is
+        w0 s cos n phi and the tangential one is -(w0 s/n) sin n phi. The factor s
+        decreases linearly along the axis; it is one at mid-face and zero at the closed
+        end. Without a cup it is one everywhere. The axial displacement follows from
+        zero shear strain in the wall.
 
         Args:
             alpha: Wave-generator angle [rad].
@@ -175,7 +177,7 @@ class SolidSectorModel:
         """
         # dimensions of the cup, and the angle phi of every master
         x = self.reference
-        strip, w0 = self.strip, self.lobe_height
+        strip, w0, n = self.strip, self.lobe_height, self.lobes
         bore = float(np.hypot(strip.bore[:, 0], strip.bore[:, 1]).min())
         closed = float(strip.masters.position[:, 2].max())
         held = strip.masters.position[strip.masters.held]
@@ -191,10 +193,11 @@ class SolidSectorModel:
             disc = np.clip((radius - boss) / (bore - boss), 0.0, 1.0)
         # inextensional displacements; points outside the bore also turn with it
         off = radius - bore
-        turn = 1.5 * w0 * s * np.sin(2.0 * phi) / bore
-        radial = w0 * s * np.cos(2.0 * phi)
-        around = -0.5 * w0 * s * np.sin(2.0 * phi) + off * turn
-        axial = -(0.25 * bore * disc + off * (disc == 1.0)) * w0 * ds * np.cos(2 * phi)
+        turn = (n - 1 / n) * w0 * s * np.sin(n * phi) / bore
+        radial = w0 * s * np.cos(n * phi)
+        around = -w0 / n * s * np.sin(n * phi) + off * turn
+        slope = bore * disc / n**2 + off * (disc == 1.0)
+        axial = -slope * w0 * ds * np.cos(n * phi)
         out = np.stack([x[..., 0], x[..., 1], 0.0 * radius], -1) / radius[..., None]
         side = np.stack([-out[..., 1], out[..., 0], 0.0 * radius], axis=-1)
         moved = x + (radial * disc)[..., None] * out + (around * disc)[..., None] * side
@@ -209,7 +212,7 @@ class SolidSectorModel:
             race = self.race.initial_guess(alpha, rotation, closed)
             # without this initial contact nothing would press the race on its balls
             along = np.arange(self.sectors) * 2.0 * pi / strip.sectors
-            at_lobe = np.cos(2.0 * (along + rotation - alpha)) > 0.9
+            at_lobe = np.cos(n * (along + rotation - alpha)) > 0.9
             touching[:, :n_bore] = at_lobe[:, None] & self.race.covers(strip.bore[:, 2])
         return SolidState(
             faces=moved[:, :size],
