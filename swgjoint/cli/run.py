@@ -19,7 +19,7 @@ from swgjoint.cli.shared.life_text import (
     life_lines,
     thermal_lines,
 )
-from swgjoint.cli.shared.load_text import design_line, load_line
+from swgjoint.cli.shared.load_text import design_line, load_line, loss_line
 from swgjoint.cli.shared.model_text import (
     assumed_lines,
     left_out_lines,
@@ -193,6 +193,7 @@ def report(result: dict[str, Any]) -> str:
         joint_table(result["joints"]),
         *notes(result["joints"]),
         load_line(result["joints"]),
+        loss_line(result["joints"]),
         ripple_line(result),
         tool_line(result["tool"], random="sensors" in contains),
         *life_lines(result),

@@ -3,13 +3,16 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.cli.run import tool_line
-from swgjoint.cli.shared.load_text import design_line, load_line
+from swgjoint.cli.shared.load_text import design_line, load_line, loss_line
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.arm.scene import scene_of_arm
+from swgjoint.view.run import run_scene
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
 SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
@@ -181,3 +184,31 @@ def test_the_most_loaded_joint_and_the_designs_of_its_size_are_named():
     choice = {"a": "CSG-20-100", "b": "CSG-14-100", "c": "CSG-20-100"}
     line = design_line({joint: {"drive": drive} for joint, drive in choice.items()})
     assert names(line, "design new", "size-20-100 (a, c)", "size-14-100 (b)")
+
+
+def test_losses_in_the_file_of_an_arm_are_named(tmp_path):
+    """A level link at constant speed: the drive carries exactly its damping."""
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        """<mujoco><worldbody><body name="base">
+        <body name="link"><geom size=".1" mass="2" contype="0"/>
+        <joint name="pan" axis="0 0 1" damping="350" frictionloss="2"/>
+        </body></body></worldbody></mujoco>"""
+    )
+    scene = scene_of_arm(
+        str(path), drive="CSG-32-100", overrides=["defaults.level=linear"]
+    )
+    run = run_scene(scene)
+    joints = run.metrics()["joints"]
+    use = joints["pan"]["ratings"]
+    speed = run.assembly.trajectory.steady_velocity[0]
+    wanted = 2.0 + 350.0 * abs(speed)
+    assert np.abs(run.output_torque[run.steady, 0]).mean() == pytest.approx(
+        wanted,
+        rel=1e-3,  # the motor's lag varies the speed
+    )
+    fastest = np.abs(run.velocity).max()
+    assert use["arm_losses_Nm"] == pytest.approx(2.0 + 350.0 * fastest)
+    assert names(loss_line(joints), "pan", "damping", "frictionloss")
+    without = {"pan": joints["pan"] | {"ratings": use | {"arm_losses_Nm": 0.0}}}
+    assert loss_line(without) == ""

@@ -1,4 +1,4 @@
-"""Which joint of an arm carries the most, and the designs of the size of its drives."""
+"""Which joints of an arm carry the most, and the designs of the size of its drives."""
 
 from __future__ import annotations
 
@@ -7,6 +7,32 @@ from typing import Any
 
 _SHOWN = 3
 """Largest number of joints that the line on the load names."""
+
+
+FAINT = 0.01
+"""Losses of the arm's file below this fraction of the rated torque are not named."""
+
+
+def loss_line(joints: Mapping[str, Any]) -> str:
+    """Name the joints whose damping and dry friction in the arm's file load the drives.
+
+    Robot files often use them for a servo or for the gear, which the drive replaces.
+
+    Args:
+        joints: Figures by joint, see :meth:`swgjoint.sim.run.Run.metrics`.
+    """
+    use = {name: joint["ratings"] for name, joint in joints.items()}
+    shares = {name: one["arm_losses_Nm"] / one["rated_Nm"] for name, one in use.items()}
+    named = ", ".join(
+        f"{name} up to {use[name]['arm_losses_Nm']:.3g} N·m or {100.0 * share:.2g} %"
+        for name, share in sorted(shares.items(), key=lambda item: -item[1])
+        if share >= FAINT
+    )
+    return named and (
+        "losses in the file of the arm: damping and frictionloss of its joints load the"
+        f" drives, {named} of the rated torque; set them to zero in the file if they"
+        " stand for a servo or for the gear, whose losses are those of the drive"
+    )
 
 
 def load_line(joints: Mapping[str, Any]) -> str:

@@ -47,6 +47,7 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
         "ratcheting_Nm": skips,
         "source": ratings.source,
         "peak_Nm": peak,
+        "arm_losses_Nm": arm_loss_torque(run, j),
         "cubed_mean_Nm": cubed,
         "input_speed_rpm": float(np.abs(run.motor_velocity[:, j]).max() / rpm),
         "within": bool(
@@ -61,6 +62,26 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
             and run.output_torque[:, j].max() <= high
         ),
     }
+
+
+def arm_loss_torque(run: Run, j: int) -> float:
+    r"""Largest torque of damping and dry friction that the arm's file gives a joint.
+
+    .. math:: f + |v| (c_1 + c_2 |v| + c_3 v^2)
+
+    The drive carries this torque besides its own losses.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+
+    Returns:
+        Torque about the joint [N·m], zero if the file states neither.
+    """
+    model, speed = run.assembly.arm.model, np.abs(run.velocity[:, j]).max()
+    factors = model.dof_damping[j], *model.dof_dampingpoly[j]
+    damping = sum(c * speed**k for k, c in enumerate(factors, start=1))
+    return float(damping + model.dof_frictionloss[j] * bool(speed))
 
 
 def first_ratcheting(
