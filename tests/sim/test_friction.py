@@ -17,6 +17,7 @@ from swgjoint.maps.friction import Friction
 from swgjoint.maps.friction_temperature import KEY, friction_table
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.figures.rating_use import first_ratcheting
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 LAW = Friction(stiffness=50.0, coulomb=0.05, static=0.05, load=0.1, damping=0.05)
@@ -45,6 +46,21 @@ def test_a_scene_has_friction_unless_it_says_false(bench, level):
     assert "friction of the drive" not in now
     (line,) = (one for one in left_out_lines(off.contains) if "friction" in one)
     assert names(line, "joints.*.friction", "false")
+
+
+def test_a_run_says_that_a_drive_without_friction_loses_nothing():
+    """The catalogue states no losses of size 32: the motor works at no loss."""
+    parts = {}
+    for name in ("CSG-25-100", "CSG-32-100"):
+        changes = {"defaults.drive": name, "simulation.duration_s": 3.0}
+        run = run_scene("bench", overrides=changes)
+        energy = run.metrics()["joints"]["joint"]["energy"]
+        parts[name] = [one["part"] for one in run.contains["left_out"]]
+        lossless = name == "CSG-32-100"
+        assert (energy["efficiency"] > 0.9999) == lossless
+        assert any("efficiency" in part for part in parts[name]) == lossless
+    lines = left_out_lines(run.contains)
+    assert any(names(line, "friction", "100 %", "catalogue") for line in lines)
 
 
 def test_the_link_feels_the_friction_of_the_flexspline(bench):

@@ -90,7 +90,9 @@ def bending_torque(design: Design, loss_factor: float = STEEL_LOSS_FACTOR) -> fl
 def without_friction(design: Design) -> str:
     """Reason why a finite-element map has no losses, with the torque of rim bending."""
     return (
-        "the finite elements model no friction of bearing, seals and grease; bending of"
-        f" the plain rim alone takes about {1e3 * bending_torque(design):.2g} mN·m"
+        "the finite elements model no friction of bearing, seals and grease, and that"
+        " of the teeth only as hysteresis; a table [losses] adds all of them to a"
+        " design with a wave-generator bearing; bending of the plain rim alone takes"
+        f" about {1e3 * bending_torque(design):.2g} mN·m"
         f" (loss factor {STEEL_LOSS_FACTOR:g}, assumed)"
     )
