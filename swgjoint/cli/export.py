@@ -86,7 +86,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``format`` and ``files``; for ``mjcf`` also ``arm``, ``step_s``,
-        ``drives_by_rule``, ``rotors_assumed``, ``joints`` (by name: ``drive``,
+        ``drives_by_rule``, ``rotors_assumed``, ``without_drive`` (hinges that remain as
+        in the file), ``joints`` (by name: ``drive``,
         ``ratio``, ``rotor_inertia_kgm2`` and the differences from level full:
         ``up_to_Nm``, ``torsion_arcmin``, ``left_out_error_pp_arcmin``,
         ``left_out_ripple_pp_Nm``, ``link_angle_arcmin``, ``resonance`` with
@@ -172,6 +173,7 @@ def _mjcf(args: argparse.Namespace) -> dict[str, Any]:
             name: result.errors[name].as_json(drive)
             for name, drive in result.drives.items()
         },
+        "without_drive": list(result.without_drive),
         "files": [str(path) for path in (result.path, *result.assets)],
     }
 
@@ -224,7 +226,7 @@ def _mjcf_text(result: dict[str, Any]) -> str:
     for name, joint in result["joints"].items():
         for note in joint["notes"]:
             notes.setdefault(note, []).append(name)
-    count = len(result["joints"])
+    count, bare = len(result["joints"]), ", ".join(result["without_drive"])
     assumed = result["joints"] if result["rotors_assumed"] else ()
     by_rule = (
         "drives selected as by swgjoint run; to select others: --drive [JOINT=]NAME"
@@ -235,6 +237,7 @@ def _mjcf_text(result: dict[str, Any]) -> str:
         " angle and torque, and resonance without load at the time step of"
         f" {1e3 * result['step_s']:g} ms:",
         table(rows, header=header),
+        *([f"without a drive: {bare}; for all hinges: --drive NAME"] if bare else []),
         *rotor_lines(result["joints"], assumed, "--rotor-inertia VALUE"),
         *(
             note + ("" if len(names) == count else f" ({', '.join(names)})")

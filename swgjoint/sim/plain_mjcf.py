@@ -39,6 +39,8 @@ class MjcfExport:
     """Meshes and textures beside it, in the folder that the file refers to."""
     drives: dict[str, JointDrive]
     """Drives by joint name, in the order of the model."""
+    without_drive: tuple[str, ...]
+    """Hinges of the arm that have no drive, and remain as in its file."""
     errors: dict[str, NativeError]
     """Difference of each drive from level ``full``, as the file states it."""
     step: float
@@ -98,6 +100,9 @@ def export_mjcf(
         spec.option.timestep = step
     if not isinstance(drives, Mapping):
         drives = {"*": drives}
+    hinges = [
+        joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    ]
     attached = attach(
         spec,
         with_whole_names(spec, drives),
@@ -120,6 +125,7 @@ def export_mjcf(
         path=path,
         assets=tuple(folder / name for name in files),
         drives=attached,
+        without_drive=tuple(name for name in hinges if name not in attached),
         errors=errors,
         step=timestep,
     )

@@ -52,6 +52,18 @@ def test_drives_by_rule_are_those_of_run(capsys):
     assert names(out, "elbow_joint", chosen["elbow_joint"], "arm.xml", "--drive")
 
 
+def test_hinges_without_a_drive_are_named(capsys):
+    """Unlike ``run``, a drive of some joints leaves the others as in the file."""
+    command = ["export", "mjcf", "ur5e", "-o", "arm.xml", "--drive"]
+    assert main([*command, "*pan*=CSG-25-100", "--json"]) == 0
+    bare = json.loads(capsys.readouterr().out)["without_drive"]
+    assert bare[0] == "shoulder_lift_joint" and len(bare) == 5
+    assert main([*command, "*pan*=CSG-25-100"]) == 0
+    assert names(capsys.readouterr().out, "without a drive", *bare, "--drive NAME")
+    assert main([*command, "CSG-25-100"]) == 0
+    assert "without a drive" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
