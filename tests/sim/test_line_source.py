@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from swgjoint.sim.figures.contains import _weak_harmonics
+from swgjoint.sim.figures.left_out import _weak_harmonics
 from swgjoint.sim.figures.line_source import drive_order, sharing_joints
 from swgjoint.view.validity import shared_orders
 
