@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from math import pi
+from math import ceil, copysign, pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,9 @@ from swgjoint.units import deg
 
 if TYPE_CHECKING:
     from swgjoint.fe.solid.meshing import SolidRun
+
+RUN_IN_STEPS = 6
+"""Number of steps through half a pitch before a position with friction."""
 
 
 def simulate_meshing(
@@ -133,10 +136,13 @@ def simulate_meshing(
     checked(state, f"loading to {overload(design, torque) or f'{torque:g} N·m'}")
     setup.append(SetupState.from_state(drive, "torque", state))
 
+    slides = drive.friction is not None and torque != 0.0
     rows = []
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
-        if k == 0:
+        if slides:
+            current = _slide_to(follow, state, angle, turn)
+        elif k == 0:
             current = state
         elif torque == 0.0:
             tried = follow.turn_unloaded(unloaded, angle)
@@ -160,6 +166,32 @@ def simulate_meshing(
         setup=tuple(setup),
         wall_s=time.perf_counter() - begin,
     )
+
+
+def _slide_to(follow: Continuation, state: State, angle: float, turn: float) -> State:
+    """Turn the input to an angle, with friction as in steady motion.
+
+    Friction follows the sliding of the flanks only in small steps. Positions that are
+    farther apart, and the first one, are approached through half a pitch of such steps,
+    after which friction does not depend on what was before.
+
+    Args:
+        follow: The drive.
+        state: State at another position or, for the first one, at the same angle.
+        angle: Input angle [rad].
+        turn: Rotation of the input in the simulation [turns], for its direction.
+    """
+    step = copysign(
+        pi / (RUN_IN_STEPS * follow.model.circular_spline.profile.teeth), turn
+    )
+    apart = (angle - follow.input_angle(state)) / step
+    count = ceil(apart - 1e-6) if 0.5 < apart <= RUN_IN_STEPS else RUN_IN_STEPS
+    first = 1 if apart > 0.5 and count < RUN_IN_STEPS else 0
+    length = apart / count * step if first else step
+    for k in range(first, count + 1):
+        if state.outcome.ok:
+            state = follow.to_angle(state, angle - (count - k) * length)
+    return state
 
 
 def _step(
