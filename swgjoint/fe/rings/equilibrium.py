@@ -104,16 +104,22 @@ class ThinRingSolver:
                 return replace(state, outcome=Outcome.DIVERGED, history=tuple(history))
             part = min(1.0, self.stride * model.lobe_height / max(size, 1e-300))
             load += part * change
-            state = replace(state, torque=load, compliance=compliance)
+            state = replace(state, rotation=psi, torque=load, compliance=compliance)
             if size < self.step_tolerance * model.rim.radius:
                 parts = total.shares(reach)
-                state = replace(
+                # this step is so small that its effect on the forces is negligible
+                q = state.q + step
+                return replace(
                     state,
-                    q=state.q + step,
+                    q=q,
+                    rotation=rim_rotation(model, q, psi)[0],
+                    energy=state.energy + float(total.gradient @ step),
                     shares={k: value / compliance for k, value in parts.items()},
+                    outcome=Outcome.CONVERGED,
+                    history=tuple(history),
                 )
-                return _finished(model, state, Outcome.CONVERGED, history, teeth=teeth)
-        return _finished(model, state, Outcome.MAX_ITERATIONS, history, teeth=teeth)
+        failed = Outcome.MAX_ITERATIONS
+        return replace(state, outcome=failed, history=tuple(history))
 
 
 def _moved(step: Array) -> float:
@@ -138,17 +144,3 @@ def rim_rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
     rows[:, 0] = (cosine * rotate_right_angle(x0) - sine * x0) / (sine**2 + cosine**2)
     psi = float(np.arctan2(sine, cosine))
     return psi + 2.0 * np.pi * round((near - psi) / (2.0 * np.pi)), gradient
-
-
-def _finished(
-    model: ThinRing,
-    state: ThinRingState,
-    outcome: Outcome,
-    history: list[float],
-    *,
-    teeth: bool,
-) -> ThinRingState:
-    """State with the forces and the energy at its final positions."""
-    state, _, _ = linearise(model, state, teeth=teeth)
-    psi, _ = rim_rotation(model, state.q, state.rotation)
-    return replace(state, rotation=psi, outcome=outcome, history=tuple(history))
