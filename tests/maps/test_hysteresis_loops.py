@@ -126,16 +126,16 @@ def test_round_of_unequal_branches_is_refused(synthetic_map):
 
 
 def small(
-    drive: DriveMap, theta: float, means: tuple[float, ...]
+    drive: DriveMap, theta: float, means: tuple[float, ...], size: float = 8.0
 ) -> list[FrictionLoop]:
-    """Small loops of 8 N·m about several torques, which follow the large loop."""
+    """Small loops about several torques, which follow the large loop."""
     part = np.arange(1, 9) / 4
     once = np.concatenate([1.0 - part, part - 1.0])
     torque = path(90.0)
     loops = []
     for mean in means:
-        approach = np.linspace(torque[-1], mean + 8.0, 5)[1:]
-        torque = np.concatenate([torque, approach, *[mean + 8.0 * once] * 2])
+        approach = np.linspace(torque[-1], mean + size, 5)[1:]
+        torque = np.concatenate([torque, approach, *[mean + size * once] * 2])
         bare = replace(drive, hysteresis=())
         psi = output_angle(bare, theta, torque)
         x = drive.torsion(theta, psi)
@@ -206,3 +206,25 @@ def test_fit_keeps_to_the_stiffness_that_a_joint_can_integrate(synthetic_map):
     assert 0.3 * stiffest < sticking_stiffness(found) <= stiffest
     back = played_loop(replace(drive, hysteresis=found), loop)
     assert back.area == pytest.approx(loop.area, rel=0.05)
+
+
+def test_round_off_does_not_choose_a_yield_torsion(synthetic_map):
+    """Yield torsions that the loops do not determine do not depend on round-off."""
+    (base,) = elements(synthetic_map, (2.0, REACHES[13]))
+    element = Jenkin(
+        stiffness=4.0 * base.stiffness, yield_torque=1.0, yield_curve=((90.0, 7.0),)
+    )
+    drive = replace(synthetic_map, hysteresis=(element,))
+    # steps of 3.75 N·m slide through the yield torsion; those of 0.25 N·m do not
+    loops = [rubbed(drive), *small(drive, 0.1, [0.0], 1.0)]
+    rng = np.random.default_rng(1)
+    fits = []
+    for size in (0.0, 1e-12, 1e-12, 1e-12):
+        noisy = [
+            replace(one, torsion=one.torsion * (1.0 + size * rng.normal(size=n)))
+            for one, n in ((one, one.torsion.size) for one in loops)
+        ]
+        fits.append(fit_elements(noisy, synthetic_map.max_stiffness))
+    stiff = [[e.stiffness for e in found] for found in fits]
+    assert len(stiff[0]) > 3
+    assert stiff[1:] == [pytest.approx(stiff[0], rel=1e-6)] * 3

@@ -11,7 +11,8 @@ Samples are weighted with the torsion between them. An element that slips throug
 then takes the mean of R and thereby dissipates the work of friction in a round. The
 small loops of a position have the same weight together as its large loop. They
 determine the yield torsions: after a reversal the teeth stick, and the large loop has
-few steps there.
+few steps there. An element whose yield torsion they do not determine, because no small
+loop is close to its load, takes a yield torsion close to those of the other elements.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ requires less than 1."""
 CLOSE = 0.05
 """Residual of constant yield torques, relative to the friction torque, below which they
 suffice [-]."""
+SAME = 1e-9
+"""Largest difference of two signals that count as the same [-]."""
 BETTER = 0.9
 """Residual relative to that of constant yield torques below which yield torques that
 depend on the load are used [-]."""
@@ -137,14 +140,62 @@ def _elements(
     unit = float(np.abs(target).max())
     if unit == 0.0:
         return (), 0.0
-    factors, off = nnls(np.concatenate(rows), target / unit)
-    yields = unit * factors
+    matrix = np.concatenate(rows)
+    alike = _alike(matrix, candidates)
+    factors, off = nnls(matrix[:, [group[0] for group in alike]], target / unit)
+    reaches = np.log([reach for reach, _ in candidates])
+    typical = _typical_reach(factors, alike, reaches)
+    yields = np.zeros(len(candidates))
+    for factor, group in zip(factors, alike, strict=True):
+        closest = np.abs(reaches[group] - typical).argmin()
+        yields[group[int(closest)]] = unit * factor
     elements = tuple(
         _element(float(f), d, at, shape)
         for f, (d, shape) in zip(yields, candidates, strict=True)
         if f > FAINT * yields.sum()
     )
     return elements, unit * float(off) / float(np.linalg.norm(target))
+
+
+def _alike(
+    signals: Array, candidates: Sequence[tuple[float, Array]]
+) -> list[list[int]]:
+    """Numbers of the candidates, grouped by equal signals.
+
+    Elements of the same factors that slide at every point of the loops have the same
+    signals: the loops do not determine their yield torsion.
+
+    Args:
+        signals: Weighted signal of each candidate (n_points, n_candidates).
+        candidates: As in :func:`_elements`; those of the same factors follow each
+            other in the order of decreasing yield torsions.
+    """
+    groups: list[list[int]] = []
+    for k, (_, shape) in enumerate(candidates):
+        if groups and np.array_equal(candidates[groups[-1][0]][1], shape):
+            apart = np.abs(signals[:, k] - signals[:, groups[-1][0]]).max()
+            if apart <= SAME * np.abs(signals[:, k]).max():
+                groups[-1].append(k)
+                continue
+        groups.append([k])
+    return groups
+
+
+def _typical_reach(factors: Array, alike: list[list[int]], reaches: Array) -> float:
+    """Logarithm of the yield torsion of the elements for which the loops determine it.
+
+    It is their mean, weighted with the yield torques; without any, the largest one.
+
+    Args:
+        factors: Yield torques of the groups of candidates (n_groups,).
+        alike: Groups of candidates with equal signals.
+        reaches: Logarithms of the yield torsions (n_candidates,).
+    """
+    sure = [len(group) == 1 for group in alike]
+    weight = factors * sure
+    if not weight.any():
+        return float(reaches.max())
+    return float(np.average([reaches[group[0]] for group in alike], weights=weight))
 
 
 def _element(torque: float, reach: float, at: Array, shape: Array) -> Jenkin:
