@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,7 +62,7 @@ def drive_of(
     drive = _without_options(section, known=known, joint=joint, progress=progress)
     if section.hysteresis is False and drive.hysteresis:
         info = {**drive.info, "hysteresis_left_out": len(drive.hysteresis)}
-        drive = replace(drive, hysteresis=(), info=info)
+        drive = drive.with_parts(hysteresis=(), info=info)
     key, celsius = "temperature_C", section.temperature_C
     if celsius is None and section.thermal is not None:
         key, celsius = "thermal.ambient_C", section.thermal.ambient_C
@@ -253,7 +252,7 @@ def _from_source(
     drive = build_map(source, model=model, angles=angles, progress=progress)
     if not omit_errors:
         return drive
-    return replace(drive, info={**drive.info, "manufacturing_errors": "left out"})
+    return drive.with_parts(info={**drive.info, "manufacturing_errors": "left out"})
 
 
 def _named(reference: str | Path | Design | DriveMap) -> str:

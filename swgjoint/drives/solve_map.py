@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
@@ -113,7 +111,7 @@ def _with_friction(
     except ComputationError as failure:
         reason = f"friction of the teeth gives no hysteresis: {failure}"
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
-        return replace(drive, info={**drive.info, "missing": missing})
+        return drive.with_parts(info={**drive.info, "missing": missing})
     return with_hysteresis(drive, loops)
 
 
@@ -143,7 +141,7 @@ def with_losses(design: Design, drive: DriveMap, progress: Progress) -> DriveMap
     except (ComputationError, DesignError) as failure:
         why = "; ".join(str(failure).splitlines())
         missing = {**info.get("missing", {}), **dict.fromkeys(LOSS_KEYS, why)}
-        return replace(drive, info={**info, "missing": missing})
+        return drive.with_parts(info={**info, "missing": missing})
     missing = {k: v for k, v in info["missing"].items() if k not in LOSS_KEYS}
     section = design.losses
     table = friction_table(
@@ -152,7 +150,7 @@ def with_losses(design: Design, drive: DriveMap, progress: Progress) -> DriveMap
         f" {section.base_oil_40C_mm2_s:g} and {section.base_oil_100C_mm2_s:g} mm²/s at"
         " 40 and 100 °C",
     )
-    drive = replace(drive, info={**info, "missing": missing, KEY: table})
+    drive = drive.with_parts(info={**info, "missing": missing, KEY: table})
     return at_temperature(drive, own.temperature, where=design.drive.name)
 
 
@@ -160,4 +158,4 @@ def _without_losses(design: Design, drive: DriveMap) -> DriveMap:
     """The map with the reason why it has no speed-dependent losses."""
     missing = dict.fromkeys(LOSS_KEYS, without_friction(design))
     missing |= drive.info.get("missing", {})
-    return replace(drive, info={**drive.info, "missing": missing})
+    return drive.with_parts(info={**drive.info, "missing": missing})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -100,7 +100,7 @@ def fit_drive(
     """
     drive, level = fitting.drive, fitting.level
     if not fitting.friction and drive.friction is not None:
-        drive = replace(drive, friction=None)
+        drive = drive.with_parts(friction=None)
     ratio, stiffness = drive.ratio, drive.mean_stiffness
     damping_ratio = fitting.damping_ratio
     if damping_ratio is None:

@@ -6,7 +6,6 @@ import hashlib
 import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -79,11 +78,11 @@ def cache_map(
     folder = cache_folder()
     if folder is None:
         drive = build()
-        return drive if name is None else replace(drive, name=name)
+        return drive if name is None else drive.with_parts(name=name)
     key = key_of(parts)
     path = folder / "maps" / key[:2] / f"{key}.swg"
     drive = _sound(path, str(parts["design"])) or _built(path, build)
-    return drive if name in (None, drive.name) else replace(drive, name=name)
+    return drive if name in (None, drive.name) else drive.with_parts(name=name)
 
 
 def recall(

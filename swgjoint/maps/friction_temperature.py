@@ -8,7 +8,6 @@ temperature, because the viscosity falls nearly exponentially.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -82,7 +81,7 @@ def at_temperature(drive: Map, temperature: float, *, where: str) -> Map:
         for field, key in _FIELDS.items()
     }
     label = f"{table['source']}; at {celsius:.4g} °C, {table['lubricant']}"
-    return replace(drive, friction=Friction(**values, source=label))
+    return drive.with_parts(friction=Friction(**values, source=label))
 
 
 def _interpolated(grid: Array, values: Array, celsius: float) -> float:

@@ -169,7 +169,7 @@ def with_stated_error(
         wanted = drive.info["stated"]["transmission_accuracy_arcmin"]
     if wanted is None:
         label = f"none: the tables state no transmission accuracy for {drive.name}"
-        return replace(drive, info={**drive.info, "kinematic_error": label})
+        return drive.with_parts(info={**drive.info, "kinematic_error": label})
     return with_assumed_error(
         drive, wanted * arcmin, seed=seed, joint=joint, stated=stated
     )
@@ -217,7 +217,7 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
         )
         friction = friction_of_losses(losses, drive.ratio, source=label)
         info = {**drive.info, KEY: _friction_table(friction)}
-        drive = replace(drive, friction=friction, info=info)
+        drive = drive.with_parts(friction=friction, info=info)
     loss = stated["hysteresis_loss_arcmin"]
     return drive if loss is None else _with_hysteresis(drive, row, s, loss * arcmin)
 
@@ -286,7 +286,7 @@ def _with_hysteresis(
                 f"catalogue {row.name}: {loss / arcmin:g} arcmin, an upper bound; a"
                 " drive may have less"
             )
-            return replace(drive, info={**drive.info, "hysteresis": label})
+            return drive.with_parts(info={**drive.info, "hysteresis": label})
         trial = trial * change
     raise InputError(
         f"catalogue drive {row.name}: found no map with its stiffness and a hysteresis"

@@ -203,7 +203,7 @@ def _with_loop(
             if loss is None:
                 return drive
             label = f"stated: {loss / arcmin:g} arcmin"
-            return replace(drive, info={**drive.info, "hysteresis": label})
+            return drive.with_parts(info={**drive.info, "hysteresis": label})
     raise InputError(
         f"stated figures: found no drive with stiffness {K[0]:g}, {K[1]:g} and {K[2]:g}"
         f" N·m/rad, lost motion {(lost or 0.0) / arcmin:g} and hysteresis loss"

@@ -17,6 +17,7 @@ are therefore conservative.
 
 from __future__ import annotations
 
+import copy
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -120,6 +121,10 @@ class Potential:
         ):
             array = frozen_array(getattr(self, key), f"{key} [{unit}]", shape=shape)
             object.__setattr__(self, key, array)
+        self._check_parts()
+
+    def _check_parts(self) -> None:
+        """Check hysteresis and friction."""
         elements = tuple(self.hysteresis)
         check_elements(elements, self.name)
         object.__setattr__(self, "hysteresis", elements)
@@ -372,6 +377,22 @@ class Potential:
             end_stiffness=self.end_stiffness[mask],
             kinematic_error=self.kinematic_error[mask],
         )
+
+    def with_parts(self, **parts: Any) -> Self:
+        """A copy with the same potential, whose bounds are not computed again.
+
+        Args:
+            parts: New values of the fields name, hysteresis, friction and info.
+
+        Raises:
+            InputError: If hysteresis or friction is not valid.
+        """
+        assert parts.keys() <= {"name", "hysteresis", "friction", "info"}
+        changed = copy.copy(self)
+        for key, value in parts.items():
+            object.__setattr__(changed, key, value)
+        changed._check_parts()
+        return changed
 
     def pruned(self, tolerance_arcmin: float) -> Self:
         """A copy without the weakest harmonics, within a tolerance.

@@ -76,8 +76,8 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         fitted = _map_of(samples, knots, combined)
         record = _tolerance_record(fitted, samples, combined.record, keep)
     sampled = [float(v) for v in samples.torque[[0, -1]]]
-    fitted = replace(
-        fitted, info={**samples.info, **record, "sampled_torque_Nm": sampled}
+    fitted = fitted.with_parts(
+        info={**samples.info, **record, "sampled_torque_Nm": sampled}
     )
     info = {
         **fitted.info,
@@ -87,7 +87,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     unseen = validation(fitted, samples)
     if unseen is not None:
         info["validation"] = unseen
-    return replace(fitted, info=info)
+    return fitted.with_parts(info=info)
 
 
 def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:

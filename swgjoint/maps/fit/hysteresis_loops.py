@@ -14,7 +14,6 @@ with those of the finite elements.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -47,7 +46,7 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
             one torque and, if there are any, small loops.
     """
     elements = fit_elements(loops, drive.max_stiffness, STIFFEST * drive.mean_stiffness)
-    fitted = replace(drive, hysteresis=elements)
+    fitted = drive.with_parts(hysteresis=elements)
     small = small_loops(fitted, [loop for loop in loops if not is_large(loop)])
     loops = [loop for loop in loops if is_large(loop)]
     width = np.array([loop.width for loop in loops])
@@ -97,7 +96,7 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         f" {taken.mean() / work.mean():.2f} times that of the finite elements"
     )
     info = {**drive.info, "friction_loop": report, "hysteresis": label}
-    return replace(fitted, info=info)
+    return fitted.with_parts(info=info)
 
 
 def small_loops(
@@ -147,16 +146,17 @@ def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
         leg = slice(begin + 1, end + 1)
         psi[leg] = output_angle(drive, theta, loop.torque[leg], sliders)
         sliders = move_sliders(drive, sliders, theta, float(psi[end]))
-    elastic = output_angle(replace(drive, hysteresis=()), theta, loop.torque)
+    once, place = np.unique(loop.torque, return_inverse=True)
+    elastic = output_angle(drive, theta, once)
     ideal = theta / drive.ratio
-    x = drive.torsion(theta, elastic)
+    stiffness = drive.stiffness(drive.torsion(theta, elastic), theta, elastic)
     return FrictionLoop(
         input_angle=theta,
         quarter=loop.quarter,
         torque=loop.torque,
         torsion=ideal - psi,
-        elastic_torsion=ideal - elastic,
-        stiffness=drive.stiffness(x, theta, elastic),
+        elastic_torsion=ideal - elastic[place],
+        stiffness=stiffness[place],
         work=np.zeros(loop.torque.size),
     )
 
