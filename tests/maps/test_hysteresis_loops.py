@@ -12,7 +12,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.fit.hysteresis_elements import REACHES, fit_elements
-from swgjoint.maps.fit.hysteresis_loops import played_loop, with_hysteresis
+from swgjoint.maps.fit.hysteresis_loops import play_loops, played_loop, with_hysteresis
 from swgjoint.maps.hysteresis import Jenkin, sticking_stiffness
 from swgjoint.units import arcmin
 
@@ -228,3 +228,17 @@ def test_round_off_does_not_choose_a_yield_torsion(synthetic_map):
     stiff = [[e.stiffness for e in found] for found in fits]
     assert len(stiff[0]) > 3
     assert stiff[1:] == [pytest.approx(stiff[0], rel=1e-6)] * 3
+
+
+def test_paths_that_begin_alike_are_played_once(synthetic_map):
+    """Loops of common and of other paths are those that each path gives alone."""
+    given = elements(synthetic_map, (4.0, REACHES[8]))
+    drive = replace(synthetic_map, hysteresis=given)
+    loops = [blank(drive, 0.0), *small(drive, 0.0, (50.0, 0.0)), blank(drive, 0.02)]
+    loops.append(blank(drive, 0.0, top=60.0))  # not a part of the longest path
+    for loop, played in zip(loops, play_loops(drive, loops), strict=True):
+        alone = played_loop(drive, loop)
+        assert played.quarter == loop.quarter
+        assert (played.torque == loop.torque).all()
+        assert played.torsion == pytest.approx(alone.torsion, rel=1e-12, abs=1e-15)
+        assert played.area == pytest.approx(alone.area, rel=1e-12)

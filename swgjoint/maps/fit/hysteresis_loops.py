@@ -47,11 +47,11 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
     """
     elements = fit_elements(loops, drive.max_stiffness, STIFFEST * drive.mean_stiffness)
     fitted = drive.with_parts(hysteresis=elements)
-    small = small_loops(fitted, [loop for loop in loops if not is_large(loop)])
-    loops = [loop for loop in loops if is_large(loop)]
+    pairs = list(zip(loops, play_loops(fitted, loops), strict=True))
+    small = _compare_small([pair for pair in pairs if not is_large(pair[0])])
+    loops, played = zip(*[pair for pair in pairs if is_large(pair[0])], strict=True)
     width = np.array([loop.width for loop in loops])
     shift = np.array([loop.shift for loop in loops])
-    played = [played_loop(fitted, loop) for loop in loops]
     widths = np.array([loop.width for loop in played])
     shifts = np.array([loop.shift for loop in played])
     grid = loops[0].branches(loops[0].torque)[1]
@@ -99,33 +99,62 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
     return fitted.with_parts(info=info)
 
 
-def small_loops(
-    drive: Potential, loops: Sequence[FrictionLoop]
+def _compare_small(
+    pairs: Sequence[tuple[FrictionLoop, FrictionLoop]],
 ) -> list[dict[str, float]]:
     """Width and area of small loops, computed and of a map, as means over positions.
 
     Args:
-        drive: The map.
-        loops: Small loops; those about the same torque belong together.
+        pairs: Small loops with those of the map; loops about the same torque belong
+            together.
     """
     rows = []
-    for mean in sorted({loop.mean_torque for loop in loops}):
-        some = [loop for loop in loops if loop.mean_torque == mean]
-        played = [played_loop(drive, loop) for loop in some]
+    for mean in sorted({loop.mean_torque for loop, _ in pairs}):
+        some = [pair for pair in pairs if pair[0].mean_torque == mean]
+        first = some[0][0]
         rows.append(
             {
                 "mean_torque_Nm": mean,
-                "amplitude_Nm": float(some[0].branches(some[0].torque)[1][-1] - mean),
-                "width_arcmin": float(np.mean([one.loss for one in some]) / arcmin),
+                "amplitude_Nm": float(first.branches(first.torque)[1][-1] - mean),
+                "width_arcmin": float(np.mean([one.loss for one, _ in some]) / arcmin),
                 "width_map_arcmin": float(
-                    np.mean([one.loss for one in played]) / arcmin
+                    np.mean([played.loss for _, played in some]) / arcmin
                 ),
-                "friction_work_J": float(np.mean([one.friction_work for one in some])),
-                "round_area_J": float(np.mean([one.area for one in some])),
-                "round_area_map_J": float(np.mean([one.area for one in played])),
+                "friction_work_J": float(
+                    np.mean([one.friction_work for one, _ in some])
+                ),
+                "round_area_J": float(np.mean([one.area for one, _ in some])),
+                "round_area_map_J": float(np.mean([played.area for _, played in some])),
             }
         )
     return rows
+
+
+def play_loops(drive: Potential, loops: Sequence[FrictionLoop]) -> list[FrictionLoop]:
+    """The loops of a map along the torques of computed loops.
+
+    Paths at one input angle usually begin alike: that of a small loop begins with the
+    large loop. The longest one is then played once for all of them.
+
+    Args:
+        drive: The map.
+        loops: Loops whose torques and input angles are used.
+    """
+    longest = {loop.input_angle: loop for loop in sorted(loops, key=_points)}
+    whole = {angle: played_loop(drive, loop) for angle, loop in longest.items()}
+    played = []
+    for loop in loops:
+        path, end = whole[loop.input_angle], _points(loop)
+        begins = np.array_equal(path.torque[:end], loop.torque)
+        played.append(
+            path.cut_path(end, loop.quarter) if begins else played_loop(drive, loop)
+        )
+    return played
+
+
+def _points(loop: FrictionLoop) -> int:
+    """Number of points of the path."""
+    return loop.torque.size
 
 
 def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
