@@ -11,6 +11,7 @@ import numpy as np
 
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.potential import Potential
+from swgjoint.units import arcmin
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -235,3 +236,20 @@ class DriveMap(Potential):
         from swgjoint.maps.sheet.spec_sheet import spec_sheet
 
         return spec_sheet(self, only)
+
+    def pruned(self, tolerance_arcmin: float) -> Self:
+        """A copy without the weakest harmonics, within a tolerance.
+
+        ``info["pruned"]`` lists the dropped harmonics, with bounds on their effect on
+        output angle, kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
+
+        Args:
+            tolerance_arcmin: Largest change of the output angle at a given torque and
+                input angle [arcmin].
+
+        Raises:
+            InputError: If the tolerance is not positive or the effect has no bound.
+        """
+        from swgjoint.maps.fit.pruning import pruned_map
+
+        return pruned_map(self, tolerance_arcmin * arcmin)

@@ -37,7 +37,6 @@ from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
 from swgjoint.maps.phase_bounds import MANY, largest_total
 from swgjoint.typing import Array, Index
-from swgjoint.units import arcmin
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -393,20 +392,3 @@ class Potential:
             object.__setattr__(changed, key, value)
         changed._check_parts()
         return changed
-
-    def pruned(self, tolerance_arcmin: float) -> Self:
-        """A copy without the weakest harmonics, within a tolerance.
-
-        ``info["pruned"]`` lists the dropped harmonics, with bounds on their effect on
-        output angle, kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
-
-        Args:
-            tolerance_arcmin: Largest change of the output angle at a given torque and
-                input angle [arcmin].
-
-        Raises:
-            InputError: If the tolerance is not positive or the effect has no bound.
-        """
-        from swgjoint.maps.fit.pruning import pruned_map
-
-        return pruned_map(self, tolerance_arcmin * arcmin)
