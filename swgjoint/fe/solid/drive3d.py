@@ -39,6 +39,7 @@ def solid_sector_model(
     elastic_circular_spline: bool = True,
     orders: Orders | None = None,
     bearing: Bearing | None = None,
+    like: SolidSectorModel | None = None,
 ) -> SolidSectorModel:
     """Build the 3D model of a design.
 
@@ -53,6 +54,9 @@ def solid_sector_model(
             the default degrees.
         bearing: Axial support of the outer race of ``[wave_generator.bearing]`` on its
             balls; None replaces bearing and cam by a rigid wave generator.
+        like: Model of the same drive, whole or half, with other errors or none and an
+            elastic circular spline. Its condensed members are used again, which saves a
+            few seconds; None condenses them.
 
     Raises:
         DesignError: If the design cannot be built or has features that the model lacks,
@@ -84,10 +88,14 @@ def solid_sector_model(
     )
     sectors = design.drive.teeth_flexspline // (2 if half else 1)
     require_solid_memory(name, required_memory(mesh, spline_mesh, sectors, orders))
-    strip = flexspline(design, profile, mesh, orders=orders)
+    if like is None:
+        strip = flexspline(design, profile, mesh, orders=orders)
+    else:
+        strip = like.strip
     gear, surface = None, CircularSpline(profile=facing)
     if spline_mesh is not None:
-        gear = condense_circular_spline(design, facing, spline_mesh)
+        gear = None if like is None else like.teeth.elastic_circular_spline
+        gear = gear or condense_circular_spline(design, facing, spline_mesh)
         stations = gear.mesh.teeth.plane.flank_stations[:-1]
         surface = CircularSpline(profile=facing, weights=average_spline(stations))
     shape, errors = design.micro_geometry, dict[str, Array]()

@@ -15,6 +15,7 @@ from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.equilibrium import MAP_SOLVER
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
+from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.tolerances.cycle import pitch_of
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
@@ -29,7 +30,11 @@ clearance is midway between its positions under this torque and its opposite."""
 
 
 def perfect_drive(
-    design: Design, model: str = "2d", *, bearing: bool = True
+    design: Design,
+    model: str = "2d",
+    *,
+    bearing: bool = True,
+    like: SolidSectorModel | None = None,
 ) -> Follower[Any]:
     """Solver of the whole drive with perfect teeth and axis and without friction.
 
@@ -39,10 +44,11 @@ def perfect_drive(
         bearing: Whether a 2D model includes the bearing of the wave generator, with its
             balls at rest on the cam, in designs for which
             :func:`swgjoint.fe.plane.drive2d.carries_bearing` is true.
+        like: See :func:`swgjoint.fe.solid.drive3d.solid_sector_model`.
     """
     perfect, layout = with_perfect_teeth(design), design.drive.layout
     if model == "3d":
-        solid = solid_sector_model(perfect)
+        solid = solid_sector_model(perfect, like=like)
         return SolidContinuation(model=solid, ratio=design.ratio, layout=layout)
     plane = sector_model(perfect, friction=False, bearing=bearing, cage_held=True)
     return Continuation(
@@ -171,6 +177,7 @@ def influences(
     model: str = "2d",
     bearing: bool = True,
     start: Any = None,
+    like: SolidSectorModel | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Follower[Any], list[Rest]]:
     """Unloaded drive with perfect teeth, linearised at positions within a pitch.
@@ -184,6 +191,7 @@ def influences(
         bearing: Whether a 2D model includes the bearing of the wave generator, see
             :func:`perfect_drive`.
         start: State close to the first position; None without any.
+        like: See :func:`perfect_drive`.
         tick: Called after every position.
 
     Returns:
@@ -192,7 +200,7 @@ def influences(
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
     """
-    follow = perfect_drive(design, model, bearing=bearing)
+    follow = perfect_drive(design, model, bearing=bearing, like=like)
     positions = []
     for rest in unloaded_positions(follow, design, phases, start):
         up, down = rest.sides or (rest.state, None)

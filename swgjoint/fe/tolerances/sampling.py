@@ -125,6 +125,7 @@ def sample_tolerances(
             solid = PerfectSolid.from_columns(solved, phases, tick)
         solid = solid or PerfectSolid.from_design(design, phases, tick)
         options["start"] = solid.whole(solid.positions[0].state)
+        options["like"] = solid.follow.model
     follow, linear = influences(design, **options)
     ideal_drive, reference = follow, linear
     if own_reference and model == "2d":
