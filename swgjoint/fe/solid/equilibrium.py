@@ -268,9 +268,8 @@ def _solve_linear(
     change = bore.change(increment[:, model.contact_dofs])
     by_teeth = np.zeros_like(change)
     if candidates is not None:
-        np.add.at(
-            by_teeth, candidates.contacts.sector, force[:, None] * condensed.coupling
-        )
+        for k in np.flatnonzero(force):
+            by_teeth[candidates.contacts.sector[k]] += force[k] * condensed.coupling[k]
     free = bore.free_gap + change + by_teeth
     push = -(bore.inverse @ bore.among_points(free)[:, :, None])[:, :, 0]
     after = free + (push[:, None] @ bore.compliance)[:, 0]
@@ -327,14 +326,11 @@ def _advance(
     circular_spline_force = np.zeros_like(state.circular_spline_force)
     kept = None
     if step.found is not None:
-        loaded = np.flatnonzero(step.force)
-        contacts, f = step.found.contacts, step.force[loaded, None]
-        np.add.at(flank_force, contacts.sector[loaded], f * step.found.weight[loaded])
-        np.add.at(
-            circular_spline_force,
-            contacts.tooth[loaded],
-            f * step.found.circular_spline_weight[loaded],
-        )
+        contacts, facing = step.found.contacts, step.found.circular_spline_weight
+        for k in np.flatnonzero(step.force):
+            f = step.force[k]
+            flank_force[contacts.sector[k]] += f * step.found.weight[k]
+            circular_spline_force[contacts.tooth[k]] += f * facing[k]
         kept = step.found.chosen(step.active)
     new = replace(
         state,
