@@ -114,8 +114,8 @@ class Search {
   }
 
   // Contact points at n places. Columns of real: gap, normal, point and tangent in the
-  // sector frame, sum of the arc lengths. Weights of the nodes of both flanks of a tooth
-  // in the gap and, where the arrays have rows, in the sliding motion.
+  // sector frame, sum of the arc lengths. Where the arrays have rows, weights of the
+  // nodes of both flanks of a tooth in the gap and in the sliding motion.
   void meet(In<4> flank, Index sector, Index side, In<1> station, Out<2> real,
             IndexOut tooth, Out<4> weight, Out<4> circular_weight, Out<4> sliding,
             Out<4> circular_sliding) const {
@@ -124,8 +124,11 @@ class Search {
     const std::size_t others = search_.rigid() ? 0 : circular_weights_.shape(2);
     check(n, sector, side);
     require(real.shape(0) == n && real.shape(1) == 8 && tooth.shape(0) == n, "real: (n, 8)");
-    fit(weight, n, nodes);
-    fit(circular_weight, n, others);
+    const bool weighted = weight.shape(0) > 0;
+    if (weighted) {
+      fit(weight, n, nodes);
+      fit(circular_weight, n, others);
+    }
     const bool rubs = sliding.shape(0) > 0;
     if (rubs) {
       fit(sliding, n, nodes);
@@ -136,7 +139,8 @@ class Search {
     for (std::size_t i = 0; i < n; ++i) {
       const swgjoint::Place place{sector.data()[i], side.data()[i], station.data()[i]};
       const swgjoint::Meeting at =
-          search_.meet(flank.data(), place, own.data(), other.data());
+          search_.meet(flank.data(), place, weighted || rubs ? own.data() : nullptr,
+                       weighted || rubs ? other.data() : nullptr);
       double* row = real.data() + 8 * i;
       row[0] = at.gap;
       row[1] = at.normal.x;
@@ -148,8 +152,10 @@ class Search {
       row[7] = at.slip;
       tooth.data()[i] = at.tooth;
       const auto s = static_cast<std::size_t>(place.side);
-      spread(own, at.normal, 1.0, weight, 2 * i + s);
-      spread(other, at.circular_normal, -1.0, circular_weight, 2 * i + 1 - s);
+      if (weighted) {
+        spread(own, at.normal, 1.0, weight, 2 * i + s);
+        spread(other, at.circular_normal, -1.0, circular_weight, 2 * i + 1 - s);
+      }
       if (!rubs) continue;
       spread(own, at.tangent, 1.0, sliding, 2 * i + s);
       spread(other, at.circular_tangent, -1.0, circular_sliding, 2 * i + 1 - s);

@@ -370,13 +370,17 @@ Meeting ToothSearch::meet(const double* flank, const Place& place, double* weigh
   const double length = size(tangent);
   const Seen seen = see(point, {-tangent.y / length, tangent.x / length},
                         pose_of(place.sector, place.side), rigid(), nullptr, 3);
-  weigh(spline_, place.station,
-        [&](std::size_t k, double weight, double) { weights[k] = weight; });
+  if (weights) {
+    weigh(spline_, place.station,
+          [&](std::size_t k, double weight, double) { weights[k] = weight; });
+  }
   Meeting meeting{};
   meeting.slip = std::numeric_limits<double>::quiet_NaN();
   if (!rigid()) {
-    weigh(flanks_.spline(), seen.foot.station,
-          [&](std::size_t k, double weight, double) { circular_weights[k] = weight; });
+    if (circular_weights) {
+      weigh(flanks_.spline(), seen.foot.station,
+            [&](std::size_t k, double weight, double) { circular_weights[k] = weight; });
+    }
     meeting.slip = place.station + seen.foot.station;
   }
   // a flank and the flank that it faces are on opposite sides of their teeth

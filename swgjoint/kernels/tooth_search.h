@@ -135,7 +135,7 @@ class ToothSearch {
                             const bool* searched, const Sampling& sampling) const;
 
   // Contact point at a place, and weights of its nodes (nodes,) on both flanks; the
-  // second ones only for elastic flanks of the circular spline
+  // second ones only for elastic flanks of the circular spline; null for none
   Meeting meet(const double* flank, const Place& place, double* weights,
                double* circular_weights) const;
 

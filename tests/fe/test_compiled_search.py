@@ -124,6 +124,21 @@ def test_no_candidate_has_the_same_columns(contact, monkeypatch):
 
 
 @pytest.mark.fe
+def test_contacts_without_derivatives_are_the_same(contact):
+    """All columns except the derivatives of the gaps, which are omitted."""
+    search, flank, _, height = contact
+    found = search.search(flank, 0.02 * height, None)
+    assert len(found) > 5
+    at = found.sector, found.side, found.station, flank
+    whole, bare = search.gather(*at), search.gather(*at, weighted=False)
+    assert bare.weight.size == bare.circular_spline_weight.size == 0
+    for field in fields(whole):
+        if not field.name.endswith("weight"):
+            ours, theirs = getattr(bare, field.name), getattr(whole, field.name)
+            np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.fe
 def test_feet_of_any_point_are_those_of_numpy(contact, monkeypatch):
     """Also beyond the ends of the flank, at corners, and far from any flank."""
     search, _, _, height = contact

@@ -158,7 +158,14 @@ class CompiledSearch:
         )
 
     def gather(
-        self, sector: Index, side: Index, station: Array, flank: Array, *, rubs: bool
+        self,
+        sector: Index,
+        side: Index,
+        station: Array,
+        flank: Array,
+        *,
+        rubs: bool,
+        weighted: bool = True,
     ) -> Contacts:
         """Contact points with all their derivatives at given points of the flanks.
 
@@ -168,11 +175,15 @@ class CompiledSearch:
             station: Arc length of each point (n,) [m].
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
             rubs: Whether to determine the derivatives along the flanks.
+            weighted: Whether to determine those of the gaps.
         """
         n, (own, other) = len(sector), self.nodes
         real, tooth = np.empty((n, 8)), np.empty(n, dtype=np.int64)
-        m = n if rubs else 0
-        weights = [np.zeros((k, 2, size, 2)) for k in (n, m) for size in (own, other)]
+        wanted = [weighted, weighted, rubs, rubs]
+        weights = [
+            np.zeros((n if some else 0, 2, size, 2))
+            for some, size in zip(wanted, (own, other, own, other), strict=True)
+        ]
         self.search.meet(
             np.ascontiguousarray(flank.reshape(len(flank), 2, -1, 2)),
             np.ascontiguousarray(sector),
@@ -182,11 +193,9 @@ class CompiledSearch:
             tooth,
             *weights,
         )
-        if not rubs:
-            weights[2:] = np.zeros((n, 0)), np.zeros((n, 0))
         by_flank, by_facing, sliding, facing_sliding = (
-            np.asarray(rows.reshape(n, int(np.prod(rows.shape[1:]))))
-            for rows in weights
+            part.reshape(n, 4 * part.shape[2] if some else 0)
+            for some, part in zip(wanted, weights, strict=True)
         )
         return Contacts(
             sector=sector,

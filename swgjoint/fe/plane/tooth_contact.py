@@ -334,7 +334,13 @@ class ToothContact:
         return s
 
     def gather(
-        self, sector: Index, side: Index, station: Array, flank: Array
+        self,
+        sector: Index,
+        side: Index,
+        station: Array,
+        flank: Array,
+        *,
+        weighted: bool = True,
     ) -> Contacts:
         """Contacts with all their derivatives at given points of the flanks.
 
@@ -343,19 +349,18 @@ class ToothContact:
             side: Side of each point (n,).
             station: Arc length of each point (n,) [m].
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
+            weighted: Whether the derivatives are needed; compiled code may omit them.
 
         Returns:
             The contacts; an infinite gap where a point faces no flank.
         """
         if self._compiled is not None:
-            places = sector, side, station
-            return self._compiled.gather(*places, flank, rubs=self.rubs)
-        element = self.element
-        size = element.flank_size
-        n = len(sector)
+            at = sector, side, station, flank
+            return self._compiled.gather(*at, rubs=self.rubs, weighted=weighted)
+        element, mirror = self.element, MIRROR[side]
+        size, n = element.flank_size, len(sector)
         shaped = flank.reshape(-1, 2, size, 2)[sector, side]
         spline = element.spline(station) if n else np.zeros((0, size))
-        mirror = MIRROR[side]
         mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
         point = mirrored * mirror
         seen = self._feet(mirrored, outward_normals(tangent), sector, side)

@@ -24,15 +24,13 @@ import numpy as np
 from swgjoint.fe.solid.strip.segment import StripSegment
 from swgjoint.typing import Array
 
-# v x w = LEVI[i, j, k] v_j w_k
-LEVI = np.zeros((3, 3, 3))
-LEVI[0, 1, 2] = LEVI[1, 2, 0] = LEVI[2, 0, 1] = 1.0
-LEVI[0, 2, 1] = LEVI[2, 1, 0] = LEVI[1, 0, 2] = -1.0
-
 
 def spin(vectors: Array) -> Array:
     """Matrices (..., 3, 3) of the cross product v x with vectors v (..., 3)."""
-    return np.asarray(np.einsum("ijk,...j->...ik", LEVI, vectors))
+    matrix = np.zeros((*vectors.shape, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        matrix[..., i, k], matrix[..., k, i] = vectors[..., j], -vectors[..., j]
+    return matrix
 
 
 def about_z(angle: Array) -> Array:
@@ -89,13 +87,13 @@ def segment_frames(
     gradient = np.zeros((len(x), *crossed.shape))
     turn, y = place, seen
     if fitted:
-        left, _, right = np.linalg.svd(np.einsum("sai,aj->sij", seen, reference))
+        left, _, right = np.linalg.svd(seen.transpose(0, 2, 1) @ reference)
         left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
         fit = left @ right
         turn, y = place @ fit, seen @ fit
         arm = np.einsum("ai,sai->s", reference, y)
         inertia = arm[:, None, None] * np.eye(3)
-        inertia -= np.einsum("sai,aj->sij", y, reference)
+        inertia -= y.transpose(0, 2, 1) @ reference
         gradient += np.linalg.solve(inertia, np.broadcast_to(crossed, gradient.shape))
     return SolidFrames(
         turn=turn,

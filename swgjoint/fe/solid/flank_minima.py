@@ -64,8 +64,6 @@ ROUND = 1e-15
 class FlankGaps:
     """Gaps around n points: three arc lengths each, in all planes."""
 
-    planes: tuple[Contacts, ...]
-    """Contacts in every plane in the order points, arc lengths (3 n,)."""
     gap: Array
     """Gaps in the order points, arc lengths, planes, zero in planes that are left out
     (n, 3, n_planes) [m]."""
@@ -82,17 +80,6 @@ class FlankGaps:
     """Whether the arc length of each point is that closest to a corner (n,)."""
     step: float
     """Distance between the arc lengths [m]."""
-
-    @cached_property
-    def contacts(self) -> Contacts:
-        """Contacts in the order of the gaps (3 n n_planes,)."""
-        order = np.arange(self.gap.size).reshape(len(self.planes), -1).T.ravel()
-        return Contacts(
-            **{
-                key: np.concatenate([getattr(part, key) for part in self.planes])[order]
-                for key in Contacts.__dataclass_fields__
-            }
-        )
 
     @property
     def found(self) -> Mask:
@@ -191,14 +178,7 @@ class FlankSurfaces:
     def gaps(self, points: FlankPoints) -> FlankGaps:
         """Gaps at and around points."""
         n, planes, step = len(points), self.planes, STEP * self.length
-        sector, side = np.repeat(points.sector, 3), np.repeat(points.side, 3)
-        around = step * np.array([-1.0, 0.0, 1.0])
-        parts = tuple(
-            search.gather(sector, side, (station[:, None] + around).ravel(), flank)
-            for search, flank, station in zip(
-                self.searches, self.flank, points.stations.T, strict=True
-            )
-        )
+        parts = self._around(points, weighted=False)
         gap, tooth, slip = (
             np.stack([getattr(part, key) for part in parts], axis=1)
             for key in ("gap", "tooth", "slip")
@@ -216,7 +196,6 @@ class FlankSurfaces:
         last = np.where(missing & after, number, planes).min(axis=1) - 1
         used = (number >= first[:, None]) & (number <= last[:, None])
         return FlankGaps(
-            planes=parts,
             gap=np.where(used[:, None], gap, 0.0),
             first=first,
             last=last,
@@ -225,6 +204,36 @@ class FlankSurfaces:
             rests=points.corner,
             step=step,
         )
+
+    def contacts(self, points: FlankPoints) -> Contacts:
+        """Contacts at and around points in the order of their gaps (3 n n_planes,)."""
+        parts = self._around(points, weighted=True)
+        order = np.arange(3 * len(points) * len(parts)).reshape(len(parts), -1)
+        return Contacts(
+            **{
+                key: np.concatenate([getattr(part, key) for part in parts])[
+                    order.T.ravel()
+                ]
+                for key in Contacts.__dataclass_fields__
+            }
+        )
+
+    def _around(self, points: FlankPoints, *, weighted: bool) -> list[Contacts]:
+        """Contacts in every plane in the order points, arc lengths (3 n,) each."""
+        sector, side = np.repeat(points.sector, 3), np.repeat(points.side, 3)
+        around = STEP * self.length * np.array([-1.0, 0.0, 1.0])
+        return [
+            search.gather(
+                sector,
+                side,
+                (station[:, None] + around).ravel(),
+                flank,
+                weighted=weighted,
+            )
+            for search, flank, station in zip(
+                self.searches, self.flank, points.stations.T, strict=True
+            )
+        ]
 
     def find_ends(self, foot: Array) -> Index:
         """End of the circular spline's flank at which feet are.
@@ -258,7 +267,10 @@ class FlankSurfaces:
             own = np.flatnonzero((keys == key).all(axis=1))
             away = np.abs(plane[own, None] - np.arange(self.planes))
             seeds.stations[own] = contacts.station[own[away.argmin(axis=0)]]
-        return replace(seeds, corner=corner != 0)
+        seeds = replace(seeds, corner=corner != 0)
+        return seeds.chosen(
+            seeds.lowest_in_planes(keys, contacts, LONGEST[0] * self.length)
+        )
 
     def minima(self, seeds: FlankPoints, reach: float) -> FlankPoints:
         """Minima of the gap that descents from given points reach.

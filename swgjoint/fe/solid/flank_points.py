@@ -112,6 +112,24 @@ class FlankPoints:
             np.add.at(loads, np.argmin(apart[near], axis=1), force[near])
         return loads, left
 
+    def lowest_in_planes(self, keys: Index, contacts: Contacts, near: float) -> Index:
+        """Points that are not higher than their neighbours, and these neighbours (m,).
+
+        A descent from any other point would pass one of them. Without the neighbours, a
+        second minimum on a flank that forces have flattened may be missed.
+
+        Args:
+            keys: Rows of integers that are equal on the same flank or corner (n, k).
+            contacts: Contacts in the planes at the points.
+            near: Largest distance along the flank of neighbours [m].
+        """
+        same = (keys[:, None] == keys).all(axis=2)
+        same &= contacts.tooth[:, None] == contacts.tooth
+        same &= np.abs(self.place[:, None] - self.place) == 1.0
+        same &= np.abs(contacts.station[:, None] - contacts.station) < near
+        lowest = ~(same & (contacts.gap < contacts.gap[:, None])).any(axis=1)
+        return np.flatnonzero(lowest | (same & lowest).any(axis=1))
+
     def nearest_in(self, others: FlankPoints, length: float) -> Index:
         """Number of the nearest of ``others`` on the same flank (n,).
 

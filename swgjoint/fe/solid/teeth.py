@@ -142,8 +142,9 @@ class SolidTeeth:
         moved = frame.displacement @ teeth.loaded_from_masters[:flank].T
         moved += force @ teeth.compliance[:, :flank]
         local = strip.flank + moved.reshape(n, planes, size, 3)
-        nodes = np.einsum("sij,spbj->spbi", frame.turn, local)
         turn = frame.turn
+        nodes = local.reshape(n, -1, 3) @ turn.transpose(0, 2, 1)
+        nodes = nodes.reshape(local.shape)
         angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
         flat = rotate(nodes[..., :2], -angle[:, None, None])
         plane_flank = flat - strip.flank[..., :2] + self.crowning.displacement(strip)
@@ -225,7 +226,7 @@ class SolidTeeth:
         spring = np.zeros(len(of))
         spring[n:] = bend[some, way] / loads[some]
         # the contacts in all planes, and their sums
-        contacts, number = gaps.contacts, np.tile(np.arange(planes), 3 * n)
+        contacts, number = surfaces.contacts(points), np.tile(np.arange(planes), 3 * n)
         spline, push, turning, arm, facing_arm = (
             part.reshape(n, 3, planes, *part.shape[1:])[of]
             for part in self._directions(contacts, number, place)
