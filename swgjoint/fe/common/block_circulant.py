@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from swgjoint.kernels import kernels
@@ -46,7 +48,12 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
 
 
 def contact_compliance(
-    offsets: Index, blocks: Array, tooth: Index, weight: Array, teeth: int
+    offsets: Index,
+    blocks: Array,
+    tooth: Index,
+    weight: Array,
+    teeth: int,
+    sides: Sequence[tuple[Index, Array]] = (),
 ) -> Array:
     """Compliance between contact points.
 
@@ -59,6 +66,8 @@ def contact_compliance(
         weight: Derivative of each gap with respect to the flank displacements (n, n_b)
             [-].
         teeth: Number of teeth in the model.
+        sides: Sets of degrees of freedom that no point shares, with their rows of the
+            blocks; a point then takes part of the operations. None for one set.
 
     Returns:
         Compliance matrix (n, n) [m/N].
@@ -82,13 +91,17 @@ def contact_compliance(
         return result
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
-    for offset, block in zip(offsets, blocks, strict=True):
-        if offset < 0:
-            continue  # added as the transpose of the opposite offset
-        pairs = apart == offset % teeth
-        responds = np.flatnonzero(pairs.any(axis=1))
-        added = np.where(pairs[responds], weight[responds] @ block @ weight.T, 0.0)
-        result[responds] += added
-        if offset > 0:
-            result[:, responds] += added.T
+    for rows, part in sides or [(np.arange(blocks.shape[1]), blocks)]:
+        own = weight[:, rows]
+        has = np.asarray(own.any(axis=1), dtype=bool)
+        for offset, block in zip(offsets, part, strict=True):
+            if offset < 0:
+                continue  # added as the transpose of the opposite offset
+            pairs = apart == offset % teeth
+            pairs[~has] = False
+            responds = np.flatnonzero(pairs.any(axis=1))
+            added = np.where(pairs[responds], own[responds] @ block @ weight.T, 0.0)
+            result[responds] += added
+            if offset > 0:
+                result[:, responds] += added.T
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -67,7 +68,17 @@ class ElasticCircularSpline:
                 (n, n_b) [-].
             teeth: Number of teeth of the circular spline in the model.
         """
-        return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
+        return contact_compliance(
+            self.offsets, self.flank, tooth, weight, teeth, self._sides
+        )
+
+    @cached_property
+    def _sides(self) -> list[tuple[Index, Array]]:
+        """Degrees of freedom of the right and of the left flank, with their rows."""
+        size = self.flank.shape[1]
+        dofs = np.arange(size).reshape(len(self.mesh.teeth.z), 2, -1)
+        both = dofs[:, 0].ravel(), dofs[:, 1].ravel()
+        return [(rows, np.ascontiguousarray(self.flank[:, rows])) for rows in both]
 
 
 def condense_circular_spline(
