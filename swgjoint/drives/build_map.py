@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from swgjoint.drives.fidelity import default_model
+from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.layouts import with_layout
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
@@ -26,7 +28,8 @@ def build_map(
     ``ring`` and in 2D for ``2d`` and ``3d``, and hysteresis elements are fitted to
     them; ``info["friction_loop"]`` compares the loops with these elements. With a table
     ``[losses]``, the map has the friction of :mod:`swgjoint.fe.rings.losses` at speed,
-    for all temperatures.
+    for all temperatures. Thin rings, and a 2D model with a bearing, are computed with
+    the circular spline fixed and transformed to the layout of the design.
 
     Args:
         design: The drive.
@@ -57,6 +60,15 @@ def build_map(
         from swgjoint.drives.solve_map import with_losses
 
         return with_losses(design, drive, progress)
+    twin = _fixed_twin(design, model)
+    if twin is not None:
+        drive = build_map(
+            twin, model=model, angles=angles, progress=progress, cache=cache
+        )
+        moved = with_layout(drive, design.drive.layout, ratings_of(design))
+        return moved.with_parts(
+            info={**moved.info, "design_hash": design.content_hash()}
+        )
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     keep = Unfinished.from_parts(parts) if cache else None
@@ -81,6 +93,19 @@ def build_map(
     if keep is not None:
         keep.clear()  # only once the map itself is in the cache
     return drive
+
+
+def _fixed_twin(design: Design, model: str) -> Design | None:
+    """The drive with a fixed circular spline, if only this layout has all its parts.
+
+    The rolling of the balls in thin rings and in 2D is derived for it. None if the
+    layout of the design is computed itself.
+    """
+    fixed = "circular_spline_fixed"
+    bearing = design.wave_generator.bearing
+    if bearing is None or model == "3d" or design.drive.layout == fixed:
+        return None
+    return design.with_changes({"drive.layout": fixed})
 
 
 def _perfect_store(design: Design, angles: int | None) -> Unfinished | None:

@@ -83,13 +83,15 @@ def check_level(design: Design, model: str) -> None:
 
     Raises:
         DesignError: If the level is unknown, or the design lacks what the level
-            needs: a cup in 3D; for thin rings a bearing with a smooth cam and a fixed
-            circular spline.
+            needs: a cup in 3D; a bearing with a smooth cam for thin rings.
     """
     if model == "3d":
         drive3d.check_modelled(design)
     elif model == "ring":
-        thin_ring.check_modelled(design)
+        # the map is transformed from this layout to that of the design
+        thin_ring.check_modelled(
+            design.with_changes({"drive.layout": "circular_spline_fixed"})
+        )
     else:
         drive2d.check_modelled(design, model)
 

@@ -10,11 +10,15 @@ import numpy as np
 import pytest
 from solved import coarse
 
+from swgjoint.drives.build_map import build_map
 from swgjoint.errors import Outcome
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
+from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.layouts import with_layout
 
 TORQUE = 20.0
 LAYOUTS = {
@@ -134,3 +138,30 @@ def test_torque_and_angle_may_change_at_once(layout, failing, monkeypatch):
     # step tolerance of the solver by the radius of the bore: 2e-12 m / 0.058 m
     assert abs(apart) < 4e-11
     assert f.input_torque(at_once) == pytest.approx(f.input_torque(by_steps), rel=1e-6)
+
+
+def test_a_map_transforms_to_other_layouts():
+    """Finite elements with the flexspline fixed agree with the transformed map."""
+    small = {
+        "drive.teeth_flexspline": 40,
+        "drive.teeth_circular_spline": 42,
+        "ratings.rated_torque_Nm": 10.0,
+        "ratings.repeated_peak_Nm": 20.0,
+    }
+    held = coarse(**small)
+    turned = held.with_changes({"drive.layout": "flexspline_fixed"})
+    fixed, solved = (
+        build_map(design, model="2d", angles=8, cache=False)
+        for design in (held, turned)
+    )
+    moved = with_layout(fixed, "flexspline_fixed", ratings_of(turned))
+    theta = 2.0 * pi * np.linspace(0.0, 2.0 / 40.0, 41)
+    for torque in (-15.0, 3.0, 18.0):
+        psi = [output_angle(drive, theta, torque) for drive in (moved, solved)]
+        error = psi[1] - theta / solved.ratio
+        assert np.abs(psi[0] - psi[1]).max() < 0.01 * np.ptp(error)
+        force = [
+            drive.law(theta, at).input_force
+            for drive, at in zip((moved, solved), psi, strict=True)
+        ]
+        assert np.abs(force[0] - force[1]).max() < 0.001 * np.ptp(force[1])

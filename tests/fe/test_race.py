@@ -406,6 +406,11 @@ def test_map_carries_the_bearing():
     label = found.info["label"]
     assert label["bearing"] == "balls at rest on the cam, their passage left out"
     assert label["left_out"] is None and rigid.info["label"]["bearing"] is None
+    # also where another member is fixed, with the stiffness of the same gear
+    other = small(**rated, **{"drive.layout": "flexspline_fixed"})
+    moved = build_map(other, model="2d", angles=8, cache=False)
+    assert moved.max_stiffness == pytest.approx(found.max_stiffness * (42 / 40) ** 2)
+    assert moved.info["label"]["bearing"] == label["bearing"]
 
 
 @pytest.mark.parametrize("clearance_um", [20.0, 120.0])
