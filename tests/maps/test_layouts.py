@@ -98,3 +98,18 @@ def test_fields_belong_to_the_output_torque_of_the_layout(fixed, fields):
     assert other.fields.torque == pytest.approx(-fields.torque[::-1] / s)
     assert (other.fields.displacement == fields.displacement[::-1]).all()
     assert (other.fields.wave_generator == fields.wave_generator).all()
+
+
+def test_yield_torques_and_ranges_scale_with_the_torque(fixed):
+    """Elements yield at the same torsion; ranges swap their ends with the sign."""
+    element = Jenkin(stiffness=2e4, yield_torque=1.0, yield_curve=((60.0, 4.0),))
+    ranges = {"sampled_torque_Nm": [-40.0, 60.0], "torque_range_Nm": [-40.0, 60.0]}
+    drive = replace(fixed, hysteresis=(element,), info=ranges)
+    other = with_layout(drive, "flexspline_fixed", drive.ratings)
+    s = drive.teeth_flexspline / drive.teeth_circular_spline
+    torque = np.linspace(0.0, 80.0, 9)
+    (turned,) = other.hysteresis
+    assert turned.yields(torque / s) == pytest.approx(element.yields(torque) / s)
+    assert turned.reach(torque / s) == pytest.approx(s * element.reach(torque))
+    for key in ranges:
+        assert other.info[key] == pytest.approx([-60.0 / s, 40.0 / s])
