@@ -14,7 +14,15 @@
 namespace swgjoint {
 
 // Kinds of the rows of an outline, see ClosedCurve.rows
-enum class Kind { kEllipse, kSimplified, kArc, kLine, kParabola };
+enum class Kind {
+  kEllipse,
+  kSimplified,
+  kArc,
+  kLine,
+  kParabola,
+  kCosine,
+  kSpline
+};
 
 constexpr std::size_t kColumns = 7;
 

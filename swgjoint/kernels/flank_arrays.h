@@ -29,15 +29,23 @@ inline void require(bool fits, const char* what) {
   if (!fits) throw std::invalid_argument(what);
 }
 
-// Check rows of an outline: one whole outline, or pieces of a chain
+// Check rows of an outline: one whole outline, pieces of a chain, or a spline
 inline void check_outline(const In<2>& rows) {
+  using swgjoint::Kind;
   const std::size_t n = rows.shape(0);
   require(n > 0 && rows.shape(1) == swgjoint::kColumns, "outline: (n, 7)");
-  const auto whole = static_cast<double>(swgjoint::Kind::kSimplified);
-  const auto last = static_cast<double>(swgjoint::Kind::kParabola);
-  for (std::size_t k = 0; k < n; ++k) {
-    const double kind = rows.data()[swgjoint::kColumns * k];
-    require(kind >= 0.0 && kind <= last && (n == 1 || kind > whole), "outline: kind");
+  const auto is_piece = [](double kind) {
+    return kind >= static_cast<double>(Kind::kArc) &&
+           kind <= static_cast<double>(Kind::kParabola);
+  };
+  const double first = rows.data()[0];
+  require(first >= 0.0 && first <= static_cast<double>(Kind::kSpline), "outline: kind");
+  const bool spline = first == static_cast<double>(Kind::kSpline);
+  for (std::size_t k = 1; k < n; ++k) {
+    const double* row = rows.data() + swgjoint::kColumns * k;
+    require(spline ? row[0] == first : is_piece(first) && is_piece(row[0]),
+            "outline: kind");
+    require(!spline || row[1] > row[1 - swgjoint::kColumns], "outline: angles");
   }
 }
 

@@ -142,11 +142,16 @@ Nearest nearest_of_simplified(double major, double radius, Vec point) {
 Outline::Outline(const double* rows, std::size_t n)
     : kind_(static_cast<Kind>(static_cast<int>(rows[0]))), major_(rows[1]),
       minor_(rows[2]) {
-  if (kind_ != Kind::kEllipse && kind_ != Kind::kSimplified) chain_.emplace(rows, n);
+  if (kind_ == Kind::kCosine || kind_ == Kind::kSpline) {
+    radial_.emplace(rows, n);
+  } else if (kind_ != Kind::kEllipse && kind_ != Kind::kSimplified) {
+    chain_.emplace(rows, n);
+  }
 }
 
 Nearest Outline::nearest(Vec point) const {
   if (chain_) return chain_->nearest(point);
+  if (radial_) return radial_->nearest(point);
   return kind_ == Kind::kEllipse ? nearest_of_ellipse(major_, minor_, point)
                                  : nearest_of_simplified(major_, minor_, point);
 }

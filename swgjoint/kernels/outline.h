@@ -1,7 +1,7 @@
 // Distance of points from the outline of a wave generator.
 //
 // Compiled twins of signed_distance in swgjoint/gear/wave_generators/ellipse.py,
-// simplified.py and chain.py, which explain the methods.
+// simplified.py, chain.py and radial.py, which explain the methods.
 
 #ifndef SWGJOINT_KERNELS_OUTLINE_H_
 #define SWGJOINT_KERNELS_OUTLINE_H_
@@ -10,12 +10,13 @@
 #include <optional>
 
 #include "chain.h"
+#include "radial.h"
 #include "vec.h"
 
 namespace swgjoint {
 
-// An ellipse, two semicircles joined by straight lines, or a chain of pieces. The major
-// axis is the y axis.
+// An ellipse, two semicircles joined by straight lines, a chain of pieces, or a radius
+// over the polar angle. The major axis is the y axis.
 class Outline {
  public:
   // rows: (n, kColumns), see ClosedCurve.rows; n > 0
@@ -30,6 +31,7 @@ class Outline {
   double major_;  // semi-major axis
   double minor_;  // semi-minor axis of the ellipse, radius of the semicircles
   std::optional<Chain> chain_;
+  std::optional<Radial> radial_;
 };
 
 // points: (n, 2); result: (n, 4) of distance, normal x, y, curvature at the foot.

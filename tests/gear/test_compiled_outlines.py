@@ -7,9 +7,11 @@ import pytest
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.chain import Chain
+from swgjoint.gear.wave_generators.curve import Kind
 from swgjoint.gear.wave_generators.ellipse import Elliptical
 from swgjoint.gear.wave_generators.parabolic import Side, parabolic
 from swgjoint.gear.wave_generators.pieces import Arc, Line
+from swgjoint.gear.wave_generators.radial import Cosine, TableOutline
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.kernels import kernels
 
@@ -93,6 +95,53 @@ def test_far_inside_all_pieces_are_searched(monkeypatch):
     np.testing.assert_allclose(
         found[0], outline.signed_distance(points)[0], rtol=0.0, atol=1e-15
     )
+
+
+def measured_table(count):
+    """Outline through the radii of an ellipse, rounded to a micrometre."""
+    at = 2.0 * np.pi * np.arange(count) / count
+    radius = 1.0 / np.hypot(np.cos(at) / 0.0311, np.sin(at) / 0.029)
+    return TableOutline((at + 0.02).tolist(), np.round(radius, 6).tolist())
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        measured_table(9),
+        measured_table(72),
+        Cosine(major=0.0311, minor=0.029),
+        Cosine(major=0.0311, minor=0.029, lobes=3),
+        Cosine(major=0.03, minor=0.015),  # concave
+    ],
+    ids=["few radii", "table", "two lobes", "three lobes", "concave"],
+)
+@pytest.mark.parametrize("nearest, farthest", [(0.97, 1.03), (0.01, 3.0)])
+def test_distances_from_radii_are_those_of_numpy(
+    monkeypatch, outline, nearest, farthest
+):
+    """As near as contact is, and from the centre to far outside."""
+    rng = np.random.default_rng(8)
+    at = rng.uniform(-10.0, 10.0, 1500)
+    foot, _, _ = outline.evaluate_at(at)
+    points = foot * rng.uniform(nearest, farthest, at.size)[:, None]
+    found = outline.signed_distance(points)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    wanted = outline.signed_distance(points)
+    np.testing.assert_allclose(found[0], wanted[0], rtol=0.0, atol=2e-16)
+    np.testing.assert_allclose(found[1], wanted[1], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found[2], wanted[2], rtol=0.0, atol=1e-10)
+
+
+def test_outlines_of_no_kind_are_refused():
+    """Two whole outlines, a mixture, angles that fall, and an unknown number."""
+    whole = [[Kind.COSINE, 0.03, 0.02, 2.0, 0.0, 0.0, 0.0]]
+    spline = measured_table(9).rows.tolist()
+    arc = [[Kind.ARC, 0.0, 0.0, 0.01, 0.0, 1.0, 0.0]]
+    for rows in (2 * whole, whole + spline, spline + arc, spline[::-1], [[7.0] * 7]):
+        with pytest.raises(ValueError):
+            kernels().outline_distance(
+                np.zeros((2, 2)), np.array(rows, float), np.zeros((2, 4))
+            )
 
 
 def test_distance_from_a_rounded_square():

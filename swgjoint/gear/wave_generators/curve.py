@@ -19,6 +19,8 @@ class Kind(IntEnum):
     ARC = 2
     LINE = 3
     PARABOLA = 4
+    COSINE = 5
+    SPLINE = 6
 
 
 class ClosedCurve(ABC):
@@ -46,8 +48,10 @@ class ClosedCurve(ABC):
 
         A row starts with its :class:`Kind` and continues with lengths [m], curvatures
         [1/m] and angles [rad]: semi-axes a and b of an ellipse, semi-major axis and
-        radius of the simplified outline, or the fields of a piece of a chain. The rest
-        of the row is zero.
+        radius of the simplified outline, the fields of a piece of a chain, largest and
+        smallest radius and number of lobes of a cosine, or the first angle of an
+        interval of a spline and its coefficients, cubic first. The rest of the row is
+        zero.
         """
         return None
 

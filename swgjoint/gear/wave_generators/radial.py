@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve, Kind
+from swgjoint.kernels import kernels
 from swgjoint.typing import Array
 
 _PANELS = 720  # quadrature panels per turn
@@ -106,6 +107,10 @@ class Radial(ClosedCurve):
         spacings. Far inside the outline, where the distance is not a convex function of
         the angle, the second derivative is kept positive.
         """
+        if (native := kernels()) is not None:
+            found = np.empty((len(points), 4))
+            native.outline_distance(np.ascontiguousarray(points), self.rows, found)
+            return found[:, 0], found[:, 1:3], found[:, 3]
         start, tree = self._nearest
         phi = start[tree.query(points)[1]]
         limit = 4.0 * (start[1] - start[0])
@@ -144,6 +149,13 @@ class Cosine(Radial):
     def folds(self) -> int:
         """Order of rotational symmetry, equal to the number of lobes."""
         return self.lobes
+
+    @cached_property
+    def rows(self) -> Array:
+        """Description for compiled loops; see :attr:`ClosedCurve.rows`."""
+        return np.array(
+            [[Kind.COSINE, self.major, self.minor, self.lobes, 0.0, 0.0, 0.0]]
+        )
 
     def radius(self, phi: Array, derivative: int = 0) -> Array:
         """Radius [m] or its derivative of order n [m/rad^n].
@@ -186,6 +198,14 @@ class TableOutline(Radial):
 
     def _breaks(self) -> Array:
         return np.unique(np.mod(self._knots, 2.0 * np.pi))
+
+    @cached_property
+    def rows(self) -> Array:
+        """Description for compiled loops; see :attr:`ClosedCurve.rows`."""
+        starts = self._knots[:-1]
+        kind, rest = np.full_like(starts, Kind.SPLINE), np.zeros_like(starts)
+        rows = np.column_stack([kind, starts, self._spline.c.T, rest])
+        return np.ascontiguousarray(rows)
 
     @cached_property
     def folds(self) -> int:
