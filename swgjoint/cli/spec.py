@@ -314,6 +314,8 @@ def _source(result: dict[str, Any]) -> str:
         text += f"; {validity['stress_state']}"
     if validity.get("left_out"):
         text += f"; without {validity['left_out'].replace(' and ', ', ')}"
+    if "ripple" in validity:
+        text += f"; ripple {validity['ripple']}"
     if "manufacturing_errors" in validity:
         text += "; without manufacturing errors"
     return text

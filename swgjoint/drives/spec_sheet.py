@@ -227,6 +227,8 @@ def _validity(
         for key in ("stress_state", "left_out"):
             if label.get(key):
                 valid_for[key] = label[key]
+        if label.get("friction"):
+            valid_for["ripple"] = "without friction of the teeth"
     stated = drive.info.get("stated")
     return {
         "validity": valid_for,

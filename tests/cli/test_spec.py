@@ -186,6 +186,23 @@ def test_errors_are_left_out_of_figures_at_a_locked_input(
     assert asked == [False, True]
 
 
+@pytest.mark.parametrize("rubs", [False, True])
+def test_a_sheet_says_that_its_ripple_has_no_friction(
+    capsys, monkeypatch, synthetic_map, rubs
+):
+    """Maps of finite elements carry the friction of the teeth as hysteresis alone."""
+    label = {"model": "2d", "friction": "left out of the potential" if rubs else None}
+    drive = replace(synthetic_map, info={**synthetic_map.info, "label": label})
+    monkeypatch.setattr(builder, "build_map", lambda design, **options: drive)
+    found = spec(capsys, "reference-2d", "--only", "K1_Nm_rad")
+    assert found["validity"].get("ripple") == (
+        "without friction of the teeth" if rubs else None
+    )
+    assert main(["spec", "reference-2d", "--only", "K1_Nm_rad", "--quiet"]) == 0
+    says = "ripple without friction of the teeth" in capsys.readouterr().out
+    assert says == rubs
+
+
 def test_figures_of_the_solid_model(built, solid, capsys):
     """Each alone computes nothing else; details stand beside them."""
     found = spec(capsys, "xb1-100-80", "--only", "radial_stiffness_N_mm")

@@ -63,6 +63,19 @@ def test_a_run_says_that_a_drive_without_friction_loses_nothing():
     assert any(names(line, "friction", "100 %", "catalogue") for line in lines)
 
 
+@pytest.mark.parametrize("level, said", [("full", True), ("native", False)])
+def test_a_run_says_that_its_ripple_has_no_friction_of_the_teeth(bench, level, said):
+    """Maps of finite elements carry it as hysteresis; without ripple, no word of it."""
+    parts = []
+    for friction in ("left out of the potential", None):
+        label = {"model": "2d", "friction": friction}
+        drive = replace(LINEAR, info={**LINEAR.info, "label": label})
+        run = bench(drive, defaults__level=level, simulation__duration_s=0.1)
+        parts.append([item["part"] for item in run.contains["left_out"]])
+    part = "effect of the friction of the teeth on the ripple"
+    assert [part in some for some in parts] == [said, False]
+
+
 def test_the_link_feels_the_friction_of_the_flexspline(bench):
     """Recorded output torque is the load: elastic part and friction on the link."""
     run = bench(RUBBING, defaults__friction=True, simulation__duration_s=3.0)

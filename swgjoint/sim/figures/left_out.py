@@ -44,6 +44,10 @@ def parts_left_out(transmission: Transmission) -> list[dict[str, str]]:
     if isinstance(label, dict) and (parts := label.get("left_out")):
         reason = f"not in maps of the model {label.get('model')}"
         items.append({"part": str(parts), "reason": reason})
+    if isinstance(label, dict) and label.get("friction") and attached.level == "full":
+        part = "effect of the friction of the teeth on the ripple"
+        reason = "maps carry it as hysteresis, which is the same at all input angles"
+        items.append({"part": part, "reason": reason})
     lossless = f"not at level {attached.level}; use level native or full"
     if attached.drive.hysteresis and attached.level not in LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
