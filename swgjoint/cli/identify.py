@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def result_of(identified: Identified) -> dict[str, Any]:
     """Convert an identification to the JSON object of the command, without files."""
-    from swgjoint.identify.identification import rms
+    from swgjoint.identify.least_squares import rms
 
     measured = identified.model.measured_torques()
     drive = identified.drive

@@ -16,7 +16,7 @@ from swgjoint.identify.unknowns import SPRINGS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.loop_units import TORSION_AT_RATED
 from swgjoint.typing import Array
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, deg
 
 if TYPE_CHECKING:
     from swgjoint.identify.identification import Estimate
@@ -47,6 +47,24 @@ POSITIVE = (
     "rotor_inertia",
 )
 """Parameters that are never negative in a real drive."""
+STIFFNESS = ("K1", "K2", "K3", "stiffness")
+"""Parameters without which the map has no stiffness."""
+SMALL = 0.01
+"""Effect on each torque, relative to its rms, below which a negative parameter is a
+note instead of a doubt [-].
+
+Encoder noise delays the hysteresis element, which the fit balances by negative damping
+of 0.05 to 0.2 % of the torque on simulated benches.
+"""
+OVERLOAD = 20.0
+"""Largest torque of a log relative to the rated torque [-]; the ratcheting torque of
+catalogue drives is at most 16 times the rated torque (``models/catalogue``)."""
+TORQUE_OFF = 10.0
+"""Factor between the two torques of a log, beyond the ratio, that is a mistake [-]."""
+OWN_PART = 0.05
+"""Part of the output torque that motion must not explain in order to check it [-]."""
+JUMP = 10.0
+"""Step of an angle relative to its median step that is a jump [-]."""
 
 PHASE_STEP = 1.0
 """Phase change of a harmonic per window above which a note is added [rad].
@@ -98,6 +116,65 @@ def check_ratio(log: BenchLog, layout: str, teeth: tuple[int, int]) -> None:
     )
 
 
+def check_angles(log: BenchLog) -> None:
+    """Reject angles that jump, as those of an encoder that restarts at every turn.
+
+    Raises:
+        InputError: If an angle changes by more than half a turn from one sample to the
+            next, and by far less between most samples.
+    """
+    for name in ("motor_angle", "link_angle"):
+        steps = np.abs(np.diff(getattr(log, name)))
+        at = int(steps.argmax()) if steps.size else 0
+        if steps.size and steps[at] > max(np.pi, JUMP * float(np.median(steps))):
+            raise InputError(
+                f"{log.where}: {name} jumps by {steps[at] / deg:.4g} deg at"
+                f" {log.time[at + 1]:g} s; accepted: angles that continue beyond a turn"
+            )
+
+
+def check_torques(model: Model, where: str) -> None:
+    """Reject two torques whose signs or units contradict each other.
+
+    The motor torque is a sum of the output torque over the ratio, inertia, friction and
+    an offset. A least-squares fit of this sum gives the factor of the output torque. It
+    is checked only if motion does not explain the output torque.
+
+    Args:
+        model: Model of the log.
+        where: Name of the log in messages.
+
+    Raises:
+        InputError: If the factor times the ratio is not between 1/10 and 10.
+    """
+    samples, i = model.samples, model.ratio
+    if samples.output_torque is None or samples.motor_torque is None:
+        return
+    motion = np.column_stack(
+        [
+            model.motor_acceleration,
+            model.relative_rate,
+            model.slipping,
+            np.ones(len(samples.time)),
+        ]
+    )
+    motion /= np.maximum(np.abs(motion).max(axis=0), 1e-300)
+    torques = np.column_stack([samples.output_torque, samples.motor_torque])
+    rest = torques - motion @ np.linalg.lstsq(motion, torques, rcond=None)[0]
+    power = float(rest[:, 0] @ rest[:, 0])
+    if power <= OWN_PART**2 * float(torques[:, 0] @ torques[:, 0]):
+        return
+    factor = float(rest[:, 0] @ rest[:, 1]) / power
+    if 1.0 / TORQUE_OFF < factor * i < TORQUE_OFF:
+        return
+    raise InputError(
+        f"{where}: motor_torque changes by {factor:.3g} N·m per N·m of output_torque;"
+        f" {model.layout} with {model.teeth[0]}/{model.teeth[1]} teeth has {1 / i:.3g}"
+        f" without losses; accepted: torques in N·m with the signs of the drive,"
+        f" {1 / TORQUE_OFF:g} to {TORQUE_OFF:g} times this factor"
+    )
+
+
 def without_skew(log: BenchLog, skew: float) -> BenchLog:
     """The log with its link angles corrected for their delay.
 
@@ -129,23 +206,47 @@ def without_skew(log: BenchLog, skew: float) -> BenchLog:
 
 
 def doubts_of(
-    estimates: Mapping[str, Estimate], left: Mapping[str, float], window: float
+    estimates: Mapping[str, Estimate],
+    left: Mapping[str, float],
+    effects: Mapping[str, float],
+    model: Model,
 ) -> list[str]:
     """Doubts about implausible parameters and poorly modelled torques, one line each.
 
     Args:
         estimates: Estimates of all parameters by name.
         left: Residual of each torque relative to its rms [-].
-        window: Duration of an averaging window [s].
+        effects: Effect of each parameter on the torques, relative to their rms [-].
+        model: The fitted model.
     """
-    lines = []
-    for name in POSITIVE:
+    window, rated = model.step, model.ratings.rated_torque
+    lines = [line for line, effect in negative(estimates, effects) if effect > SMALL]
+    lines += [
+        f"{name}: the residual of the model is {share:.1%} of its rms; plausible: at"
+        f" most {SHARE_LEFT:.0%}"
+        for name, share in left.items()
+        if share > SHARE_LEFT
+    ]
+    if lines:
+        lines[-1] += (
+            "; check the clocks of the channels, their noise and signs, the teeth, and"
+            " orders and corners of the model"
+        )
+    for name in STIFFNESS:
         e = estimates.get(name)
-        if e is not None and e.value + SURE * e.deviation < 0.0:
+        if e is not None and e.low <= 0.0:
             lines.append(
-                f"{name} {e.value:.3g} {e.unit} ({e.low:.3g} to {e.high:.3g}) is"
-                " negative"
+                f"the log does not determine {name}: {e.value:.3g} {e.unit}"
+                f" ({e.low:.3g} to {e.high:.3g}); check the unit of the torque, the"
+                " rated torque and the corners"
             )
+    if model.largest_torque > OVERLOAD * rated:
+        lines.append(
+            f"the largest torque of the log at the output, {model.largest_torque:.4g}"
+            f" N·m, is {model.largest_torque / rated:.3g} times the rated {rated:g}"
+            f" N·m; plausible: at most {OVERLOAD:g} times, as catalogue drives ratchet"
+            " below that; check the unit of the torques and the rated torque"
+        )
     first, last = estimates.get("K1"), estimates.get("K3")
     if first is not None and last is not None:
         apart = SURE * np.hypot(first.deviation, last.deviation)
@@ -154,20 +255,33 @@ def doubts_of(
                 f"K1 {first.value:.4g} N·m/rad is above K3 {last.value:.4g} N·m/rad:"
                 " drives stiffen under load"
             )
-    for name, share in left.items():
-        if share > SHARE_LEFT:
-            lines.append(
-                f"{name}: the residual of the model is {share:.1%} of its rms;"
-                f" plausible: at most {SHARE_LEFT:.0%}"
-            )
-    if lines:
-        lines[-1] += "; check the clocks of the channels, their signs and the teeth"
     skew = estimates.get("link_skew")
     if skew is not None and abs(skew.value) > window:
         lines.append(
             f"link_angle is {1e3 * skew.value:.3g} ms behind motor_angle, more than the"
             f" window of {1e3 * window:g} ms"
         )
+    return lines
+
+
+def negative(
+    estimates: Mapping[str, Estimate], effects: Mapping[str, float]
+) -> list[tuple[str, float]]:
+    """A line for each parameter that is negative but must not be, and its effect.
+
+    Args:
+        estimates: Estimates of all parameters by name.
+        effects: Effect of each parameter on the torques, relative to their rms [-].
+    """
+    lines = []
+    for name in POSITIVE:
+        e = estimates.get(name)
+        if e is not None and e.value + SURE * e.deviation < 0.0:
+            line = (
+                f"{name} {e.value:.3g} {e.unit} ({e.low:.3g} to {e.high:.3g}) is"
+                f" negative; its effect is {100 * effects[name]:.2g} % of the torque"
+            )
+            lines.append((line, effects[name]))
     return lines
 
 

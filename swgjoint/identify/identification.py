@@ -47,11 +47,29 @@ from pathlib import Path
 
 import numpy as np
 
-from swgjoint.errors import ComputationError, InputError
-from swgjoint.gear.kinematics import LAYOUTS
+from swgjoint.errors import InputError
+from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients
 from swgjoint.gear.ratings import Ratings
-from swgjoint.identify.checks import SURE, check_ratio, doubts_of, remarks, without_skew
+from swgjoint.identify.checks import (
+    SMALL,
+    SURE,
+    check_angles,
+    check_ratio,
+    check_torques,
+    doubts_of,
+    negative,
+    remarks,
+    without_skew,
+)
 from swgjoint.identify.identified_map import map_of
+from swgjoint.identify.least_squares import (
+    correlation_factor,
+    covariance_of,
+    effects_of,
+    least_determined,
+    rms,
+    solve,
+)
 from swgjoint.identify.log import FEWEST, Averaged, BenchLog
 from swgjoint.identify.model import Model
 from swgjoint.maps.drive_map import DriveMap
@@ -66,9 +84,6 @@ ORDERS_OF_PART: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0))
 DEVIATIONS = 1.96
 """Half width of an interval in standard deviations: 95 % of a normal distribution."""
 _TURN = 0.95  # fraction of an output turn that counts as a whole turn
-_ROUNDS = 2  # fits, each with updated weights
-_CORRELATED = 200  # largest lag of the autocorrelation [samples]
-_SINGULAR = 1e-10  # smallest reciprocal condition number of D'D
 _SKEW_LEAST = 1e-6  # delay that has no effect on the torques [s]
 
 
@@ -105,6 +120,8 @@ class Identified:
     model: Model
     residuals: Mapping[str, Array]
     """Measured minus modelled torque of each channel [N·m]. Shape (n,)."""
+    effects: Mapping[str, float]
+    """Effect of each parameter on the torques, relative to their rms [-]."""
     correlation: float
     """Correlation factor kappa of the covariance [-]."""
     skew: float = 0.0
@@ -182,6 +199,7 @@ def identify(
     if rotor_inertia is not None and not 0.0 < rotor_inertia < np.inf:
         raise InputError(f"rotor inertia {rotor_inertia:g} kg·m²; accepted: > 0 kg·m²")
     teeth = (teeth_flexspline, teeth_circular_spline)
+    check_angles(log)
     check_ratio(log, layout, teeth)
     options = _Options(
         teeth=teeth,
@@ -226,43 +244,62 @@ def _doubts_of(
     measured = result.model.measured_torques()
     left = {key: rms(r) / rms(measured[key]) for key, r in result.residuals.items()}
     units = [note for note in result.notes if "plausible: " in note]
-    return (*doubts_of(estimates, left, result.model.step), *units)
+    return (*doubts_of(estimates, left, result.effects, result.model), *units)
 
 
 def _identified(log: BenchLog, options: _Options) -> Identified:
     """Identify the parameters from a log without correcting its delay."""
     samples = log.average(options.window)
-    model = _model_of(log, samples, options)
-    values, residuals, jacobian = _solve(model)
-    kappa = max(_correlation(r) for r in residuals.values())
+    model, no_orders = _model_of(log, samples, options)
+    values, residuals, jacobian = solve(model)
+    kappa = max(correlation_factor(r) for r in residuals.values())
     information = jacobian.T @ jacobian
-    undetermined = _undetermined(model, information)
+    undetermined = least_determined(model, information)
     if undetermined is not None:
         return _without(undetermined, log, options)
-    estimates = _estimates(model, values, _covariance(information, kappa))
+    estimates = _estimates(model, values, covariance_of(information, kappa))
     element = estimates.get("hysteresis_yield_torque")
     if element is not None and element.low <= 0.0:
         why = f"its yield torque, {element.value:.3g} N·m, is within its uncertainty"
         return _without_element(why, log, options)
     drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
+    effects = effects_of(model, values, residuals, jacobian)
+    small = [line for line, size in negative(estimates, effects) if size <= SMALL]
     result = Identified(
         estimates=estimates,
         drive=drive,
         samples=samples,
         model=model,
         residuals=residuals,
+        effects=effects,
         correlation=kappa,
-        notes=(*notes, *remarks(model, drive, residuals)),
+        notes=(*notes, *no_orders, *small, *remarks(model, drive, residuals)),
     )
     return replace(result, doubts=_doubts_of(result, estimates))
 
 
-def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
-    """The model of the log; rejects repeated orders and too few slipping samples."""
-    orders = options.orders
+def _model_of(
+    log: BenchLog, samples: Averaged, options: _Options
+) -> tuple[Model, list[str]]:
+    """The model of the log, and a note if the log is too short for orders.
+
+    Raises:
+        InputError: If orders repeat, if torques contradict each other, or if too few
+            samples slip.
+    """
+    orders, notes = options.orders, []
     if orders is None:
         whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
         orders = ORDERS if whole_turn else ORDERS_OF_PART
+        alpha = angle_coefficients(options.layout)[0]
+        turns = np.ptp(alpha[0] * samples.motor_angle + alpha[1] * samples.link_angle)
+        if turns < _TURN * 2.0 * np.pi:
+            orders = ()
+            notes.append(
+                "no kinematic error: the wave generator turns by"
+                f" {turns / (2.0 * np.pi):.2g} turns relative to the circular spline;"
+                f" accepted: at least {_TURN:g} turns, or the orders stated by --orders"
+            )
     if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
         shown = ", ".join(f"{p}:{q}" for p, q in orders)
         raise InputError(f"orders {shown}; accepted: each order once, and not 0:0")
@@ -285,26 +322,8 @@ def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
             f" {model.kept.size} averages; accepted: at least {FEWEST}, or a log"
             " without motor_torque_Nm"
         )
-    return model
-
-
-def _undetermined(model: Model, information: Array) -> str | None:
-    """Name of the least determined parameter; None if all are determined."""
-    names = [p.name for p in model.unknowns]
-    scale = np.sqrt(np.diag(information))
-    if not scale.all():
-        return names[int(np.argmin(scale))]
-    normal = information / np.outer(scale, scale)
-    if np.linalg.cond(normal) > 1.0 / _SINGULAR:
-        return names[int(np.abs(np.linalg.eigh(normal)[1][:, 0]).argmax())]
-    return None
-
-
-def _covariance(information: Array, kappa: float) -> Array:
-    """Covariance of the parameters, in their units."""
-    scale = np.sqrt(np.diag(information))
-    normal = information / np.outer(scale, scale)
-    return np.asarray(kappa * np.linalg.inv(normal) / np.outer(scale, scale))
+    check_torques(model, log.where)
+    return model, notes
 
 
 def _estimates(model: Model, values: Array, covariance: Array) -> dict[str, Estimate]:
@@ -332,68 +351,3 @@ def _without_element(why: str, log: BenchLog, options: _Options) -> Identified:
     """The result of a model without a Jenkin element, with a note that says why."""
     result = _identified(log, replace(options, hysteresis=False))
     return replace(result, notes=(*result.notes, f"no hysteresis: {why}"))
-
-
-def rms(x: Array) -> float:
-    """Root mean square including the mean."""
-    return float(np.sqrt(np.mean(x**2)))
-
-
-def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
-    """Parameter values, residuals by channel, and the weighted Jacobian."""
-    from scipy.optimize import least_squares
-
-    unknowns = model.unknowns
-    values = np.array([p.start for p in unknowns])
-    scale = np.array([p.scale for p in unknowns])
-    bounds = (np.array([p.least for p in unknowns]), np.inf)
-    measured = model.measured_torques()
-    weight = {key: 1.0 / max(rms(x), 1e-12) for key, x in measured.items()}
-
-    def residual(x: Array, weight: Mapping[str, float]) -> Array:
-        got = model.torques(x)
-        return np.concatenate(
-            [(got[key] - measured[key]) * w for key, w in weight.items()]
-        )
-
-    for _ in range(_ROUNDS):
-        solution = least_squares(
-            residual,
-            values,
-            bounds=bounds,
-            x_scale=scale,
-            max_nfev=60,
-            args=(weight,),
-        )
-        if not np.isfinite(solution.x).all():
-            raise ComputationError(
-                "identification diverged: check that torques and angles of the log"
-                " have the signs of the drive"
-            )
-        values = solution.x
-        got = model.torques(values)
-        off = {key: measured[key] - got[key] for key in measured}
-        # weight by each channel's own residual; a perfect log has none
-        weight = {
-            key: 1.0 / max(rms(r), 1e-9 * rms(measured[key]), 1e-12)
-            for key, r in off.items()
-        }
-    # rescale the Jacobian to the final weights for the covariance
-    rows = [len(r) for r in off.values()]
-    old = np.sqrt([np.mean(r**2) for r in np.split(solution.fun, rows[:-1])])
-    jacobian = solution.jac / np.repeat(np.maximum(old, 1e-9), rows)[:, None]
-    return values, off, np.asarray(jacobian)
-
-
-def _correlation(residual: Array) -> float:
-    """Factor kappa; the sum ends where the autocorrelation disappears in noise."""
-    x = residual - residual.mean()
-    n = len(x)
-    power = float(x @ x)
-    total = 1.0
-    for k in range(1, min(_CORRELATED, n // 4)):
-        rho = float(x[k:] @ x[:-k]) / power if power else 0.0
-        if rho < 2.0 / np.sqrt(n):
-            break
-        total += 2.0 * rho
-    return total

@@ -152,8 +152,10 @@ class Model:
         late = _line_skew(torsion, torque, link_rate) if skew else 0.0
         slope = float(np.polyfit(torsion - late * link_rate, torque, 1)[0])
         if not slope > 0.0:
+            channel = "motor" if samples.output_torque is None else "output"
             raise InputError(
-                f"torque decreases by {-slope:.3g} N·m/rad with increasing torsion"
+                f"{log.where}: the {channel} torque falls by {-slope:.3g} N·m/rad, at"
+                " the output, with increasing torsion"
                 f" theta/i - psi, i = {i:g}; accepted: a log whose torques and angles"
                 " have the signs of the drive; check its layout and teeth"
             )

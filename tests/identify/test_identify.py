@@ -15,7 +15,8 @@ from scipy.signal import lfilter
 from swgjoint.cli.identify import result_of
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.identify.identification import _correlation, identify, rms
+from swgjoint.identify.identification import identify
+from swgjoint.identify.least_squares import correlation_factor, rms
 from swgjoint.identify.log import BenchLog, mean_acceleration, mean_rate, read_log
 from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
@@ -163,9 +164,9 @@ def test_log_with_noise_gives_all_parameters(bench):
 def test_residuals_that_are_alike_widen_the_intervals():
     """Of x_k = a x_(k-1) + noise the factor is (1 + a)/(1 - a); 1 of white noise."""
     noise = np.random.default_rng(1).normal(size=40_000)
-    assert _correlation(noise) == pytest.approx(1.0, abs=0.05)
+    assert correlation_factor(noise) == pytest.approx(1.0, abs=0.05)
     alike = lfilter([1.0], [1.0, -0.6], noise)
-    assert _correlation(alike) == pytest.approx(4.0, rel=0.1)
+    assert correlation_factor(alike) == pytest.approx(4.0, rel=0.1)
 
 
 @pytest.mark.slow
