@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.equilibrium import output_angle, stays_free
 from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array, Index
 
@@ -289,6 +289,9 @@ class IdealMotion:
         for _ in range(_NEWTON):
             exerted, stiffness, there = self.torque(shift, there)
             missing = exerted - torque
+            if torque == 0.0:
+                free = stays_free(drive, exerted, stiffness)
+                missing = np.where(free, 0.0, missing)
             soft = np.where(stiffness > 0.0, stiffness, np.nan)
             step = np.where(missing == 0.0, 0.0, missing / soft)
             if not (np.abs(step) > settled).any():

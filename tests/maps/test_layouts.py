@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.fit.hysteresis_loops import played_loop
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.layouts import with_layout
+from swgjoint.maps.sheet.turn import error_turn
 
 
 @pytest.fixture
@@ -113,3 +116,35 @@ def test_yield_torques_and_ranges_scale_with_the_torque(fixed):
     assert turned.reach(torque / s) == pytest.approx(s * element.reach(torque))
     for key in ranges:
         assert other.info[key] == pytest.approx([-60.0 / s, 40.0 / s])
+
+
+@pytest.mark.parametrize("layout", ["flexspline_fixed", "wave_generator_fixed"])
+def test_an_unloaded_output_stays_in_the_middle_of_its_clearance(layout):
+    """Harmonics of the energy do not move it through the clearance in other layouts.
+
+    They act on the output there, by 2e-6 of the rated torque. The transmission accuracy
+    of a drive of 60 and 62 teeth was 1.29 arcmin, and 0.009 with the other layout.
+    """
+    mean = DriveMap.from_numbers(
+        stiffness=7e4, rated_torque=87.0, ratio=30, lost_motion_arcmin=1.0
+    )
+    assert mean.teeth_flexspline == 60
+    potential = np.zeros((2, *mean.potential.shape[1:]))
+    potential[0] = mean.potential[0]
+    potential[1, 0, :, 0] = 2e-6 * 87.0 / 26
+    fixed = replace(
+        mean,
+        orders=np.array([(0, 0), (26, 0)]),
+        potential=potential,
+        end_stiffness=np.concatenate([mean.end_stiffness, np.zeros((1, 2, 2))]),
+        kinematic_error=np.array([(0.0, 0.0), (1e-6, 0.0)]),
+    )
+    assert fixed.mean_torsion(0.1) > 1e-4  # the clearance
+    other = with_layout(fixed, layout, fixed.ratings)
+    s = 60 / 62
+    width = error_turn(fixed).peak_to_peak()
+    assert width == pytest.approx(2e-6, rel=1e-3)
+    assert error_turn(other).peak_to_peak() == pytest.approx(s * width, rel=1e-2)
+    theta = np.linspace(0.0, 9.0, 60)
+    error = output_angle(other, theta, 0.0) - theta / other.ratio
+    assert np.abs(error).max() < 1.01e-6
