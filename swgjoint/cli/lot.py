@@ -164,6 +164,7 @@ def report(result: dict[str, Any]) -> str:
     lines.append(
         f"superposition of errors: the first drive differs by {error} from full solves"
     )
+    lines += _conditions(result)
     if result["yield"] is not None:
         yields = result["yield"]
         lines.append(
@@ -175,6 +176,25 @@ def report(result: dict[str, Any]) -> str:
         ]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join([*lines, f"{result['wall_s']:.0f} s"])
+
+
+def _conditions(result: dict[str, Any]) -> list[str]:
+    """State under which conditions the figures apply, and what the model leaves out."""
+    validity = result["validity"]
+    lines = [
+        "transmission accuracy: peak to peak of the kinematic error over one output"
+        " turn, without torque"
+    ]
+    if "ripple_rms_percent" in result["figures"]:
+        lines.append(
+            f"ripple and stiffness: at the rated torque of {validity['torque_Nm']:g}"
+            " N·m; ripple of the output torque in % of it, with both shafts turning at"
+            " a constant ratio: in an arm the output gives way, and swgjoint run"
+            " computes the ripple that is left"
+        )
+    if validity["left_out"]:
+        lines.append(f"level {validity['level']}, without {validity['left_out']}")
+    return lines
 
 
 def _share(yields: dict[str, Any]) -> str:

@@ -196,6 +196,8 @@ def _command(name: str, arguments: list[str]) -> int:
         prefix = f"{exc.filename}: " if exc.filename else ""
         return _refuse(name, f"{prefix}{exc.strerror or exc}", FAILED)
     except Exception as exc:
+        if isinstance(exc.__cause__, KeyboardInterrupt):  # while a module was imported
+            raise exc.__cause__ from None
         if out_of_memory(exc):
             return _refuse(name, "out of memory: use a smaller refinement", FAILED)
         # a bug in swgjoint: print one line, which tells how to report it

@@ -9,6 +9,7 @@ import pytest
 from messages import names
 from solved import few_teeth
 
+from swgjoint.cli.lot import report
 from swgjoint.cli.main import main
 
 
@@ -24,6 +25,11 @@ def test_lot_writes_rows_and_picture(tmp_path, capsys):
     arguments += ["--spec", str(spec), "--out", str(out), "--json"]
     assert main(arguments) == 0
     found = json.loads(capsys.readouterr().out)
+    text = report(found)
+    assert names(text, "output turn", "rated torque of 20 N·m", "swgjoint run")
+    assert "without micro_geometry" not in text
+    found["validity"]["left_out"] = "micro_geometry"
+    assert "level 2d, errors superposed, without micro_geometry" in report(found)
     assert found["yield"]["part"] == 1.0
     assert sorted(path.name for path in out.iterdir()) == [
         "lot.csv",

@@ -362,6 +362,17 @@ def test_interrupt(command, capsys):
     assert capsys.readouterr().err == "swgjoint: interrupted\n"
 
 
+def test_interrupt_of_an_import(command, capsys):
+    """Compiled modules turn Ctrl-C while they load into an ImportError."""
+
+    def work(args):
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    command(work)
+    assert main(["doctor"]) == 130
+    assert capsys.readouterr().err == "swgjoint: interrupted\n"
+
+
 def test_reader_that_leaves():
     """A closed pipe is no error message."""
     reader, writer = os.pipe()

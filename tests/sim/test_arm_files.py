@@ -481,6 +481,14 @@ def test_a_template_is_named(tmp_path, capsys):
     file.write_text("<robot/>")
     assert main(["run", str(file)]) == 2
     assert names(capsys.readouterr().err, "'xacro arm.urdf.xacro'", "URDF", ".urdf")
+    plain = tmp_path / "arm.urdf"
+    plain.write_text(
+        '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l"/>'
+        '<joint name="j" type="revolute"><parent link="l"/><child link="m"/>'
+        '<origin xyz="0 0 ${r}"/></joint><link name="m"/></robot>'
+    )
+    assert main(["run", str(plain)]) == 2
+    assert names(capsys.readouterr().err, "arm.urdf", "xyz", "template", "'xacro")
 
 
 def test_a_scene_names_a_urdf_beside_it(tmp_path, monkeypatch):

@@ -74,6 +74,8 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
         return spec
     except (ValueError, OSError) as exc:
         line = " ".join(str(exc).split())
+        if path.is_file() and b"xacro" in path.read_bytes():
+            line += f"; it is a URDF template; accepted: the output of 'xacro {path}'"
         raise InputError(f"{path}: cannot be read as MJCF or URDF: {line}") from None
 
 
