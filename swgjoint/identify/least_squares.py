@@ -21,7 +21,11 @@ def rms(x: Array) -> float:
 
 
 def solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
-    """Parameter values, residuals by channel, and the weighted Jacobian."""
+    """Parameter values, residuals by channel, and the weighted Jacobian.
+
+    Raises:
+        ComputationError: If the least-squares fit diverges.
+    """
     from scipy.optimize import least_squares
 
     unknowns = model.unknowns
@@ -85,7 +89,11 @@ def effects_of(
 ) -> dict[str, float]:
     """Effect of each parameter on the torques, relative to their rms [-].
 
-    The rows of the Jacobian are relative to the residual of their channel.
+    Args:
+        model: The fitted model.
+        values: Its parameters.
+        residuals: Residual of each channel [N·m].
+        jacobian: Weighted Jacobian; the rows of a channel are relative to its residual.
     """
     measured = model.measured_torques()
     left = np.array([rms(r) / rms(measured[key]) for key, r in residuals.items()])
@@ -98,7 +106,12 @@ def effects_of(
 
 
 def least_determined(model: Model, information: Array) -> str | None:
-    """Name of the least determined parameter; None if all are determined."""
+    """Name of the least determined parameter; None if all are determined.
+
+    Args:
+        model: The fitted model.
+        information: Product of the weighted Jacobian and its transpose.
+    """
     names = [p.name for p in model.unknowns]
     scale = np.sqrt(np.diag(information))
     if not scale.all():
@@ -110,7 +123,12 @@ def least_determined(model: Model, information: Array) -> str | None:
 
 
 def covariance_of(information: Array, kappa: float) -> Array:
-    """Covariance of the parameters, in their units."""
+    """Covariance of the parameters, in their units.
+
+    Args:
+        information: Product of the weighted Jacobian and its transpose.
+        kappa: Factor of correlated residuals [-].
+    """
     scale = np.sqrt(np.diag(information))
     normal = information / np.outer(scale, scale)
     return np.asarray(kappa * np.linalg.inv(normal) / np.outer(scale, scale))
