@@ -27,7 +27,6 @@ from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import ThinRingState
 from swgjoint.typing import Array
 
-
 LEAST = 1e-9
 """Least force per opening of a loaded contact, relative to its stiffness [-]."""
 
@@ -74,7 +73,8 @@ def tooth_influence(model: ThinRing, state: ThinRingState, reach: float) -> Infl
     matrix = sign[:, None] * by_force * scale + np.diag(np.where(closed, k, 1.0 / k))
     # a contact that carries the torque alone has the force of statics at any opening:
     # its entry is zero but for the turning of its flank, which can make it negative
-    np.fill_diagonal(matrix, np.maximum(np.diag(matrix), np.where(closed, LEAST * k, 0)))
+    least = np.where(closed, LEAST * k, 0.0)
+    np.fill_diagonal(matrix, np.maximum(np.diag(matrix), least))
     by_gap = -sign[:, None] * by_force * np.where(closed, k, 0.0) + np.diag(sign)
     return Influence(
         sector=contacts.sector,
