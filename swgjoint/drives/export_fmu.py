@@ -6,9 +6,10 @@ import hashlib
 import io
 import platform
 import sys
+import warnings
 import zipfile
 from dataclasses import dataclass
-from math import sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 from swgjoint.drives.attach import DriveSource
@@ -31,6 +32,9 @@ STEP = 1e-3
 """Default of the largest internal step of co-simulation [s]."""
 SHORTEST_STEP = 1e-7
 """Shortest internal step that the FMU accepts [s]."""
+STEPS_PER_PERIOD = 5
+"""Internal steps per period of the torsional vibration below which a warning is given.
+"""
 LARGEST = 1e10
 """Largest parameter that the FMU accepts, in SI units."""
 DEVIATIONS = (
@@ -116,6 +120,9 @@ def export_fmu(
         InputError: If the drive or a value cannot be used, or the file cannot be
             written.
         ComputationError: If the library is not built.
+
+    Warns:
+        UserWarning: If the step does not resolve the torsional vibration.
     """
     path = check_output_file(path, ".fmu")
     if version not in VERSIONS:
@@ -149,6 +156,15 @@ def export_fmu(
     reflected = source.ratio**2 * rotor
     reduced = reflected * load / (reflected + load)
     damping = 2.0 * source.damping_ratio * sqrt(source.mean_stiffness * reduced)
+    frequency = sqrt(source.mean_stiffness / reduced) / (2.0 * pi)
+    if step * frequency * STEPS_PER_PERIOD > 1.0:
+        warnings.warn(
+            f"step {step:g} s: internal steps of this length do not resolve the"
+            f" torsional vibration between rotor and load at {frequency:.4g} Hz in"
+            " co-simulation; recommended: at most"
+            f" {1.0 / (STEPS_PER_PERIOD * frequency):.2g} s (--step)",
+            stacklevel=2,
+        )
     variables = (
         *fixed_variables(source.ratio),
         *_parameters(source, rotor, load, damping, step),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import warnings
 import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fmi3 import Fmu
-from messages import naming
+from messages import names, naming
 
 import swgjoint
 from swgjoint.errors import InputError
@@ -364,3 +365,21 @@ def test_fmpy_runs_both_kinds_of_both_versions(fmpy, synthetic_map, tmp_path):
     one, other = found["3.0", "CoSimulation"], found["3.0", "ModelExchange"]
     size = np.abs(other).max(axis=0)
     assert (np.abs(one - other).max(axis=0) < 2e-3 * size).all()
+
+
+@pytest.mark.parametrize(("step", "said"), [(3e-3, False), (4e-3, True), (1.0, True)])
+def test_a_step_beyond_the_vibration_is_named(tmp_path, step, said):
+    """CSG-25-100 vibrates at 54 Hz: five steps per period are 3.7 ms.
+
+    With a step of 1 s and a communication step of 0.1 s, the output turned by 0.0003
+    rad in the first 0.1 s instead of -0.045 rad.
+    """
+    path = tmp_path / "drive.fmu"
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        swgjoint.export_fmu("CSG-25-100", path, step=step)
+    assert path.exists()
+    lines = [str(one.message) for one in found]
+    assert [
+        names(line, f"step {step:g} s", "54.21 Hz", "0.0037 s") for line in lines
+    ] == ([True] if said else [])
