@@ -364,12 +364,14 @@ def ratings_of(
     if not 0.0 < T1 < T2 < np.inf:
         raise InputError(f"corners {T1:g} and {T2:g} N·m; accepted: 0 < T1 < T2")
     peak = max(rated, largest)
+    peaks = f"peaks from the log to {largest:g} N·m"
     return Ratings(
         rated_torque=rated,
         repeated_peak=peak,
         momentary_peak=peak,
         T1=T1,
         T2=T2,
-        source=f"rated torque given; peaks from the log to {largest:g} N·m; T1, T2"
-        f" {'given' if corners else 'are 0.2 and 0.6 of rated'}",
+        source=f"default (repeated_peak_Nm, momentary_peak_Nm): {peaks}"
+        if corners
+        else f"rated torque given; {peaks}; T1, T2 are 0.2 and 0.6 of rated",
     )

@@ -9,6 +9,7 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
+from swgjoint.gear.ratings import rule_of
 from swgjoint.identify.identification import identify
 from swgjoint.identify.log import BenchLog
 from swgjoint.maps.hysteresis import stretches
@@ -65,6 +66,8 @@ def test_the_log_of_these_tests_has_no_doubts():
     assert found.doubts == ()
     for name, true in (("K1", K1), ("K2", K2), ("K3", K3)):
         assert found.estimates[name].value == pytest.approx(true, rel=0.01)
+    by_rule, _ = rule_of(found.drive.ratings.source)
+    assert by_rule == ("repeated_peak_Nm", "momentary_peak_Nm")  # the corners are given
 
 
 @pytest.mark.parametrize(
