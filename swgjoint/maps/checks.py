@@ -64,7 +64,12 @@ def check_map(drive: Potential) -> None:
             raise ValueError(f"{name} is discontinuous at a torsion knot")
     # the mean torque is constant within a clearance, where round-off may lower it
     torque = np.append(c[0, 0, :, 1], slope[0, 0, -1])
-    if (np.diff(torque) < -1e-9 * np.abs(torque).max()).any() or (
-        drive.end_stiffness[0, 0] <= 0
-    ).any():
-        raise ValueError("mean torque decreases with the torsion")
+    falls = np.diff(torque) < -1e-9 * np.abs(torque).max()
+    if falls.any():
+        k = int(falls.argmax())
+        raise ValueError(
+            f"mean torque decreases with the torsion: {torque[k]:.4g} N·m at"
+            f" {knots[k]:.4g} rad and {torque[k + 1]:.4g} N·m at {knots[k + 1]:.4g} rad"
+        )
+    if (drive.end_stiffness[0, 0] <= 0).any():
+        raise ValueError("mean torque decreases with the torsion beyond the knots")
