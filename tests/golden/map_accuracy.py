@@ -20,10 +20,11 @@ import numpy as np
 from golden import FROZEN, stamped, text
 from numpy.typing import NDArray
 
-from swgjoint.fe.common.sampling import SYMMETRIC, follower_in_plane, sample_map
+from swgjoint.fe.common.sampling import follower_in_plane, sample_map
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.gear.wave_generators.wave_generator import has_mirror_symmetry
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.fit import fit_map
 
@@ -145,7 +146,7 @@ def differences(
 ) -> Array:
     """Differences of a map at unseen torques of both signs, see :func:`at_torques`."""
     peak = ratings_of(design).repeated_peak
-    signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
+    signs = (1.0,) if has_mirror_symmetry(design) else (1.0, -1.0)
     rows = [
         at_torques(found, design, sign * peak * np.array(parts), angles)
         for sign in signs

@@ -161,6 +161,20 @@ class Follower(ABC, Generic[AnyState]):
         """
         return None
 
+    def mirror(self, state: AnyState) -> AnyState | None:
+        """Mirror image of an equilibrium, at the opposite input angle and torque.
+
+        It is an equilibrium of a drive without errors whose wave generator has mirror
+        symmetry.
+
+        Args:
+            state: The equilibrium.
+
+        Returns:
+            The mirror image; None if this model does not provide it.
+        """
+        return None
+
     @abstractmethod
     def influence(self, state: AnyState) -> Influence:
         """Influence of every tooth gap on the output, linearised at an equilibrium."""

@@ -381,11 +381,16 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
     """Record of the difference of the output error between drive and mirror image.
 
     The difference is evaluated at the second angle. It is None if the solve under the
-    opposite torque fails.
+    opposite torque fails. The search starts from the mirror image if the model provides
+    it; a drive without this symmetry has its equilibrium elsewhere.
     """
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]
-    solve = partial(grid.follow.to_torque, one.rest.state, -torque)
+    mirrored = grid.follow.mirror(image.states[torque])
+    if mirrored is None:
+        solve = partial(grid.follow.to_torque, one.rest.state, -torque)
+    else:
+        solve = partial(grid.follow.to_angle, mirrored, one.theta)
     opposite = grid.solve_at(one.theta, -torque, solve)
     difference = None
     if opposite is not None:

@@ -27,7 +27,7 @@ from swgjoint.fe.plane.shape_fields import (
 )
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
-from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
+from swgjoint.fe.solid.figures.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerances.rest import SMALL
 from swgjoint.fe.tolerances.ripple import ripple_with_errors
 from swgjoint.fe.tolerances.sampling import sample_tolerances, stage_name
@@ -36,6 +36,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.gear.wave_generators.wave_generator import has_mirror_symmetry
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.worst_positions import worst_positions
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
@@ -89,8 +90,6 @@ doubled for both signs of torque."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
 """Initial torques, of both signs and at every angle, as fractions of the repeated peak
 torque [-]. More torques are added at all angles."""
-SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
-"""Kinds of wave generator with mirror symmetry, which the teeth always have."""
 
 
 def sample_map(
@@ -142,7 +141,7 @@ def sample_map(
     given = design
     if model == "2d":
         design = in_plane(design)
-    symmetric = design.wave_generator.kind in SYMMETRIC
+    symmetric = has_mirror_symmetry(design)
     effort = effort_of(
         model, angles, both_signs=not symmetric, errors=has_errors(design)
     )
@@ -251,7 +250,7 @@ def _solved(
     settings: dict[str, Any] = {
         "small": SMALL * ratings.rated_torque,
         "rated": ratings.rated_torque,
-        "symmetric": design.wave_generator.kind in SYMMETRIC,
+        "symmetric": has_mirror_symmetry(design),
         "tick": tick,
         "keep": series,
         **options,
@@ -279,7 +278,7 @@ def _initial_torques(design: Design) -> list[float]:
     """Initial torques of every angle [N·m]; only positive ones if symmetric."""
     peak = ratings_of(design).repeated_peak
     parts = [part * peak for part in LEVELS]
-    if design.wave_generator.kind in SYMMETRIC:
+    if has_mirror_symmetry(design):
         return parts
     return [-t for t in parts[::-1]] + parts
 

@@ -13,6 +13,7 @@ from swgjoint.fe.common.following import Follower
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
+from swgjoint.fe.solid.mirror import mirror_state
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tolerance_influence import influence
@@ -132,6 +133,10 @@ class SolidContinuation(Follower[SolidState]):
             state.rotation + rotation,
             state.circular_spline_rotation + circular_spline_rotation,
         )
+
+    def mirror(self, state: SolidState) -> SolidState | None:
+        """Mirror image of an equilibrium; None with a race."""
+        return None if self.model.race else mirror_state(self.model, state)
 
     def influence(self, state: SolidState) -> Influence:
         """Influence of every tooth gap on the output, linearised at an equilibrium."""

@@ -15,6 +15,7 @@ from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.tolerances.rest import loaded_states, unloaded_positions
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
+from swgjoint.gear.wave_generators.wave_generator import has_mirror_symmetry
 from swgjoint.typing import Array
 
 
@@ -32,6 +33,9 @@ class PerfectSolid:
     """The drive without load."""
     loaded: Sequence[Mapping[float, SolidState]] = ()
     """States of all positions by torque [N·m] that are known; empty for none."""
+    symmetric: bool = False
+    """Whether the drive has mirror symmetry, so that only positive torques are solved.
+    """
 
     @classmethod
     def from_design(
@@ -52,7 +56,8 @@ class PerfectSolid:
         for position in unloaded_positions(follow, ideal, phases):
             positions.append(position)
             tick()
-        return cls(follow=follow, positions=positions)
+        symmetric = has_mirror_symmetry(ideal)
+        return cls(follow=follow, positions=positions, symmetric=symmetric)
 
     @classmethod
     def from_columns(
@@ -82,6 +87,7 @@ class PerfectSolid:
             follow=solved.follow,
             positions=[column.rest for column in columns],
             loaded=[column.states for column in columns],
+            symmetric=solved.signs == [1.0],
         )
 
     def under_both_signs(
@@ -89,18 +95,48 @@ class PerfectSolid:
     ) -> list[dict[float, SolidState]]:
         """States of all positions by torque [N·m], of both signs.
 
+        The mirror image of a position is the one as far before the end of the pitch, or
+        itself at the first one, at the opposite torque.
+
         Args:
             levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
             tick: Called with the number of torques that are done or left out.
         """
         found = list[dict[float, SolidState]]()
         for k, rest in enumerate(self.positions):
-            starts = rest.sides or (rest.state, rest.state)
+            both = rest.sides or (rest.state, rest.state)
+            starts = both[:1] if self.symmetric else both
             before = found[-1] if found else None
             known = self.loaded[k] if self.loaded else {}
             states = loaded_states(self.follow, starts, levels, tick, before, known)
             found.append(dict(states))
+        if self.symmetric:
+            images = [self._mirror(found[-k], k, tick) for k in range(len(found))]
+            found = [a | b for a, b in zip(found, images, strict=True)]
         return found
+
+    def _mirror(
+        self,
+        states: Mapping[float, SolidState],
+        number: int,
+        tick: Callable[[int], None],
+    ) -> dict[float, SolidState]:
+        """States of a position by negative torque [N·m]: the mirror images of others.
+
+        Args:
+            states: States of the mirrored position by positive torque [N·m].
+            number: Number of the position.
+            tick: Called with the number of torques.
+        """
+        angle = self.follow.input_angle(self.positions[number].state)
+        images = {}
+        for torque, state in states.items():
+            image = self.follow.mirror(state)
+            assert image is not None
+            # whole pitches apart
+            images[-torque] = self.follow.predict(image, angle)
+        tick(len(states))
+        return images
 
     def table(
         self, loaded: Sequence[Mapping[float, SolidState]], levels: Array

@@ -129,18 +129,19 @@ class Rest:
 
 def loaded_states(
     follow: Follower[Any],
-    starts: tuple[Any, Any],
+    starts: tuple[Any, ...],
     levels: Array,
     tick: Callable[[int], None] = lambda parts: None,
     before: Mapping[float, Any] | None = None,
     known: Mapping[float, Any] | None = None,
 ) -> Iterator[tuple[float, Any]]:
-    """Equilibria of one position under torques of both signs.
+    """Equilibria of one position under torques of one sign or of both.
 
     Args:
         follow: Solver of the drive.
-        starts: Equilibria from which to load the drive by positive and by negative
-            torques. They are not solved again where they have one of the torques.
+        starts: Equilibria from which to load the drive by positive and, if there is a
+            second one, by negative torques. They are not solved again where they have
+            one of the torques.
         levels: Magnitudes of the torques, increasing (n,) [N·m].
         tick: Called with the number of torques that are done or left out.
         before: States of other positions by torque, which are turned to this one.
@@ -150,7 +151,7 @@ def loaded_states(
         Torques [N·m] and states, up to the first failure of each sign.
     """
     angle, known = follow.input_angle(starts[0]), known or {}
-    for sign, start in zip((1.0, -1.0), starts, strict=True):
+    for sign, start in zip((1.0, -1.0), starts, strict=False):
         state = start
         for k, torque in enumerate((sign * levels).tolist()):
             if isclose(start.torque, torque, rel_tol=1e-9):

@@ -25,10 +25,28 @@ from swgjoint.gear.wave_generators.sections import (
 from swgjoint.gear.wave_generators.simplified import Simplified
 from swgjoint.units import deg, mm
 
-__all__ = ["WaveGenerator", "lobe_height", "wave_generator", "with_checks"]
+__all__ = [
+    "WaveGenerator",
+    "has_mirror_symmetry",
+    "lobe_height",
+    "wave_generator",
+    "with_checks",
+]
 
 WaveGenerator = ClosedCurve
 """Outline of a wave generator, as contact and kinematics use it."""
+
+SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
+"""Kinds of wave generator with mirror symmetry."""
+
+
+def has_mirror_symmetry(design: Design) -> bool:
+    """Whether the drive without errors has mirror symmetry, as its teeth always have.
+
+    Its results under negative torques are then the mirror image of those under positive
+    ones.
+    """
+    return design.wave_generator.kind in SYMMETRIC
 
 
 def lobe_height(design: Design) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.solid.figures.axial_section import sector_points
-from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
+from swgjoint.fe.solid.figures.shape_fields import solid_fields, solid_surface
 
 
 def test_shape_and_forces_are_those_of_the_equilibrium(small_ring, loaded):

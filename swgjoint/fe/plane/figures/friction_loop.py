@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.sampling import SYMMETRIC
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.gear.wave_generators.wave_generator import has_mirror_symmetry
 from swgjoint.maps.fit.friction_loop import FrictionLoop
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
@@ -150,7 +150,7 @@ def friction_loops(
     perfect, drive = without_errors(design), design.drive
     period = 2.0 * pi / design.periodicity
     parts = (np.arange(positions) + 0.5) / positions
-    if design.wave_generator.kind in SYMMETRIC:
+    if has_mirror_symmetry(design):
         parts = parts[: (positions + 1) // 2]
     model = sector_model(perfect, half="auto", cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
