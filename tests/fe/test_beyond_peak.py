@@ -11,8 +11,8 @@ from solved import few_teeth, kept
 from swgjoint.errors import Outcome
 from swgjoint.fe.common import mesh_cycle as pattern
 from swgjoint.fe.common import sampling
+from swgjoint.fe.common.columns.torque_choice import BEYOND
 from swgjoint.fe.common.sampling import effort_of, sample_map
-from swgjoint.fe.common.torque_choice import BEYOND
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.maps.fit.fit import fit_map
 

@@ -14,8 +14,8 @@ from swgjoint.drives import solve_map as solving
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.common import sampling
+from swgjoint.fe.common.columns.torque_columns import ColumnGrid
 from swgjoint.fe.common.sampling import sample_map
-from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.sampling import sample_tolerances

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.common.load_path import LoadPath
-from swgjoint.fe.common.torque_choice import (
+from swgjoint.fe.common.columns.torque_choice import (
     FEWEST_TORQUES,
     KINK,
     MISSED_JUMPS,
@@ -14,6 +13,7 @@ from swgjoint.fe.common.torque_choice import (
     TABLE_GOAL,
     common_torques,
 )
+from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.quartic import evaluate, quartic_chain
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import pi
 
 import numpy as np
 import pytest
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common import torque_choice
+from swgjoint.fe.common.columns import torque_choice
+from swgjoint.fe.common.columns.torque_columns import ColumnGrid
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import Unloaded
-from swgjoint.fe.common.torque_columns import ColumnGrid
 
 PEAK, STIFF = 10.0, 1e-3
 
@@ -85,6 +86,17 @@ class KnownDrive:
         """As of a follower, noted."""
         self.ways.append(("angle", state.theta, theta))
         return self.at(state.torque, theta)
+
+    def near(self, state: Known) -> KnownDrive:
+        """As of a follower, noted."""
+        self.ways.append(("near", state.theta, state.torque))
+        return self
+
+    def extrapolate(self, state: Known, earlier: Known, theta: float) -> Known:
+        """As of a follower, noted."""
+        assert earlier.torque == state.torque
+        self.ways.append(("trend", earlier.theta, state.theta))
+        return state
 
     def predicted_changes(
         self, state: Known, low: float, high: float
@@ -161,6 +173,23 @@ def test_a_torque_of_the_column_after_is_reached_by_turning_back():
     assert middle.states[4.0] == drive.at(4.0, middle.theta)
     columns._more(columns.columns[1], [6.0], [columns.columns[0], middle])
     assert drive.ways[-1][0] == "torque"
+
+
+def test_columns_start_from_a_trend_and_share_a_tangent():
+    """At each torque a tangent for four columns, and the trend of the last two."""
+    drive = KnownDrive(drops=())
+    columns = grid(drive)
+    theta = [one.theta for _, one in columns.chosen(6)]
+    near = [(a, b) for kind, a, b in drive.ways if kind == "near"]
+    assert sorted(near) == sorted((a, t) for a in theta[:5:4] for t in (0.0, 2.0, PEAK))
+    trend = [(a, b) for kind, a, b in drive.ways if kind == "trend"]
+    pairs = list(pairwise(theta[:5]))
+    assert trend == [pair for pair in pairs for _ in range(3)]
+    # the same for a torque that is added later, from the first column onwards
+    begin = len(drive.ways)
+    columns._add_torque(6, 5.0)
+    near = [(a, b) for kind, a, b in drive.ways[begin:] if kind == "near"]
+    assert near == [(a, 5.0) for a in theta[:5:4]]
 
 
 def test_all_angles_get_the_same_torques():

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.increments import HALVINGS, follow
 from swgjoint.fe.common.influence import Influence
 from swgjoint.typing import Array
 
@@ -18,37 +18,10 @@ if TYPE_CHECKING:
     from swgjoint.fe.solid.state import SolidState
 
 
-HALVINGS = 5
-"""Largest number of halvings of a failing increment."""
 TAKE_UP = 150
 """Largest rotation of the output in search of contact, in hundredths of a pitch [-]."""
 
 AnyState = TypeVar("AnyState", "State", "SolidState")
-
-
-def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyState:
-    """State after a gradual change, whose increment is halved whenever a solve fails.
-
-    Args:
-        state: State at the start.
-        step: Function that takes a nearby state and a fraction of the change, from 0 to
-            1, and returns the state at that fraction.
-
-    Returns:
-        State after the whole change or, if the smallest increment fails, the last
-        converged state with the outcome of the failed attempt.
-    """
-    current, done, increment = state, 0.0, 1.0
-    while done < 1.0:
-        target = min(1.0, done + increment)
-        reached = step(current, target)
-        if reached.outcome.ok:
-            current, done = reached, target
-        elif increment <= 0.5**HALVINGS:
-            return replace(current, outcome=reached.outcome, history=reached.history)
-        else:
-            increment *= 0.5
-    return replace(current, outcome=Outcome.CONVERGED)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,6 +109,31 @@ class Follower(ABC, Generic[AnyState]):
             state: State to start from.
             angle: New input angle [rad].
         """
+
+    def extrapolate(self, state: AnyState, earlier: AnyState, angle: float) -> AnyState:
+        """Start of a search at another input angle, from the trend up to a state.
+
+        Args:
+            state: Equilibrium to turn to that angle.
+            earlier: Equilibrium under the same torque at an angle before it.
+            angle: New input angle [rad].
+
+        Returns:
+            The state at its own angle, changed as it will change on the way; the state
+            itself if the model has no use for it.
+        """
+        return state
+
+    def near(self, state: AnyState) -> Follower[AnyState]:
+        """Solver for equilibria close to a given one, from whose tangent they start.
+
+        Args:
+            state: The equilibrium.
+
+        Returns:
+            The solver; this one if the model has no use for such a tangent.
+        """
+        return self
 
     @abstractmethod
     def rotate_output(self, state: AnyState, output: float) -> AnyState:

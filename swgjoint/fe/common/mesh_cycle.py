@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.clearance import FAINT
+from swgjoint.fe.common.columns.angle_columns import AngleColumn, SolvedColumns
+from swgjoint.fe.common.columns.torque_choice import Ripple, no_ripple, unseen_places
+from swgjoint.fe.common.columns.torque_columns import ColumnGrid
 from swgjoint.fe.common.following import AnyState, Follower
-from swgjoint.fe.common.torque_choice import Ripple, no_ripple, unseen_places
-from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
 from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.samples import FullSolves

@@ -10,10 +10,10 @@ from math import pi
 from typing import Any
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.angle_columns import SolvedColumns
 from swgjoint.fe.common.clearance import FAINT, HELD
+from swgjoint.fe.common.columns.angle_columns import SolvedColumns
+from swgjoint.fe.common.columns.torque_choice import Ripple
 from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
-from swgjoint.fe.common.torque_choice import Ripple
 from swgjoint.fe.label import label_of
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import in_plane, sector_model

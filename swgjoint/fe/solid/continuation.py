@@ -8,14 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from swgjoint.fe.common.cyclic import shift_rows
-from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.cyclic import SingularCyclicError, shift_rows
+from swgjoint.fe.common.following import Follower, is_free
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
+from swgjoint.fe.solid.linearise import linearise
 from swgjoint.fe.solid.mirror import mirror_state
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.gear.kinematics import Layout, member_angles
 from swgjoint.typing import Array
@@ -35,6 +37,9 @@ class SolidContinuation(Follower[SolidState]):
     layout: Layout = "circular_spline_fixed"
     """Which of the three members is fixed."""
     solver: SolidSolver = field(default_factory=SolidSolver)
+    tangent: SolidTangent | None = None
+    """Factorised tangent from which searches under a torque start; None for that of
+    their own start."""
     loads_free_output: ClassVar[bool] = True
 
     @property
@@ -87,10 +92,11 @@ class SolidContinuation(Follower[SolidState]):
             torque: Torque T of the output on its load [N·m].
             angle: Input angle [rad].
         """
-        if not self.circular_spline_is_output:
-            return self.solver(self.model, start, SolidLoad(torque=torque))
-        held = angle if self.layout == "wave_generator_fixed" else 0.0
-        return self.solver(self.model, start, SolidLoad(torque=torque, rotation=held))
+        held = None
+        if self.circular_spline_is_output:
+            held = angle if self.layout == "wave_generator_fixed" else 0.0
+        load = SolidLoad(torque=torque, rotation=held)
+        return self.solver(self.model, start, load, self.tangent)
 
     def hold_output(self, state: SolidState) -> SolidState:
         """Equilibrium with the output fixed at its angle; the torque is a result."""
@@ -133,6 +139,32 @@ class SolidContinuation(Follower[SolidState]):
             state.rotation + rotation,
             state.circular_spline_rotation + circular_spline_rotation,
         )
+
+    def near(self, state: SolidState) -> SolidContinuation:
+        """Solver for equilibria close to a given one, from whose tangent they start."""
+        linear = linearise(self.model, state)
+        try:
+            return replace(self, tangent=SolidTangent(self.model, linear))
+        except SingularCyclicError:
+            return self
+
+    def extrapolate(
+        self, state: SolidState, earlier: SolidState, angle: float
+    ) -> SolidState:
+        """Start of a search at another input angle, from the trend up to a state.
+
+        The displacement field on the wave generator changes linearly with the angle.
+
+        Args:
+            state: Equilibrium to turn to that angle.
+            earlier: Equilibrium under the same torque at an angle before it.
+            angle: New input angle [rad].
+        """
+        if is_free(state) or is_free(earlier):
+            return state
+        here = self.input_angle(state)
+        part = (angle - here) / (here - self.input_angle(earlier))
+        return state.extrapolate(self.predict(earlier, here), part)
 
     def mirror(self, state: SolidState) -> SolidState | None:
         """Mirror image of an equilibrium; None with a race."""

@@ -92,7 +92,11 @@ class SolidSolver:
     """Displacement increment from which the iteration counts as diverged [m]."""
 
     def __call__(
-        self, model: SolidSectorModel, start: SolidState, load: SolidLoad
+        self,
+        model: SolidSectorModel,
+        start: SolidState,
+        load: SolidLoad,
+        tangent: SolidTangent | None = None,
     ) -> SolidState:
         """Solve for the equilibrium at the wave-generator angle of ``start``.
 
@@ -100,6 +104,7 @@ class SolidSolver:
             model: The 3D model.
             start: State from which the search starts.
             load: Prescribed torque and rotation.
+            tangent: Tangent of a state near the solution; None for that of ``start``.
 
         Returns:
             The last state with the outcome of the search. If the search did not
@@ -109,7 +114,6 @@ class SolidSolver:
         tried: set[bytes] = set()
         settled, stay, since = False, False, 0
         last: Array | None = None
-        tangent: SolidTangent | None = None
         # a state whose teeth carry force is close to the solution
         thorough = start.held is not None and len(start.held) > 0
         reach = (NARROW if thorough else WIDE) * model.lobe_height
@@ -118,6 +122,7 @@ class SolidSolver:
             for _ in range(self.max_iterations):
                 keep = self.keep_below, self.slowest
                 anew = not keeps_tangent(history, since, keep, settled=settled)
+                anew &= tangent is None or bool(history)
                 kept = released >= RELEASES
                 linear = linearise(model, state, kept=kept, tangent=anew)
                 if tangent is None or anew:

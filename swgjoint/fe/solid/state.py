@@ -56,6 +56,31 @@ class SolidState(StateFigures):
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Normal forces of these contacts (n_contacts,) [N]."""
 
+    def extrapolate(self, earlier: SolidState, part: float) -> SolidState:
+        """Start of a search: this state with a part of its change since an earlier one.
+
+        Contacts remain those of this state; a race is left as it is.
+
+        Args:
+            earlier: State of the same model, moved to the same angles.
+            part: Factor on the change [-].
+        """
+        moved: dict[str, Any] = {}
+        for key in (
+            "faces",
+            "inside",
+            "pressure",
+            "bore_force",
+            "flank_force",
+            "circular_spline_force",
+            "rotation",
+            "circular_spline_rotation",
+        ):
+            here = getattr(self, key)
+            moved[key] = here + part * (here - getattr(earlier, key))
+        moved["pressure"] = np.clip(moved["pressure"], 0.0, None)
+        return replace(self, **moved)
+
     def of_both_halves(self) -> SolidState:
         """State of the whole drive that a state of a half model describes.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swgjoint.fe.common.angle_columns import SolvedColumns
+from swgjoint.fe.common.columns.angle_columns import SolvedColumns
 from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model

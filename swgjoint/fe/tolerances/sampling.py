@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.angle_columns import SolvedColumns
 from swgjoint.fe.common.clearance import with_mean_clearance
+from swgjoint.fe.common.columns.angle_columns import SolvedColumns
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves

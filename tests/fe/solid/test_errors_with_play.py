@@ -9,7 +9,7 @@ import pytest
 from solved import kept
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
+from swgjoint.fe.common.columns.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of

@@ -91,9 +91,9 @@ class Stop(Exception):
 
 @pytest.mark.slow
 def test_a_pattern_in_space_goes_on_bit_for_bit(monkeypatch, small_drive, tmp_path):
-    """Interrupted at the second equilibrium of the second position; none is lost."""
+    """Interrupted at the second equilibrium of the third position; none is lost."""
     period = 2.0 * np.pi / 42
-    effort = Effort(angles=2, most_angles=2, solves=0, unseen=(1, 1), torques=4)
+    effort = Effort(angles=4, most_angles=4, solves=0, unseen=(1, 1), torques=4)
     solves = 0
 
     def tick() -> None:
@@ -102,7 +102,7 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(monkeypatch, small_drive, tmp_pa
 
     def stop() -> None:
         tick()
-        if solves == 4:
+        if solves == 6:
             raise Stop
 
     def solve(tick, **options):
@@ -128,7 +128,7 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(monkeypatch, small_drive, tmp_pa
     written = len(list(tmp_path.iterdir())) - kept
     # one of the next pitch, the mirror image that no progress counts, one to judge
     # with its torque and another one
-    assert (kept, solves, written) == (4, 8, 5)
+    assert (kept, solves, written) == (6, 12, 7)
     whole = solve(tick)
     np.testing.assert_array_equal(found.table, whole.table)
     assert found.info == whole.info

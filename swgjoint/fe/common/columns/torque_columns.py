@@ -8,12 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swgjoint.fe.common.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.clearance import FAINT, add_clearance
-from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.common.following import AnyState
-from swgjoint.fe.common.load_path import LoadPath, least_certain
-from swgjoint.fe.common.torque_choice import (
+from swgjoint.fe.common.columns.angle_columns import AngleColumn, SolvedColumns
+from swgjoint.fe.common.columns.torque_choice import (
     Ripple,
     common_torques,
     no_ripple,
@@ -21,6 +18,9 @@ from swgjoint.fe.common.torque_choice import (
     torque_beyond,
     unseen_parts,
 )
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.following import AnyState
+from swgjoint.fe.common.load_path import LoadPath, least_certain
 from swgjoint.maps.fit.between_angles import (
     doubt_between,
     even_steps,
@@ -262,8 +262,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
         """Solve one more torque in every column; it is dropped if a column fails."""
         columns = self.all_columns(count)
         for k, column in enumerate(columns):
-            # start from the previous angle if there is one within the pitch
-            self._more(column, [torque], columns[max(0, k - 1) : k])
+            # start from the previous angles if there are any within the pitch
+            self._more(column, [torque], columns[:k])
             if torque in column.failed:
                 self.failed.append(torque)
                 return
@@ -330,7 +330,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
             error, _, compliance, _ = self._row(columns, top)
             torque = torque_beyond(top, rest - error, compliance)
             for k, column in enumerate(columns):
-                self._more(column, [torque], columns[max(0, k - 1) : k])
+                self._more(column, [torque], columns[:k])
                 if torque in column.failed:
                     break
             else:

@@ -6,13 +6,14 @@ A column contains the equilibria of a drive under several torques at one input a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, TypeVar, cast
 
 import numpy as np
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.columns.turning import Turning
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState, Follower, Unloaded
 from swgjoint.fe.common.load_path import LoadPath
@@ -96,6 +97,10 @@ class SolvedColumns(Generic[AnyState]):
     """Number of solves that count against the budget."""
     like: AnyState | None = None
     """First state; stored states of another type or shape are rejected."""
+    _turning: Turning[AnyState] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._turning = Turning(follow=self.follow)
 
     @property
     def free(self) -> bool:
@@ -150,19 +155,22 @@ class SolvedColumns(Generic[AnyState]):
         for place in range(0, self.finest, step):
             if place not in self.columns:
                 self.columns[place] = self._column(place)
+        self._turning.near.clear()
 
     def unseen_column(self, place: float) -> AngleColumn[AnyState]:
         """Validation column at a place between the samples; it is not added to them."""
-        return self._column(place)
+        column = self._column(place)
+        self._turning.near.clear()
+        return column
 
     def _column(self, place: float) -> AngleColumn[AnyState]:
-        """Column solved at all levels, starting from the preceding column if any."""
+        """Column solved at all levels, starting from the preceding columns if any."""
         theta = self.period * place / self.finest
-        before = max((p for p in self.columns if p < place), default=None)
-        if before is None:
-            column = self._first()
+        before = sorted(p for p in self.columns if p < place)
+        if before:
+            column = self._beside([self.columns[p] for p in before], theta)
         else:
-            column = self._beside(self.columns[before], theta)
+            column = self._first()
         lost = [t for t in self.levels if t not in column.states]
         for sign in (1.0, -1.0):
             first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
@@ -192,18 +200,31 @@ class SolvedColumns(Generic[AnyState]):
         return column
 
     def _beside(
-        self, before: AngleColumn[AnyState], theta: float
+        self, before: Sequence[AngleColumn[AnyState]], theta: float
     ) -> AngleColumn[AnyState]:
-        """Column at the next angle, solved from the equilibria of the preceding one.
+        """Column at the next angle, solved from the equilibria of preceding ones.
 
         Torques beyond one that fails are skipped.
+
+        Args:
+            before: Preceding columns.
+            theta: Input angle [rad].
         """
-        column = self._rest(
-            theta, partial(self.follow.turn_unloaded, before.rest, theta)
-        )
+
+        def unloaded() -> Unloaded[AnyState]:
+            rest, near, follow = before[-1].rest, before[-2:], self.follow
+            if all(one.rest.sides is None for one in near):
+                states = [one.rest.state for one in before]
+                start, follow = self._turning.start(states, 0.0, theta)
+                rest = replace(rest, state=start)
+            return follow.turn_unloaded(rest, theta)
+
+        column = self._rest(theta, unloaded)
 
         def beside(torque: float) -> AnyState:
-            state = self.follow.to_angle(before.states[torque], theta)
+            near = [one.states[torque] for one in before]
+            start, follow = self._turning.start(near, torque, theta)
+            state = follow.to_angle(start, theta)
             if state.outcome.ok:
                 return state
             return self.follow.to_torque(column.nearest(torque), torque)
@@ -244,23 +265,29 @@ class SolvedColumns(Generic[AnyState]):
     ) -> None:
         """Solve additional torques of a column, each from a nearby equilibrium.
 
-        The search starts from the equilibrium at the same torque in a neighbouring
-        column ``beside``, which halves the number of iterations, or otherwise from the
-        nearest torque in the same column.
+        The search starts from the equilibria at the same torque in the columns
+        ``beside``, the nearest one last, which halves the number of iterations, or
+        otherwise from the nearest torque in the same column.
         """
         for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
             there = [one.states[torque] for one in beside if torque in one.states]
-            if there:
-                solve = partial(self.follow.to_angle, there[0], column.theta)
-            else:
-                near = column.nearest(torque)
-                solve = partial(self.follow.to_torque, near, torque)
+            solve = partial(self._one_more, column, torque, there)
             state = self.solve_at(column.theta, torque, solve)
             if state is None:
                 column.failed.add(torque)
             else:
                 column.states[torque] = state
             self.count()
+
+    def _one_more(
+        self, column: AngleColumn[AnyState], torque: float, there: list[AnyState]
+    ) -> AnyState:
+        """Equilibrium of a column, from those under the same torque if any."""
+        if not there:
+            self._turning.near.clear()
+            return self.follow.to_torque(column.nearest(torque), torque)
+        start, follow = self._turning.start(there, torque, column.theta)
+        return follow.to_angle(start, column.theta)
 
     def solve_positions(
         self, count: int, positions: Sequence[tuple[float, float]]

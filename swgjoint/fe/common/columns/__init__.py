@@ -1,0 +1,1 @@
+"""Columns of equilibria over torque and input angle."""
