@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from swgjoint.typing import Array, Index
+from swgjoint.typing import Array, Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,3 +64,35 @@ class SectorMatrices:
         """Mean of the diagonals of all matrices."""
         total = sum(float(np.einsum("sii->", blocks)) for _, blocks in self.terms)
         return total / (len(self) * self.size)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SupportedSectors:
+    """Matrices of the sectors with some degrees of freedom prescribed."""
+
+    matrices: SectorMatrices
+    held: Index
+    """Prescribed degrees of freedom of every sector (h,)."""
+    fixed: Mask | None
+    """Further ones of each sector (N, n); None without any."""
+    sign: Array
+    """Factors on the degrees of freedom of the face that closes the ring."""
+    scale: float
+    """Diagonal of the prescribed degrees of freedom [N/m]."""
+
+    def __len__(self) -> int:
+        return len(self.matrices)
+
+    def __getitem__(self, sector: int) -> Array:
+        """Matrix of a sector (n, n), a new array."""
+        matrix, still = self.matrices[sector], self.held
+        if self.fixed is not None:
+            still = np.union1d(still, np.flatnonzero(self.fixed[sector]))
+        matrix[still] = 0.0
+        matrix[:, still] = 0.0
+        matrix[still, still] = self.scale
+        if sector == len(self) - 1:
+            size = len(self.sign)
+            matrix[-size:] *= self.sign[:, None]
+            matrix[:, -size:] *= self.sign
+        return matrix

@@ -20,9 +20,9 @@ import numpy as np
 from swgjoint.fe.solid.cholesky_cyclic import CholeskyResponse, factorise_ring
 from swgjoint.fe.solid.dense_cyclic import DenseResponse
 from swgjoint.fe.solid.linearise import BoreContact, SolidLinearised
-from swgjoint.fe.solid.sector_matrices import SectorMatrices
+from swgjoint.fe.solid.sector_matrices import SupportedSectors
 from swgjoint.fe.solid.sector_model import SolidSectorModel
-from swgjoint.typing import Array, Index, Mask
+from swgjoint.typing import Array, Index
 
 NEGLIGIBLE = 1e-3
 """Eigenvalues of a change that are neglected, relative to the largest of a sector [-].
@@ -55,7 +55,7 @@ class SolidTangent:
             self._fixed[:, model.race_dofs] = linear.race.fixed
         # a half model is closed by the factors of its last face
         self._sign = sign = model.face_closure
-        supported = _Supported(
+        supported = SupportedSectors(
             matrices=linear.hessian,
             held=held,
             fixed=self._fixed,
@@ -178,35 +178,3 @@ class TangentResponse:
         moved = self.ring.combine(np.concatenate([factors, -self.correction @ factors]))
         moved[-1, -len(self.sign) :] *= self.sign
         return moved
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Supported:
-    """Matrices of the sectors with some degrees of freedom prescribed."""
-
-    matrices: SectorMatrices
-    held: Index
-    """Prescribed degrees of freedom of every sector (h,)."""
-    fixed: Mask | None
-    """Further ones of each sector (N, n); None without any."""
-    sign: Array
-    """Factors on the degrees of freedom of the face that closes the ring."""
-    scale: float
-    """Diagonal of the prescribed degrees of freedom [N/m]."""
-
-    def __len__(self) -> int:
-        return len(self.matrices)
-
-    def __getitem__(self, sector: int) -> Array:
-        """Matrix of a sector (n, n), a new array."""
-        matrix, still = self.matrices[sector], self.held
-        if self.fixed is not None:
-            still = np.union1d(still, np.flatnonzero(self.fixed[sector]))
-        matrix[still] = 0.0
-        matrix[:, still] = 0.0
-        matrix[still, still] = self.scale
-        if sector == len(self) - 1:
-            size = len(self.sign)
-            matrix[-size:] *= self.sign[:, None]
-            matrix[:, -size:] *= self.sign
-        return matrix

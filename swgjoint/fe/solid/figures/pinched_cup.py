@@ -21,6 +21,7 @@ from math import pi
 import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError, Outcome
+from swgjoint.fe.solid.cholesky_cyclic import factorise_ring
 from swgjoint.fe.solid.corotation import (
     SolidFrames,
     about_z,
@@ -32,8 +33,8 @@ from swgjoint.fe.solid.corotation import (
     spin,
     tangent,
 )
-from swgjoint.fe.solid.dense_cyclic import DenseCyclicFactor
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
+from swgjoint.fe.solid.sector_matrices import SectorMatrices, SupportedSectors
 from swgjoint.fe.solid.stress import average_faces
 from swgjoint.fe.solid.strip.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.strip.mesh import StripMesh, flexspline_strip
@@ -234,8 +235,7 @@ class PinchedCup:
                 in the global frame (k, 3 m) [N].
         """
         n, few = 3 * self.masters.size, len(loads)
-        out = np.zeros((self.sectors, n))
-        matrix = np.zeros((self.sectors, n, n))
+        out, terms = np.zeros((self.sectors, n)), list[tuple[Index, Array]]()
         for number, (segment, frame) in enumerate(
             zip(self.segments, frames, strict=True)
         ):
@@ -247,22 +247,23 @@ class PinchedCup:
                 out[:few, dofs] += pushed
             out[:, dofs] -= rotate_to_global(frame, project_to_frames(frame, elastic))
             local = matrices_in_global(frame, tangent(segment, frame, total))
-            matrix[:, dofs[:, None], dofs] += local
-        scale = float(np.mean(np.einsum("sii->si", matrix)))
-        held = self._held
-        matrix[:, held], matrix[:, :, held] = 0.0, 0.0
-        matrix[:, held, held] = scale
+            terms.append((dofs, local))
+        matrices, held = SectorMatrices(size=n, terms=tuple(terms)), self._held
+        scale = matrices.mean_diagonal
         out[:, held] = 0.0
         if not len(held):
             # springs against rigid motion carry no force, because the loads balance
-            matrix[0, [0, 2], [0, 2]] += scale
+            springs = np.multiply.outer(np.arange(self.sectors) == 0, scale * np.eye(2))
+            terms.append((np.array([0, 2]), springs))
+            matrices = SectorMatrices(size=n, terms=tuple(terms))
         # the half model closes with the factors of its last face
         size = 3 * self.masters.face_size
         sign = np.tile(CLOSURE, self.masters.face_size)
-        matrix[-1, -size:] *= sign[:, None]
-        matrix[-1, :, -size:] *= sign
         out[-1, -size:] *= sign
-        solved = DenseCyclicFactor(matrix, size).solve(out[..., None])[..., 0]
+        blocks = SupportedSectors(
+            matrices=matrices, held=held, fixed=None, sign=sign, scale=scale
+        )
+        solved = factorise_ring(blocks, size).solve(out[..., None])[..., 0]
         solved[-1, -size:] *= sign
         return np.asarray(solved)
 
