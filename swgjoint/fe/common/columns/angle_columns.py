@@ -152,30 +152,36 @@ class SolvedColumns(Generic[AnyState]):
     def solve_columns(self, count: int) -> None:
         """Solve those of ``count`` equally spaced columns that are still missing."""
         step = self.finest // count
-        for place in range(0, self.finest, step):
-            if place not in self.columns:
-                self.columns[place] = self._column(place)
-        self._turning.near.clear()
+        places = [p for p in range(0, self.finest, step) if p not in self.columns]
+        if not self.columns:
+            self.columns[places.pop(0)] = self._first()
+        for place in places:
+            self.columns[place] = self._unloaded(place)
+        # one torque after the other, so that only one tangent is in memory
+        for torque in sorted(self.levels, key=abs):
+            for place in places:
+                self._load(self.columns[place], torque)
+        self._turning.forget()
 
     def unseen_column(self, place: float) -> AngleColumn[AnyState]:
         """Validation column at a place between the samples; it is not added to them."""
-        column = self._column(place)
-        self._turning.near.clear()
-        return column
+        return self._column(place)
 
     def _column(self, place: float) -> AngleColumn[AnyState]:
-        """Column solved at all levels, starting from the preceding columns if any."""
-        theta = self.period * place / self.finest
-        before = sorted(p for p in self.columns if p < place)
-        if before:
-            column = self._beside([self.columns[p] for p in before], theta)
-        else:
-            column = self._first()
-        lost = [t for t in self.levels if t not in column.states]
-        for sign in (1.0, -1.0):
-            first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
-            self.levels = [t for t in self.levels if t * sign < 0.0 or abs(t) < first]
+        """Column solved at all levels, starting from the preceding columns."""
+        column = self._unloaded(place)
+        for torque in sorted(self.levels, key=abs):
+            self._load(column, torque)
         return column
+
+    def _drop(self, torque: float) -> None:
+        """Remove a torque and all larger ones of its sign from the levels."""
+        most = abs(torque)
+        self.levels = [t for t in self.levels if t * torque < 0.0 or abs(t) < most]
+
+    def _before(self, theta: float) -> list[AngleColumn[AnyState]]:
+        """Columns at smaller angles."""
+        return [one for _, one in sorted(self.columns.items()) if one.theta < theta]
 
     def _first(self) -> AngleColumn[AnyState]:
         """First column, loaded from zero torque outwards until a solve fails."""
@@ -194,52 +200,46 @@ class SolvedColumns(Generic[AnyState]):
                     0.0, torque, partial(self.follow.to_torque, state, torque)
                 )
                 if loaded is None:
+                    self._drop(torque)
                     break
                 column.states[torque] = state = loaded
                 self.count()
         return column
 
-    def _beside(
-        self, before: Sequence[AngleColumn[AnyState]], theta: float
-    ) -> AngleColumn[AnyState]:
-        """Column at the next angle, solved from the equilibria of preceding ones.
-
-        Torques beyond one that fails are skipped.
-
-        Args:
-            before: Preceding columns.
-            theta: Input angle [rad].
-        """
+    def _unloaded(self, place: float) -> AngleColumn[AnyState]:
+        """Column without load, from the preceding columns."""
+        theta = self.period * place / self.finest
+        before = self._before(theta)
 
         def unloaded() -> Unloaded[AnyState]:
-            rest, near, follow = before[-1].rest, before[-2:], self.follow
-            if all(one.rest.sides is None for one in near):
+            rest, follow = before[-1].rest, self.follow
+            if all(one.rest.sides is None for one in before[-2:]):
                 states = [one.rest.state for one in before]
-                start, follow = self._turning.start(states, 0.0, theta)
+                start, follow = self._turning.start(states, theta)
                 rest = replace(rest, state=start)
             return follow.turn_unloaded(rest, theta)
 
-        column = self._rest(theta, unloaded)
+        return self._rest(theta, unloaded)
 
-        def beside(torque: float) -> AnyState:
-            near = [one.states[torque] for one in before]
-            start, follow = self._turning.start(near, torque, theta)
-            state = follow.to_angle(start, theta)
+    def _load(self, column: AngleColumn[AnyState], torque: float) -> None:
+        """Solve a level of a column; if that fails, drop it and all larger ones."""
+        if torque not in self.levels:
+            return
+
+        def beside() -> AnyState:
+            near = [one.states[torque] for one in self._before(column.theta)]
+            start, follow = self._turning.start(near, column.theta)
+            state = follow.to_angle(start, column.theta)
             if state.outcome.ok:
                 return state
             return self.follow.to_torque(column.nearest(torque), torque)
 
-        lost = set()
-        for torque in sorted(self.levels, key=abs):
-            if (torque > 0.0) in lost:
-                continue
-            state = self.solve_at(theta, torque, partial(beside, torque))
-            if state is None:
-                lost.add(torque > 0.0)
-            else:
-                column.states[torque] = state
-                self.count()
-        return column
+        state = self.solve_at(column.theta, torque, beside)
+        if state is None:
+            self._drop(torque)
+        else:
+            column.states[torque] = state
+            self.count()
 
     def _rest(
         self, theta: float, solve: Callable[[], Unloaded[AnyState]]
@@ -284,9 +284,8 @@ class SolvedColumns(Generic[AnyState]):
     ) -> AnyState:
         """Equilibrium of a column, from those under the same torque if any."""
         if not there:
-            self._turning.near.clear()
             return self.follow.to_torque(column.nearest(torque), torque)
-        start, follow = self._turning.start(there, torque, column.theta)
+        start, follow = self._turning.start(there, column.theta)
         return follow.to_angle(start, column.theta)
 
     def solve_positions(
