@@ -175,7 +175,7 @@ def test_shapes_that_do_not_fit_are_refused():
         ("offset", np.zeros(1)),
         ("outline", np.zeros((1, 6))),
         ("outline", np.zeros((0, 7))),
-        ("outline", np.full((1, 7), 5.0)),
+        ("outline", np.full((1, 7), 7.0)),
         ("outline", np.zeros((2, 7))),
         ("gap", np.zeros((5, 5))),
         ("normal", np.zeros((4, 4, 2))),
