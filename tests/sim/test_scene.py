@@ -121,6 +121,17 @@ def test_an_override_may_replace_a_named_drive_by_a_linear_one():
     assert scene.with_changes({"defaults.drive": "a"}).defaults.linear is None
 
 
+def test_an_override_may_replace_a_load_by_another_kind_of_load():
+    """A torque for a fraction of the rated torque, and back; not both at once."""
+    scene = Scene.from_toml(GOOD).with_changes(["load.joint.rated_fraction=0.5"])
+    load = scene.with_changes(["load.joint.torque_Nm=20"]).load["joint"]
+    assert (load.torque_Nm, load.rated_fraction) == (20.0, None)
+    both = ["load.joint.torque_Nm=20", "load.joint.rated_fraction=1"]
+    for changes in (both, both[::-1]):
+        with pytest.raises(InputError, match=naming("torque_Nm", "rated_fraction")):
+            scene.with_changes(changes)
+
+
 def test_a_joint_inherits_what_it_does_not_say():
     """Own keys win over the defaults, key by key; a drive counts as one key."""
     scene = Scene.from_toml(GOOD)

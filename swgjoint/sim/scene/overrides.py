@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from swgjoint.drives.sections import DRIVE_KEYS
@@ -10,6 +10,9 @@ from swgjoint.errors import InputError
 from swgjoint.faults import shorten
 from swgjoint.sim.scene.trajectory_sections import MOTIONS
 from swgjoint.toml_file import MAX_DEPTH, parse_value
+
+ALTERNATIVES = (tuple(DRIVE_KEYS), ("torque_Nm", "rated_fraction"))
+"""Keys of a table that exclude each other: drives of a joint, and sizes of a load."""
 
 
 def merge(
@@ -40,6 +43,7 @@ def merge(
         if isinstance(overrides, Mapping)
         else [parse_override(text) for text in overrides or ()]
     )
+    given = {key for key, _ in pairs}
     # apply a new kind of motion first, because it drops the keys of the old kind
     for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
         if key == "trajectory.kind":
@@ -47,11 +51,12 @@ def merge(
         *tables, last = key.split(".")
         table = merged
         for name in tables:
-            _make_room(table, name)
+            _make_room(table, name, ())
             table = table.setdefault(name, {})
             if not isinstance(table, dict):
                 raise InputError(f"{where}: {key}: {name} is not a table")
-        _make_room(table, last)
+        beside = {k.split(".")[-1] for k in given if k.split(".")[:-1] == tables}
+        _make_room(table, last, beside)
         table[last] = value
     return merged
 
@@ -66,11 +71,12 @@ def _switch_motion(table: Any, kind: Any) -> None:
             del table[key]
 
 
-def _make_room(table: dict[str, Any], key: str) -> None:
-    """Drop the drive of a joint if another key states it; they exclude each other."""
-    for other in DRIVE_KEYS if key in DRIVE_KEYS else ():
-        if other != key:
-            table.pop(other, None)
+def _make_room(table: dict[str, Any], key: str, given: Collection[str]) -> None:
+    """Drop the alternatives to a key, unless they are given, too, which is an error."""
+    for keys in ALTERNATIVES:
+        for other in keys if key in keys else ():
+            if other != key and other not in given:
+                table.pop(other, None)
 
 
 def parse_override(text: str) -> tuple[str, Any]:
