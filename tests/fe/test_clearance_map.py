@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import pi
 
 import numpy as np
 import pytest
+from known_samples import samples_of
 from solved import FEW_PITCH, FEW_TEETH, few_teeth, kept
 
-from swgjoint.fe.common.clearance import across_clearance
+from swgjoint.fe.common.clearance import FAINT, across_clearance, add_clearance
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.samples import MapSamples
 from swgjoint.maps.sheet.loop import torque_loop
 
 pytestmark = pytest.mark.fe
@@ -115,3 +118,82 @@ def test_begin_of_contact_of_a_linear_spring():
     # a faint torque on the way, so that the energy is that of the middle
     assert table[1, 0] == pytest.approx(5.0 - 0.5 * begin * table[0, 0], rel=1e-12)
     assert table[2, 0] * begin == pytest.approx(-table[0, 0], rel=1e-12)
+
+
+def test_a_growing_stiffness_stores_the_energy():
+    """A tooth that touches early: contact begins at least 2 E/T before."""
+    gap, torque, energy = 1e-3, 0.2, 1.0e-5
+    rest = np.array([[0.0], [5.0], [np.inf], [0.0]])
+    for sign in (1.0, -1.0):
+        place = -sign * gap
+        taken_up = np.array([[place], [5.0 + energy], [5e-5], [0.0]])
+        _, table = across_clearance(rest, taken_up, sign * torque)
+        # 3 T/2K is 1.5e-5 rad, over which a torque up to T does 3e-6 J of work at most
+        assert table[0, 0] == pytest.approx(place + sign * 2.0 * energy / torque)
+
+
+def early_tooth(early: float) -> MapSamples:
+    """Equilibria of a soft tooth that touches before the stiff ones.
+
+    Args:
+        early: Largest rotation from the contact of the tooth to the others [rad].
+    """
+    gap, soft, stiff, small = 1.6e-4, 65.0, 2600.0, 0.013
+    theta = 2.0 * pi / FEW_TEETH * np.arange(12) / 12
+    begin = gap - 0.5 * early * (1.0 - np.cos(FEW_TEETH * theta))
+    along = -0.5 * early * FEW_TEETH * np.sin(FEW_TEETH * theta)
+    levels = np.array([1.0, 10.0, 20.0, 33.0, 50.0, 72.0, 102.0, 142.0]) * small
+
+    def rows(torque: float, sign: float) -> np.ndarray:
+        alone = begin + torque / soft
+        both = (torque + soft * begin + stiff * gap) / (soft + stiff)
+        x = np.where(alone < gap, alone, both)
+        beyond = np.maximum(x - gap, 0.0)
+        energy = 0.5 * soft * (x - begin) ** 2 + 0.5 * stiff * beyond**2
+        slope = np.where(alone < gap, soft, soft + stiff)
+        moment = -sign * torque / 60.0 - soft * (x - begin) * along
+        return np.array([-sign * x, energy, 1.0 / slope, moment])
+
+    table = {0.0: np.zeros((4, 12))}
+    for torque in levels.tolist():
+        table |= {sign * torque: rows(torque, sign) for sign in (1.0, -1.0)}
+    add_clearance(table, [1.0, -1.0], small, FAINT)
+    torque = np.array(sorted(table))
+    error, energy, compliance, moment = np.array([table[t] for t in torque]).swapaxes(
+        0, 1
+    )
+    return replace(
+        samples_of(),
+        order=(FEW_TEETH, 0),
+        input_angle=theta,
+        torque=torque,
+        output_error=error,
+        energy=energy,
+        compliance=compliance,
+        input_torque=moment,
+        free=True,
+        solved=None,
+        solved_angles=None,
+    )
+
+
+@pytest.mark.parametrize("early", [1e-5, 3e-5, 7e-5])
+def test_the_mean_torque_rises_where_one_tooth_touches_early(early):
+    """Between the knots as well, and the sampled torques come back.
+
+    A drive like size-8-30: 65 N·m/rad over 7e-5 rad until the next tooth touches.
+    """
+    given = early_tooth(early)
+    found = fit_map(given, keep=0.0)
+    knots = found.torsion_knots
+    x = np.linspace(knots[0], knots[-1], 20_001)
+    torque = np.array([found.coefficients(float(at), 1)[0, 0] for at in x])
+    # round-off of a torque that is constant within the clearance
+    assert np.diff(torque).min() > -1e-12 * torque.max()
+    torsion = given.output_error[given.torque == 0.0] - given.output_error
+    theta = np.broadcast_to(given.input_angle, torsion.shape)
+    wrong = np.abs(found.torque(torsion, theta, theta / found.ratio).T - given.torque)
+    # the common knots follow the ends of the clearance, which differ between angles
+    near = np.abs(given.torque) < 0.1
+    assert wrong[:, ~near].max() < 1e-12 * torque.max()
+    assert wrong[:, near].max() < 1e-3

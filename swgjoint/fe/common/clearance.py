@@ -31,7 +31,9 @@ def across_clearance(
     begins to grow, and it reaches K under T after a further rotation
     :math:`\ell = 3 T / 2 K`. A linear spring would reach T after a rotation of T/K and
     store the energy :math:`T^2 / 2 K`; the growing stiffness stores nearly the same
-    energy over :math:`\ell`.
+    energy over :math:`\ell`. If few teeth touch long before the others, they hold the
+    output with a small part of K and store more energy E. A growing stiffness stores
+    at most :math:`T \ell / 2`, so :math:`\ell` is at least :math:`2 E / T`.
 
     Args:
         rest: Output error [rad], energy [J], compliance [rad/(N·m)] and input torque
@@ -45,7 +47,9 @@ def across_clearance(
     """
     begin = faint * torque
     apart = taken_up[0] - rest[0]  # against the sign of the torque
-    way = np.clip(1.0 - 1.5 * torque * taken_up[2] / -apart, 0.1, 1.0)
+    stiff = 1.5 * torque * taken_up[2] / -apart
+    soft = 2.0 * (taken_up[1] - rest[1]) / (torque * -apart)
+    way = np.clip(1.0 - np.maximum(stiff, soft), 0.1, 1.0)
     onset = rest.copy()
     onset[0] += way * apart
     onset[1] -= 0.5 * begin * way * apart
@@ -134,7 +138,7 @@ def with_mean_clearance(table: Array, levels: Array) -> tuple[Array, Array]:
         # the torsion must grow up to the next torque
         beyond = sign * (table[0, end - int(sign)] - table[0, zero])
         table[0, end] = table[0, zero] + sign * np.minimum(half, NARROWED * beyond)
-        table[2, end] = soft
+        table[1, end], table[2, end] = table[1, zero], soft
     table = with_onsets(table, small, HELD)
     torque = np.append(HELD * small, levels)
     torque = np.concatenate([-torque[::-1], [0.0], torque])

@@ -306,11 +306,15 @@ def _both_signs(tables: dict[float, Array]) -> dict[float, Array]:
 
 def _add_onsets(tables: dict[float, Array], small: float, faint: float) -> None:
     """Add the torques at which the teeth begin to hold the output, in place."""
-    if faint != FAINT:
-        tables[0.0][1] -= spring_energy(tables[small][0], tables[-small][0], small)
+    starts = []
     for side in (small, -small):
         start, onset = across_clearance(tables[0.0], tables[side], side, faint)
         tables[start] = onset
+        starts.append(start)
+    if faint != FAINT:
+        stored = spring_energy(tables[small][0], tables[-small][0], small)
+        for torque in (0.0, *starts):
+            tables[torque][1] -= stored
     tables[0.0][2] = onset[2]  # compliance at the ends of the clearance
 
 
