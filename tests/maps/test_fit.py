@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_samples import N, samples_of
 
+from swgjoint.maps.checks import check_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.fit_checks import stiffness_range
 from swgjoint.maps.quartic import quartic_chain
 
 
@@ -33,6 +37,34 @@ def test_stiffness_range_covers_a_pitch(keep):
     largest = np.abs(drive.torsion_knots[[0, -1]]).max()
     assert low == pytest.approx(2e4 * (1.0 - 0.1), rel=0.01)
     assert high == pytest.approx(2e4 * (1 + 24e4 * largest**2) * (1 + 0.1), rel=0.02)
+
+
+@pytest.mark.parametrize("too_much, falls", [(0.15, False), (0.2, True), (-0.2, True)])
+def test_a_torque_that_falls_between_breakpoints_is_refused(
+    synthetic_map, too_much, falls
+):
+    """One interval stores more or less energy than its torques; all knots are right."""
+    stiffness, knots = 2e4, np.linspace(-5e-3, 5e-3, 5)
+    width = knots[1] - knots[0]
+    energy = 0.5 * stiffness * knots**2
+    energy[knots > 0.5 * width] += too_much * stiffness * width**2
+    data = np.stack([energy, stiffness * knots, np.full_like(knots, stiffness)])
+    breaks, chain = quartic_chain(knots, data)
+    assert (np.diff(chain[:, 1]) > 0.0).all()
+    drive = replace(
+        synthetic_map.with_harmonics([False] * len(synthetic_map.orders)),
+        torsion_knots=breaks,
+        potential=np.stack([chain, 0.0 * chain])[None],
+    )
+    dense = drive.coefficients(np.linspace(knots[0], knots[-1], 20_001), 2)[..., 0, 0]
+    low, high = stiffness_range(drive)
+    assert (low < 0.0) == falls == (dense.min() < 0.0)
+    np.testing.assert_allclose([low, high], [dense.min(), dense.max()], rtol=1e-3)
+    if falls:
+        with pytest.raises(ValueError, match="mean torque decreases"):
+            check_map(drive)
+    else:
+        check_map(drive)
 
 
 def test_integration_constant_is_the_cogging_energy():

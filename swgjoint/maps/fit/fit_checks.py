@@ -96,15 +96,13 @@ def against_solves(
 
 
 def stiffness_range(drive: DriveMap) -> list[float]:
-    """Smallest and largest sampled stiffness inside the knots [N·m/rad].
+    """Smallest and largest stiffness inside the knots at sampled angles [N·m/rad].
 
     Input and output turn in the ideal ratio over one cycle of the slowest harmonic,
     :data:`PER_CYCLE` steps in each of the fastest, or fewer with :data:`MOST_ANGLES`
     and :data:`MOST_PHASES`. An equilibrium where the stiffness is not positive would be
     unstable.
     """
-    knots = drive.torsion_knots
-    x = np.linspace(knots[0], knots[-1], 12 * knots.size)
     cycles = np.abs(drive.angle_orders @ np.array([1.0, 1.0 / drive.ratio]))
     fastest = max(1.0, float(cycles.max()))
     slowest = cycles[cycles > ROUND_OFF * fastest].min(initial=fastest)
@@ -117,10 +115,16 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     # its values, because maps with tooth errors have thousands of harmonics
     second = np.array([2.0, 6.0, 12.0]) * drive.potential[..., 2:]
     c = np.tensordot(second, waves, axes=([1, 0], [0, 2]))  # (n_pieces, 3, n_angles)
-    j = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, knots.size - 2)
-    d = (x - knots[j])[:, None]
-    stiffness = c[j, 0] + d * (c[j, 1] + d * c[j, 2])
-    return [float(stiffness.min()), float(stiffness.max())]
+    width = np.diff(drive.torsion_knots)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = np.clip(np.nan_to_num(-0.5 * c[:, 1] / c[:, 2]), 0.0, width)
+    ends = c[:, 0], c[:, 0] + width * (c[:, 1] + width * c[:, 2])
+    at_vertex = c[:, 0] + vertex * (c[:, 1] + vertex * c[:, 2])
+    extremes = [*ends, at_vertex]
+    return [
+        float(min(one.min() for one in extremes)),
+        float(max(one.max() for one in extremes)),
+    ]
 
 
 def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
