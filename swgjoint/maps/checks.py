@@ -12,6 +12,11 @@ JUMP = 1e-6
 starts and at the ends of all intervals. It applies to the coefficients of the potential
 and to those of the torque."""
 
+FALL = 5e-3
+"""Largest accepted fall of the mean torque between two knots, relative to the rated
+torque [-]: half of the torque that takes up a clearance. Where the clearance ends, the
+torque between these two is interpolated."""
+
 
 def check_map(drive: Potential) -> None:
     """Reject a map that no real drive can have.
@@ -63,9 +68,21 @@ def check_map(drive: Potential) -> None:
         scale = np.abs(start).max() + np.abs(end).max()
         if (np.abs(end[..., :-1] - start[..., 1:]) > JUMP * scale).any():
             raise ValueError(f"{name} is discontinuous at a torsion knot")
-    torsion, torque = _extremes_of_torque(drive)
     # the mean torque is constant within a clearance, where round-off may lower it
-    falls = np.diff(torque) < -1e-9 * np.abs(torque).max()
+    torque = np.append(c[0, 0, :, 1], slope[0, 0, -1])
+    _refuse_falls(knots, torque, 1e-9 * float(np.abs(torque).max()))
+    _refuse_falls(*_extremes_of_torque(drive), FALL * r.rated_torque)
+    if (drive.end_stiffness[0, 0] <= 0).any():
+        raise ValueError("mean torque decreases with the torsion beyond the knots")
+
+
+def _refuse_falls(torsion: Array, torque: Array, largest: float) -> None:
+    """Reject a torque [N·m] that falls by more than the largest from one to the next.
+
+    Raises:
+        ValueError: If it does; the message states where.
+    """
+    falls = np.diff(torque) < -largest
     if falls.any():
         k = int(falls.argmax())
         raise ValueError(
@@ -73,8 +90,6 @@ def check_map(drive: Potential) -> None:
             f" {torsion[k]:.4g} rad and {torque[k + 1]:.4g} N·m at"
             f" {torsion[k + 1]:.4g} rad"
         )
-    if (drive.end_stiffness[0, 0] <= 0).any():
-        raise ValueError("mean torque decreases with the torsion beyond the knots")
 
 
 def _extremes_of_torque(drive: Potential) -> tuple[Array, Array]:

@@ -39,9 +39,17 @@ def test_stiffness_range_covers_a_pitch(keep):
     assert high == pytest.approx(2e4 * (1 + 24e4 * largest**2) * (1 + 0.1), rel=0.02)
 
 
-@pytest.mark.parametrize("too_much, falls", [(0.15, False), (0.2, True), (-0.2, True)])
+@pytest.mark.parametrize(
+    "too_much, falls, refused",
+    [
+        (0.15, False, False),
+        (0.17, True, False),  # by 0.1 % of the rated torque
+        (0.2, True, True),  # by 2.7 %
+        (-0.2, True, True),
+    ],
+)
 def test_a_torque_that_falls_between_breakpoints_is_refused(
-    synthetic_map, too_much, falls
+    synthetic_map, too_much, falls, refused
 ):
     """One interval stores more or less energy than its torques; all knots are right."""
     stiffness, knots = 2e4, np.linspace(-5e-3, 5e-3, 5)
@@ -60,7 +68,7 @@ def test_a_torque_that_falls_between_breakpoints_is_refused(
     low, high = stiffness_range(drive)
     assert (low < 0.0) == falls == (dense.min() < 0.0)
     np.testing.assert_allclose([low, high], [dense.min(), dense.max()], rtol=1e-3)
-    if falls:
+    if refused:
         with pytest.raises(ValueError, match="mean torque decreases"):
             check_map(drive)
     else:
