@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from swgjoint.drives.fidelity import default_model
-from swgjoint.errors import ComputationError
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.maps.cache import cache_map
-from swgjoint.maps.checks import check_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.layouts import with_layout
 from swgjoint.maps.unfinished import Unfinished
@@ -51,8 +49,7 @@ def build_map(
     Raises:
         DesignError: If the design cannot be built or contains something that the model
             does not cover.
-        ComputationError: If the solver converges at none of the torques, or if the
-            fitted map is one that no real drive can have.
+        ComputationError: If the solver converges at none of the torques.
     """
     model = model or default_model(design)
     if design.losses is not None:  # not part of the finite elements
@@ -81,7 +78,7 @@ def build_map(
         # a map from the cache does without the finite elements
         from swgjoint.drives.solve_map import solve_map
 
-        drive = solve_map(
+        return solve_map(
             design,
             model,
             angles,
@@ -89,15 +86,6 @@ def build_map(
             keep=keep,
             perfect_keep=perfect_keep,
         )
-        try:
-            check_map(drive)
-        except ValueError as exc:
-            raise ComputationError(
-                f"{design.drive.name}: the fitted map of model {model} is not valid:"
-                f" {exc}; try another model (ring, 2d or 3d) or another clearance of"
-                " the bearing"
-            ) from None
-        return drive
 
     if not cache:
         return build()

@@ -5,17 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from swgjoint.maps.potential import Potential
-from swgjoint.typing import Array
 
 JUMP = 1e-6
 """Largest accepted jump at a knot, relative to the sum of the largest magnitudes at the
 starts and at the ends of all intervals. It applies to the coefficients of the potential
 and to those of the torque."""
-
-FALL = 5e-3
-"""Largest accepted fall of the mean torque between two knots, relative to the rated
-torque [-]: half of the torque that takes up a clearance. Where the clearance ends, the
-torque between these two is interpolated."""
 
 
 def check_map(drive: Potential) -> None:
@@ -70,42 +64,7 @@ def check_map(drive: Potential) -> None:
             raise ValueError(f"{name} is discontinuous at a torsion knot")
     # the mean torque is constant within a clearance, where round-off may lower it
     torque = np.append(c[0, 0, :, 1], slope[0, 0, -1])
-    _refuse_falls(knots, torque, 1e-9 * float(np.abs(torque).max()))
-    _refuse_falls(*_extremes_of_torque(drive), FALL * r.rated_torque)
-    if (drive.end_stiffness[0, 0] <= 0).any():
-        raise ValueError("mean torque decreases with the torsion beyond the knots")
-
-
-def _refuse_falls(torsion: Array, torque: Array, largest: float) -> None:
-    """Reject a torque [N·m] that falls by more than the largest from one to the next.
-
-    Raises:
-        ValueError: If it does; the message states where.
-    """
-    falls = np.diff(torque) < -largest
-    if falls.any():
-        k = int(falls.argmax())
-        raise ValueError(
-            f"mean torque decreases with the torsion: {torque[k]:.4g} N·m at"
-            f" {torsion[k]:.4g} rad and {torque[k + 1]:.4g} N·m at"
-            f" {torsion[k + 1]:.4g} rad"
-        )
-
-
-def _extremes_of_torque(drive: Potential) -> tuple[Array, Array]:
-    """Knots, and torsions between them where the mean torque may be extreme.
-
-    Returns:
-        Torsions, increasing (n,) [rad], and mean torques (n,) [N·m].
-    """
-    width = np.diff(drive.torsion_knots)
-    _, c1, c2, c3, c4 = drive.potential[0, 0].T * np.arange(5)[:, None]
-    # zeros of the stiffness c2 + 2 c3 d + 3 c4 d^2, at any place without a zero
-    with np.errstate(all="ignore"):
-        root = np.sqrt(np.maximum(c3**2 - 3.0 * c2 * c4, 0.0))
-        far = -(c3 + np.copysign(root, c3))
-        zeros = np.nan_to_num([far / (3.0 * c4), c2 / far], posinf=0.0, neginf=0.0)
-    inside = np.sort(np.clip(zeros, 0.0, width), axis=0)
-    d = np.concatenate([np.zeros((1, len(width))), inside, width[None]])
-    torque = c1 + d * (c2 + d * (c3 + d * c4))
-    return (drive.torsion_knots[:-1] + d).T.ravel(), torque.T.ravel()
+    if (np.diff(torque) < -1e-9 * np.abs(torque).max()).any() or (
+        drive.end_stiffness[0, 0] <= 0
+    ).any():
+        raise ValueError("mean torque decreases with the torsion")

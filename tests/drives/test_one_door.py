@@ -14,7 +14,7 @@ import swgjoint
 from swgjoint.cli.main import main
 from swgjoint.drives import solve_map as solving
 from swgjoint.drives.references import load_drive
-from swgjoint.errors import ComputationError, InputError
+from swgjoint.errors import InputError
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.file import map_bytes
 from swgjoint.sim.assembly import assemble
@@ -76,20 +76,3 @@ def test_a_fidelity_needs_a_design():
     said = naming("2d", "CSG-25-100", "catalogue", "a design")
     with pytest.raises(InputError, match=said):
         swgjoint.spec_sheet("CSG-25-100", model="2d")
-
-
-@pytest.mark.parametrize("cache", [False, True])
-def test_an_invalid_map_is_refused(synthetic_map, monkeypatch, tmp_path, cache):
-    """A fit whose mean torque falls with the torsion: no map, whatever asks for it.
-
-    ``run`` and ``spec`` used such a map of size-8-30, and only ``map`` refused it.
-    """
-    potential = synthetic_map.potential.copy()
-    potential[0] *= -1.0
-    broken = replace(synthetic_map, potential=potential)
-    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
-    monkeypatch.setattr(solving, "solve_map", lambda *args, **options: broken)
-    words = naming("size-8-30", "ring", "torque decreases", "N·m", "rad", "2d")
-    with pytest.raises(ComputationError, match=words):
-        swgjoint.build_map(Design.load("size-8-30"), model="ring", cache=cache)
-    assert not list(tmp_path.rglob("*.swg"))
