@@ -33,6 +33,9 @@ def test_the_mirror_image_of_an_equilibrium_is_one(small_drive, loaded):
     assert small_drive.input_torque(solved) == pytest.approx(
         -small_drive.input_torque(loaded), rel=1e-6
     )
+    # the figures of the image are those of the equilibrium that is solved from it
+    for key in ("torque", "wave_generator_torque", "tooth_moment", "energy"):
+        assert getattr(image, key) == pytest.approx(getattr(solved, key), rel=1e-6)
 
 
 def test_an_unmirrored_state_is_no_equilibrium_under_the_opposite_torque(
