@@ -93,7 +93,7 @@ Nearest Radial::nearest(Vec point) const {
   const double angle = std::atan2(-point.x, point.y);
   double bend;
   const Nearest found = from(angle, point, &bend);
-  const bool near = std::abs(found.gap) < kNear * radius(angle).value;
+  const bool near = std::abs(found.gap) < kNear * size(point);
   if (near && bend > kStraight) return found;
   return from(nearest_sample(point), point, &bend);
 }

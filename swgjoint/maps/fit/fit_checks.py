@@ -118,13 +118,9 @@ def stiffness_range(drive: DriveMap) -> list[float]:
     width = np.diff(drive.torsion_knots)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         vertex = np.clip(np.nan_to_num(-0.5 * c[:, 1] / c[:, 2]), 0.0, width)
-    ends = c[:, 0], c[:, 0] + width * (c[:, 1] + width * c[:, 2])
-    at_vertex = c[:, 0] + vertex * (c[:, 1] + vertex * c[:, 2])
-    extremes = [*ends, at_vertex]
-    return [
-        float(min(one.min() for one in extremes)),
-        float(max(one.max() for one in extremes)),
-    ]
+    places = 0.0, width, vertex
+    extremes = np.stack([c[:, 0] + d * (c[:, 1] + d * c[:, 2]) for d in places])
+    return [float(extremes.min()), float(extremes.max())]
 
 
 def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
