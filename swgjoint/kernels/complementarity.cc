@@ -12,12 +12,6 @@ namespace {
 // A new reference is taken after kFewest changes and one per kShare active contacts: then
 // the factors cost less than the extra unknowns.
 constexpr std::size_t kFewest = 4, kShare = 12;
-constexpr double kResidual = 1e-4;  // error of an active equation, in tolerances
-// Contacts are exchanged whose violation is at least this fraction of the largest one:
-// the first as long as the number of violations falls, the second if it does not. If all
-// of them were exchanged, the rim could lift off the wave generator in one step, and the
-// search would go around in circles.
-constexpr double kViolated = 0.05, kMostViolated = 0.5;
 
 }  // namespace
 

@@ -27,6 +27,14 @@ struct StripLaw {
   double excess(std::size_t strip, double force, double* derivative) const;
 };
 
+// Error of an active equation up to which a solution is accepted, in tolerances
+constexpr double kResidual = 1e-4;
+// Contacts are exchanged whose violation is at least this fraction of the largest one:
+// the first as long as the number of violations falls, the second if it does not. If all
+// of them were exchanged, the rim could lift off the wave generator in one step, and the
+// search would go around in circles.
+constexpr double kViolated = 0.05, kMostViolated = 0.5;
+
 // What all problems share. Everything is scaled to a unit diagonal of the matrix.
 struct Problem {
   std::size_t size;

@@ -33,6 +33,7 @@ constexpr std::size_t kSmall = 4000;  // numbers of a matrix that is not divided
 // Eight numbers, which compilers with vector types keep in one or more registers.
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(64), aligned(8), may_alias));
+SWGJOINT_INLINE Lanes inverted(Lanes x) { return 1.0 / x; }
 #else
 struct Lanes {
   double v[8];
@@ -43,6 +44,14 @@ struct Lanes {
 };
 inline Lanes operator*(double a, Lanes x) {
   for (int k = 0; k < 8; ++k) x.v[k] *= a;
+  return x;
+}
+inline Lanes operator*(const Lanes& a, Lanes x) {
+  for (int k = 0; k < 8; ++k) x.v[k] *= a.v[k];
+  return x;
+}
+inline Lanes inverted(Lanes x) {
+  for (int k = 0; k < 8; ++k) x.v[k] = 1.0 / x.v[k];
   return x;
 }
 #endif
@@ -281,6 +290,52 @@ SWGJOINT_WIDE void substitute(const double* factors, const std::size_t* pivots,
     const double* column = factors + c * rows;
     const double known = right[c] /= column[c];
     for (std::size_t i = 0; i < c; ++i) right[i] -= known * column[i];
+  }
+}
+
+SWGJOINT_WIDE void eliminate_lanes(double* matrices, std::size_t rows,
+                                   std::size_t stride) {
+  Lanes* a = reinterpret_cast<Lanes*>(matrices);
+  for (std::size_t c = 0; c < rows; ++c) {
+    const Lanes* own = a + c * stride;
+    const Lanes inverse = inverted(own[c]);
+    a[c * stride + c] = inverse;
+    std::size_t i = c + 1;
+    for (; i + 2 <= rows; i += 2) {
+      Lanes *row = a + i * stride, *next = row + stride;
+      const Lanes lower = row[c] * inverse, below = next[c] * inverse;
+      row[c] = lower;
+      next[c] = below;
+      for (std::size_t k = c + 1; k < rows; ++k) {
+        const Lanes upper = own[k];
+        row[k] -= lower * upper;
+        next[k] -= below * upper;
+      }
+    }
+    for (; i < rows; ++i) {
+      Lanes* row = a + i * stride;
+      const Lanes lower = row[c] * inverse;
+      row[c] = lower;
+      for (std::size_t k = c + 1; k < rows; ++k) row[k] -= lower * own[k];
+    }
+  }
+}
+
+SWGJOINT_WIDE void substitute_lanes(const double* factors, std::size_t rows,
+                                    std::size_t stride, double* right) {
+  const Lanes* a = reinterpret_cast<const Lanes*>(factors);
+  Lanes* x = reinterpret_cast<Lanes*>(right);
+  for (std::size_t i = 1; i < rows; ++i) {
+    const Lanes* row = a + i * stride;
+    Lanes sum = x[i];
+    for (std::size_t k = 0; k < i; ++k) sum -= row[k] * x[k];
+    x[i] = sum;
+  }
+  for (std::size_t i = rows; i-- > 0;) {
+    const Lanes* row = a + i * stride;
+    Lanes sum = x[i];
+    for (std::size_t k = i + 1; k < rows; ++k) sum -= row[k] * x[k];
+    x[i] = sum * row[i];
   }
 }
 

@@ -39,6 +39,16 @@ bool eliminate(double* matrix, std::size_t rows, std::size_t width, std::size_t 
 void substitute(const double* factors, const std::size_t* pivots, std::size_t rows,
                 double* right);
 
+// LU factors of kLanes matrices at once, without pivoting, for matrices that are nearly
+// symmetric or whose symmetric part is positive definite. The numbers of all matrices at
+// the same place follow one another and begin at a multiple of their size in memory. A
+// row begins stride places after the one before it. The diagonal becomes its inverse.
+void eliminate_lanes(double* matrices, std::size_t rows, std::size_t stride);
+
+// Replace one right-hand side of each matrix by its solution.
+void substitute_lanes(const double* factors, std::size_t rows, std::size_t stride,
+                      double* right);
+
 }  // namespace swgjoint
 
 #endif  // SWGJOINT_KERNELS_DENSE_FACTORS_H_

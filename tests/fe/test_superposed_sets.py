@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.common.pivot_base import similar_sets
@@ -80,9 +81,14 @@ def few_first(request, monkeypatch) -> Iterator[int]:
 
 
 @pytest.mark.parametrize("how", ["", "numpy"])
-def test_guesses_change_no_result(monkeypatch, few_first, how):
-    """Angle, potential and compliance at two torques are those chunk by chunk."""
+@pytest.mark.parametrize("part", [16, 128])
+def test_guesses_change_no_result(monkeypatch, few_first, how, part):
+    """Angle, potential and compliance at two torques are those chunk by chunk.
+
+    Parts smaller than a chunk are solved eight at a time.
+    """
     monkeypatch.setenv("SWGJOINT_KERNELS", how)
+    monkeypatch.setattr(strip_problems, "PART", part)
     change, ticks, before = errors(), [], []
     options = {"chunk": CHUNK, "tick": lambda: ticks.append(1)}
     for torque in (5.0, 8.0):

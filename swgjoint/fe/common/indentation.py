@@ -139,15 +139,16 @@ class Indentation:
             start: Square of b_s [m^2].
         """
         at = start / self._growth
-        x = force / at
-        exact = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
+        x = np.asarray(force / at)
+        area = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
         # for small x the terms cancel: use the series
-        small, series = np.minimum(x, 0.05), np.zeros_like(x)
+        small = x < 0.05
+        few = x[small]
+        series = np.zeros_like(few)
         for n in range(13, 2, -1):
-            series = (series - (-1.0) ** n / (n * (n - 2.0))) * small
-        series *= small**2
-        area = at**2 * np.where(x < 0.05, series, exact)
-        return np.asarray(area + 0.5 * force**2 * log(start))
+            series = (series - (-1.0) ** n / (n * (n - 2.0))) * few
+        area[small] = series * few**2
+        return np.asarray(at**2 * area + 0.5 * force**2 * log(start))
 
 
 def relative_radius(own: ToothProfile, other: ToothProfile) -> float:
@@ -298,8 +299,9 @@ class Strips:
                 zero.
         """
         some, law = np.maximum(force, 0.0), self.law
-        beyond = law.energy(some) - law.energy(self.force)
-        beyond -= 0.5 * self.line * (some**2 - self.force**2)
+        loaded = some > 0.0
+        beyond = -0.5 * self.line * (some**2 - self.force**2) - law.energy(self.force)
+        beyond[loaded] += law.energy(some[loaded])
         return np.asarray(beyond.sum(axis=-1))
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,10 +23,12 @@ class Base:
     """
 
     inside: Index
-    """Unknowns that have changed places (k,)."""
+    """Unknowns that have changed places."""
+    columns: Index
+    """Offsets on which others depend (k,)."""
     forward: Array
-    """Change of the offset q per offset of these unknowns, whose own are removed
-    (m, k)."""
+    """Change of the offset q, without those of the unknowns inside, per offset of
+    these columns (m, k)."""
     matrix: Array
     """Matrix (m, m)."""
     by_strip: Array
@@ -39,6 +41,8 @@ class Base:
     """Change of the output per approach of a strip (n_strips,)."""
     slope: float
     """Change of the output per unit of load while all unknowns are inactive."""
+    line: Array
+    """Compliances that are added to the lines of the strips (n_strips,) [m/N]."""
 
     def offset_of(self, offset: Array) -> Array:
         """Offsets of problems after the exchange.
@@ -47,10 +51,53 @@ class Base:
             offset: Scaled offsets q of the original problems (n_problems, m).
         """
         changed = offset.copy()
-        if self.inside.size:
+        if self.columns.size:
             changed[:, self.inside] = 0.0
-            changed += offset[:, self.inside] @ self.forward.T
+            changed += offset[:, self.columns] @ self.forward.T
         return changed
+
+    def with_lines(self, line: Array, by_slack: Array, by_value: Array) -> Base:
+        """The same problems, with other lines in place of the law of the strips.
+
+        Args:
+            line: Compliances to add to the lines (n_strips,) [m/N].
+            by_slack: Force of each strip per slack (n_strips, m) [N].
+            by_value: Force of each strip per unknown (n_strips, m) [N].
+        """
+        assert not self.columns.size
+        # an approach B c, c = line F + c', with the forces F = by_slack w + by_value v
+        columns = np.flatnonzero(by_slack.any(axis=0))
+        taken = self.by_strip * line
+        system = np.eye(len(self.matrix)) - taken @ by_slack
+        matrix, by_strip, by_load, forward = np.split(
+            np.linalg.solve(
+                system,
+                np.column_stack(
+                    [
+                        self.matrix + taken @ by_value,
+                        self.by_strip,
+                        self.by_load,
+                        taken @ by_slack[:, columns],
+                    ]
+                ),
+            ),
+            np.cumsum([len(self.matrix), len(line), 1]),
+            axis=1,
+        )
+        output = line * self.output_by_strip
+        along = output @ by_slack
+        return replace(
+            self,
+            columns=columns,
+            forward=forward,
+            matrix=matrix,
+            by_strip=by_strip,
+            by_load=by_load[:, 0],
+            by_value=self.by_value + output @ by_value + along @ matrix,
+            output_by_strip=self.output_by_strip + along @ by_strip,
+            slope=self.slope + float(along @ by_load[:, 0]),
+            line=self.line + line,
+        )
 
     def exchange(self, active: Mask) -> Base:
         """The problems in which the active unknowns have changed places.
@@ -76,15 +123,19 @@ class Base:
         matrix[:, inside], matrix[:, outside] = -forward, columns[:, : outside.size]
         by_value[inside] = -self.by_value[inside] @ forward[inside]
         by_value[outside] = outputs[: outside.size]
-        return Base(
+        before = forward @ self.forward[inside]
+        before[outside] += self.forward[outside]
+        return replace(
+            self,
             inside=inside,
-            forward=forward,
+            columns=np.concatenate([inside, self.columns]),
+            forward=np.column_stack([forward, before]),
             matrix=matrix,
             by_load=columns[:, outside.size],
             by_strip=columns[:, outside.size + 1 :],
             by_value=by_value,
             output_by_strip=self.output_by_strip + outputs[outside.size + 1 :],
-            slope=float(outputs[outside.size]),
+            slope=self.slope + float(outputs[outside.size]),
         )
 
 

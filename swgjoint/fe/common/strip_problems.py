@@ -24,13 +24,8 @@ import numpy as np
 
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.common.pivot_base import Base, next_to, similar_parts, similar_sets
-from swgjoint.fe.common.pivoting import (
-    SINGLES,
-    TOLERANCE,
-    TRIES,
-    solve_active,
-    solve_many,
-)
+from swgjoint.fe.common.pivoting import SINGLES, TOLERANCE, TRIES, solve_many
+from swgjoint.fe.common.strip_slopes import slopes_by_load
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
@@ -41,6 +36,8 @@ ROUNDS = 60
 each of which divides its error by about four."""
 PART = 128
 """Largest number of similar problems that share a base, see :class:`Base`."""
+TOGETHER = 512
+"""Largest number of consecutive problems with guesses that share a base."""
 GROUP = 4
 """Number of parts that are solved one after another. Without a guess, the first problem
 of a part starts from a solution of the part before it."""
@@ -99,7 +96,8 @@ class StripProblems:
 
         Args:
             offset: Offsets q (n_problems, m).
-            start: Guess of the active sets (n_problems, m); None for empty sets.
+            start: Guess of the active sets (n_problems, m), similar ones one after
+                another; None for empty sets.
         """
         if kernels() is None:
             return self._solve_in_rounds(offset, start)
@@ -123,7 +121,7 @@ class StripProblems:
         return numbers
 
     @cached_property
-    def _sums(self) -> Array:
+    def sums(self) -> Array:
         """Matrix that adds up what belongs to a strip (n, n_strips)."""
         if self.strips is None:
             return np.zeros((self.by_gap.shape[1], 0))
@@ -134,20 +132,20 @@ class StripProblems:
     @cached_property
     def by_strip(self) -> Array:
         """Change B of the offset per approach of a strip (m, n_strips)."""
-        return np.asarray(self.by_gap @ self._sums)
+        return np.asarray(self.by_gap @ self.sums)
 
     @cached_property
     def output_by_strip(self) -> Array:
         """Change b of the output per approach of a strip (n_strips,)."""
-        return np.asarray(self.output_by_gap @ self._sums)
+        return np.asarray(self.output_by_gap @ self.sums)
 
     # -- numpy -------------------------------------------------------------------------
 
     def _solve_in_rounds(self, offset: Array, start: Mask | None) -> StripSolution:
         """Reference: solve with given approaches, correct them until they agree."""
         count, strips = len(offset), self.strips
-        n = self._sums.shape[0]
-        approach = np.zeros((count, self._sums.shape[1]))
+        n = self.sums.shape[0]
+        approach = np.zeros((count, self.sums.shape[1]))
         force, active = np.zeros_like(approach), start
         agreed = np.full(count, strips is None)
         for _ in range(ROUNDS):
@@ -158,7 +156,7 @@ class StripProblems:
             if strips is None:
                 break
             forces = np.where(self.closed, solution.slack, solution.value)
-            force = forces[:, :n] @ self._sums
+            force = forces[:, :n] @ self.sums
             wanted, _ = strips.excess(force)
             agreed = np.abs(wanted - approach).max(axis=1) <= EXACT
             if (agreed | ~solution.solved).all():
@@ -170,45 +168,12 @@ class StripProblems:
             active=solution.active,
             approach=approach,
             force=force,
-            slope=np.where(solved, self._slopes(solution.active, force), np.nan),
+            slope=np.where(
+                solved, slopes_by_load(self, solution.active, force), np.nan
+            ),
             solved=solved,
             margin=solution.value * self._scale - solution.slack / self._scale,
         )
-
-    def _slopes(self, active: Mask, force: Array) -> Array:
-        """Derivative of the output with respect to the load (n_problems,)."""
-        if self.strips is None:
-            moves = solve_active(self.matrix, self.by_load, active)
-            return np.asarray(moves @ self.by_value)
-        _, derivative = self.strips.excess(force)
-        slope = np.empty(len(active))
-        n, count = self._sums.shape
-        for k, row in enumerate(active):
-            inside = np.flatnonzero(row)
-            # forces of the strips: unknowns of open contacts, slacks of closed ones
-            open_ = self._sums.T * (row & ~self.closed)[:n]
-            shut = self._sums.T * (self.closed & ~row)[:n]
-            into = np.zeros((count, len(row)))
-            into[:, :n] = open_
-            into = into + shut @ self.matrix[:n]
-            d = derivative[k][:, None]
-            system = np.block(
-                [
-                    [self.matrix[np.ix_(inside, inside)], self.by_strip[inside]],
-                    [
-                        -d * into[:, inside],
-                        np.eye(count) - d * (shut @ self.by_strip[:n]),
-                    ],
-                ]
-            )
-            right = [-self.by_load[inside], derivative[k] * (shut @ self.by_load[:n])]
-            try:
-                moves = np.linalg.solve(system, np.concatenate(right))
-            except np.linalg.LinAlgError:
-                moves = np.full(len(system), np.nan)
-            outputs = [self.by_value[inside], self.output_by_strip]
-            slope[k] = np.concatenate(outputs) @ moves
-        return slope
 
     # -- compiled ----------------------------------------------------------------------
 
@@ -223,6 +188,7 @@ class StripProblems:
         scale = self._scale
         return Base(
             inside=np.zeros(0, dtype=np.int64),
+            columns=np.zeros(0, dtype=np.int64),
             forward=np.zeros((len(scale), 0)),
             matrix=self.matrix / scale[:, None] / scale,
             by_strip=self.by_strip / scale[:, None],
@@ -230,17 +196,65 @@ class StripProblems:
             by_value=self.by_value / scale,
             output_by_strip=self.output_by_strip,
             slope=0.0,
+            line=np.zeros(self.sums.shape[1]),
+        )
+
+    @cached_property
+    def _unit(self) -> Array:
+        """Force per scaled slack of closed contacts, or unknown of open ones (m,)."""
+        return np.where(self.closed, self._scale, 1.0 / self._scale)
+
+    @cached_property
+    def _by_contact(self) -> Array:
+        """Forces of the strips per scaled slack or unknown (n_strips, m) [N]."""
+        n, count = self.sums.shape
+        by_contact = np.zeros((count, len(self.matrix)))
+        by_contact[:, :n] = self.sums.T * self._unit[:n]
+        return by_contact
+
+    def _forces(self, active: Mask, result: Array) -> Array:
+        """Forces of the strips (n_problems, n_strips) [N].
+
+        Args:
+            active: Active sets (n_problems, m).
+            result: Scaled unknowns where active, scaled slacks elsewhere
+                (n_problems, m).
+        """
+        n = len(self.sums)
+        # unknowns of open contacts, slacks of closed ones
+        carries = active[:, :n] != self.closed[:n]
+        return np.asarray(
+            np.where(carries, result[:, :n], 0.0) @ self._by_contact[:, :n].T
+        )
+
+    def _with_lines_at(self, force: Array) -> Base:
+        """The problems with lines that touch the law at mean forces.
+
+        Args:
+            force: Forces of the strips in some of the problems (k, n_strips) [N].
+        """
+        loaded = force > 0.0
+        if self.strips is None or not loaded.any():
+            return self._origin
+        count = loaded.sum(axis=0)
+        # a strip that carries nothing here may carry as much as others elsewhere
+        mean = force.sum() / count.sum()
+        at = np.where(count > 0, force.sum(axis=0) / np.maximum(count, 1), 0.5 * mean)
+        return self._origin.with_lines(
+            self.strips.law.slope(at) - self.strips.line,
+            self._by_contact * self.closed,
+            self._by_contact * ~self.closed,
         )
 
     def _native(self, base: Base) -> Any:
         """Matrix and strips of a base as the compiled loop takes them."""
         native = kernels()
         assert native is not None
-        scale, strips = self._scale, self.strips
-        none = np.zeros(0)
+        strips, none = self.strips, np.zeros(0)
         law, line, offset = np.zeros(4), none, none
         if strips is not None:
-            law, line, offset = strips.law.constants, strips.line, strips.line_offset
+            law, offset = strips.law.constants, strips.line_offset
+            line = strips.line + base.line
         closed = self.closed.copy()
         closed[base.inside] ^= True
         return native.StripProblems(
@@ -248,7 +262,7 @@ class StripProblems:
             np.ascontiguousarray(base.by_strip.T),
             self._strip,
             closed,
-            np.where(self.closed, scale, 1.0 / scale),
+            self._unit,
             np.ascontiguousarray(base.by_load),
             np.ascontiguousarray(base.by_value),
             np.ascontiguousarray(base.output_by_strip),
@@ -264,7 +278,7 @@ class StripProblems:
     def _solve_compiled(self, offset: Array, start: Mask | None) -> StripSolution:
         """Block principal pivoting with Newton's method for the strips."""
         scale, (count, m) = self._scale, offset.shape
-        n_strips = self._sums.shape[1]
+        n_strips = self.sums.shape[1]
         q = offset / scale
         tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
         active = np.zeros((count, m), bool) if start is None else start.copy()
@@ -291,6 +305,7 @@ class StripProblems:
                 done,
             )
             ends[:, inside] ^= True
+            moved += base.line * self._forces(ends, values)
             result[part], active[part], approach[part] = values, ends, moved
             slope[part], solved[part] = slopes + base.slope, done
 
@@ -307,6 +322,11 @@ class StripProblems:
             for part in parts:
                 base, problems = chosen(active[part], part.size)
                 solve(part, base, problems, np.full(part.size, -1))
+
+        def solve_together(parts: list[Index]) -> None:
+            for part in parts:
+                base = lined.exchange(active[part].mean(axis=0) > 0.5)
+                solve(part, base, self._native(base), np.zeros(0, dtype=np.int64))
 
         def collect(part: Index, otherwise: Mask) -> Mask:
             """Active sets of the problems of a part that were solved (k, m)."""
@@ -343,8 +363,14 @@ class StripProblems:
             crowded = count > PART and first_sets.sum(axis=1).mean() > FEW
             similar_at = common[0].offset_of(q)
             parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
-        else:
+        elif count < PART:
             parts, solve_parts = similar_sets(start, PART), solve_guessed
+        else:
+            rows = np.arange(count)
+            parts = np.array_split(rows, -(-count // TOGETHER))
+            solve_parts, samples = solve_together, rows[:: -(-count // SAMPLES)]
+            solve(samples, self._origin, self._native_origin, np.full(samples.size, -1))
+            lined = self._with_lines_at(self._forces(active[samples], result[samples]))
         groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
         if len(groups) == 1:
             solve_parts(groups[0])
@@ -352,18 +378,14 @@ class StripProblems:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
                 list(pool.map(solve_parts, groups))
         solved &= np.isfinite(result).all(axis=1) & np.isfinite(slope)
-        # forces of the strips: unknowns of open contacts, slacks of closed ones
-        n = self._sums.shape[0]
-        unit = np.where(self.closed, scale, 1.0 / scale)[:n]
-        carries = active[:, :n] != self.closed[:n]
-        forces = np.where(carries, result[:, :n] * unit, 0.0)
+        force = self._forces(active, result)
         margin = np.where(active, result, -result)
         result = np.maximum(margin, 0.0) / scale
         return StripSolution(
             value=result,
             active=active,
             approach=approach,
-            force=forces @ self._sums,
+            force=force,
             slope=slope,
             solved=solved,
             margin=margin,

@@ -99,12 +99,21 @@ class NearContacts:
         at, change = self.at, gap_change[:, self.teeth]
         found = self.near.respond(change, torque, start)
         assert found.margin is not None and found.approach is not None
-        inputs = [change, np.maximum(found.margin, 0.0), found.approach]
-        slack = np.concatenate(inputs, axis=1) @ self.by_inputs
+        inputs = np.concatenate(
+            [change, np.maximum(found.margin, 0.0), found.approach], axis=1
+        )
         scale = np.sqrt(np.diag(at.matrix))
         begin = (at.slack + (torque - at.torque) * at.by_torque) / scale
-        slack += begin[self.others]
-        apart = self.others[self.others < len(at.sector)]
-        slack[:, : apart.size] += gap_change[:, apart] / scale[apart]
         tolerance = TOLERANCE * np.abs(begin).max()
+        begin = begin[self.others]
+        # most contacts keep their state whatever the inputs within their ranges are
+        low, high = inputs.min(axis=0), inputs.max(axis=0)
+        least = begin + 0.5 * (low + high) @ self.by_inputs
+        least -= 0.5 * (high - low) @ np.abs(self.by_inputs)
+        apart = self.others[self.others < len(at.sector)]
+        least[: apart.size] += gap_change[:, apart].min(axis=0) / scale[apart]
+        doubtful = np.flatnonzero(~(least >= -tolerance))
+        slack = begin[doubtful] + inputs @ self.by_inputs[:, doubtful]
+        teeth = apart[doubtful[doubtful < apart.size]]
+        slack[:, : teeth.size] += gap_change[:, teeth] / scale[teeth]
         return found, np.asarray(slack.min(axis=1, initial=0.0) >= -tolerance)
