@@ -162,9 +162,11 @@ SWGJOINT_INLINE void DriveMap::CombineBlocks(int segment, const double* weight,
                                              double out[5]) const {
   constexpr BlockSizes size = {kSize};
   constexpr int width = sizeof(V) / sizeof(double);
-  V total[5] = {};
+  V total[5];
+  Clear(total);
   for (int part = 0; part < kSize; part += width) {
-    V sum[5] = {};
+    V sum[5];
+    Clear(sum);
     const double* by = weight + part;
     // data() is used because a map without harmonics has an empty table
     const double* row =
@@ -205,7 +207,7 @@ template <class V, int kSize, bool kPsi>
 SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
   constexpr BlockSizes size = {kSize};
   constexpr int width = sizeof(V) / sizeof(double);
-  V all_w[5] = {}, all_u[5] = {}, all_v[5] = {}, all_theta = {}, all_psi = {};
+  V all_w[5], all_u[5], all_v[5], all_theta, all_psi;
   const int blocks = blocks_;
   // n sin(eta)/eta is sin(eta) times this number, or n if eta^2/6 is less than 2^-53
   const bool still = std::fabs(dtheta) * top_theta_ < 1e-8;
@@ -215,7 +217,10 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
         table_->data() + static_cast<size_t>(j0_) * blocks_ * size.block() + part;
     const double* own = harmonics_.data() + part;
     double* weight = weight_.data() + part;
-    V w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
+    V w[5], u[5], v[5], g_theta = {}, g_psi = {};
+    Clear(w);
+    Clear(u);
+    Clear(v);
     for (int b = 0; b < blocks;
          ++b, row += size.block(), own += size.harmonics(), weight += size.weights()) {
       V c0, s0, ch, sh, by_theta, by_psi, error_c, error_s, psi_c, psi_s, even, odd;
@@ -262,12 +267,13 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, DriveValue* out) {
     for (int p = 0; p < 5; ++p) {
       V a;
       Load(mean + p * size.lanes, &a);
-      all_w[p] += w[p] + a;
-      all_u[p] += u[p];
-      all_v[p] += v[p];
+      w[p] += a;
+      all_w[p] = part ? all_w[p] + w[p] : w[p];
+      all_u[p] = part ? all_u[p] + u[p] : u[p];
+      all_v[p] = part ? all_v[p] + v[p] : v[p];
     }
-    all_theta += g_theta;
-    all_psi += g_psi;
+    all_theta = part ? all_theta + g_theta : g_theta;
+    all_psi = part ? all_psi + g_psi : g_psi;
   }
   double rest[4];
   Sums(all_w[1], all_w[2], all_w[3], all_w[4], w_ + 1);

@@ -137,8 +137,10 @@ SWGJOINT_INLINE void Store(double* to, const V& x) {
 // its place has been hidden. Both would take half as long again.
 #if defined(__GNUC__) && !defined(__clang__)
 #define SWGJOINT_ROLLED _Pragma("GCC unroll 1")
+#define SWGJOINT_UNROLLED _Pragma("GCC unroll 16")
 #else
 #define SWGJOINT_ROLLED
+#define SWGJOINT_UNROLLED
 #endif
 SWGJOINT_INLINE void Hide(const double** place) {
 #if defined(__GNUC__)
@@ -146,6 +148,16 @@ SWGJOINT_INLINE void Hide(const double** place) {
 #else
   static_cast<void>(place);
 #endif
+}
+
+// Sets sums in vectors to zero. With an initial value the compiler clears the array in
+// memory, in every call and with vectors of twice the length, even if it keeps the sums
+// in registers.
+template <class V, int kCount>
+SWGJOINT_INLINE void Clear(V (&sums)[kCount]) {
+  const V zero = {};
+  SWGJOINT_UNROLLED
+  for (int k = 0; k < kCount; ++k) sums[k] = zero;
 }
 
 SWGJOINT_INLINE double Dot(const Pair& a, const Pair& b) {

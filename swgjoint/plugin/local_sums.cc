@@ -314,7 +314,8 @@ SWGJOINT_INLINE void LocalSums::SumWaves(const Window& window, Totals* out) cons
   const Powers of = PowersOfStep();
   alignas(64) double weights[kTerms * kWeights * kWideLanes];
   // real and imaginary parts in sums that do not wait for each other
-  V sum[parts][kWeights] = {};
+  V sum[parts][kWeights];
+  for (int part = 0; part < parts; ++part) Clear(sum[part]);
   const double* block = window.z.data();
   for (int first = 0; first < waves_; first += kWideLanes) {
     const int count = std::min(kWideLanes, waves_ - first);
