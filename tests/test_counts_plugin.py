@@ -149,7 +149,7 @@ def test_map_evaluations_of_a_step(program, models, folder):
     for path in sorted((ROOT / "swgjoint" / "plugin").glob("*.[ch]*")):
         text = path.read_text()
         if path.name == "drive_map.cc":
-            head = "void DriveMap::Secant("
+            head = "void DriveMap::SumHarmonics("
             assert text.count(head) == 1
             name, rest = text.split(head)
             begin, body = rest.split("{", 1)

@@ -369,7 +369,8 @@ SWGJOINT_CLONES void Drive::PredictGroup(const mjModel* m, mjData* d, int instan
     if (drive->map_.many()) {
       // the table is in the cache from one pass to the next
       for (int pass = 0; pass < drive->passes_; ++pass) {
-        drive->Secant(&drive->step_);
+        drive->SumHarmonics(&drive->step_);
+        drive->FinishSecant(&drive->step_);
         drive->Solve(pass, &drive->step_);
       }
       continue;
@@ -379,10 +380,12 @@ SWGJOINT_CLONES void Drive::PredictGroup(const mjModel* m, mjData* d, int instan
   }
   for (int pass = 0; pass < passes; ++pass) {
     for (int k = 0; k < size; ++k) {
-      if (pass < group[k]->passes_) group[k]->Secant(&group[k]->step_);
+      if (pass < group[k]->passes_) group[k]->SumHarmonics(&group[k]->step_);
     }
     for (int k = 0; k < size; ++k) {
-      if (pass < group[k]->passes_) group[k]->Solve(pass, &group[k]->step_);
+      if (pass >= group[k]->passes_) continue;
+      group[k]->FinishSecant(&group[k]->step_);
+      group[k]->Solve(pass, &group[k]->step_);
     }
   }
 }

@@ -7,32 +7,6 @@
 #include "lanes.h"
 
 namespace swgjoint {
-namespace {
-
-// The mean torque between two torsions that belong to one polynomial of the potential,
-// and its derivative by the second torsion.
-SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
-  // The torque is cubic, so that the trapezoidal rule with a correction by the end
-  // derivatives is exact. It needs no difference of energies and remains accurate if
-  // the torsions are close or equal.
-  const double c2 = 2 * w[2], c3 = 3 * w[3], c4 = 4 * w[4];
-  const Pair cubic = d * c4;
-  const Pair stiffness = c2 + d * (2 * c3 + cubic * 3);
-  const Pair torque = w[1] + d * (c2 + d * (c3 + cubic));
-  const double step = d[1] - d[0], growth = stiffness[1] - stiffness[0];
-  return {0.5 * (torque[0] + torque[1]) - step * (1. / 12) * growth,
-          0.5 * stiffness[1] - growth * (1. / 12) -
-              step * (1. / 6) * (c3 + 3 * cubic[1]),
-          stiffness};
-}
-// Mean of the polynomial's values at two places.
-SWGJOINT_INLINE double MeanValue(const double w[5], const Pair& d) {
-  const Pair value = w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
-  return 0.5 * (value[0] + value[1]);
-}
-
-}  // namespace
-
 // Segment that contains a torsion; 0 and segments_ - 1 are the end parabolas.
 int DriveMap::Segment(double torsion) const {
   if (torsion < knots_.front()) return 0;
@@ -44,6 +18,11 @@ int DriveMap::Segment(double torsion) const {
 void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
   Begin(theta, psi);
   Secant(0.0, 0.0, out);
+}
+
+void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
+  SumHarmonics(dtheta, dpsi, out);
+  FinishSecant(dtheta, dpsi, out);
 }
 
 void DriveMap::Begin(double theta, double psi) {
@@ -373,7 +352,7 @@ SWGJOINT_INLINE void DriveMap::Step(double dtheta, double dpsi, DriveValue* out)
   }
 }
 
-SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
+SWGJOINT_CLONES void DriveMap::SumHarmonics(double dtheta, double dpsi, DriveValue* out) {
   // With the phase phi at the midpoint and half the phase change eta,
   //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), and similarly for sin.
   // The secants of every harmonic for theta and psi therefore have a closed form, and
@@ -389,28 +368,6 @@ SWGJOINT_CLONES void DriveMap::Secant(double dtheta, double dpsi, DriveValue* ou
       Step<Lanes, kWideLanes>(dtheta, dpsi, out);
     }
   }
-  const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
-  const int j1 = SegmentNear(j0_, x1);
-  const Pair d = {d0_, x1 - base_[j1]};
-
-  // torque: mean of dV/d(torsion) along the step, with cos and sin at their means
-  const MeanTorque mean = j0_ == j1 ? Mean(w_, d) : Work(j1, x1);
-  const double begin = mean.stiffness[0], end = mean.stiffness[1];
-  out->torque = scale_ * mean.torque;
-  out->slope = scale_ * std::clamp(mean.slope, 0.5 * std::min(begin, end),
-                                   0.5 * std::max(begin, end));
-  out->stiffness_begin = scale_ * begin;
-  out->stiffness_end = scale_ * end;
-
-  // secants of V for the angles: mean of their values at the two torsions
-  const auto angle = [&](const double u[5], Weighting by) {
-    if (j1 == j0_) return MeanValue(u, d);
-    double other[5] = {0, 0, 0, 0, 0};
-    Add(j1, by, other);
-    return 0.5 * (Value(u, d[0]) + Value(other, d[1]));
-  };
-  const double e_theta = scale_ * angle(u_theta_, Weighting::kTheta);
-  out->e = Pair{e_theta, moves_psi_ ? scale_ * angle(u_psi_, Weighting::kPsi) : 0.0};
 }
 
 }  // namespace swgjoint

@@ -3,6 +3,7 @@
 #ifndef SWGJOINT_PLUGIN_DRIVE_MAP_H_
 #define SWGJOINT_PLUGIN_DRIVE_MAP_H_
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -68,6 +69,28 @@ struct BlockSizes {
   constexpr int weights() const { return 6 * lanes; }
 };
 
+// The mean torque between two torsions that belong to one polynomial of the potential,
+// and its derivative by the second torsion.
+SWGJOINT_INLINE MeanTorque Mean(const double w[5], const Pair& d) {
+  // The torque is cubic, so that the trapezoidal rule with a correction by the end
+  // derivatives is exact. It needs no difference of energies and remains accurate if
+  // the torsions are close or equal.
+  const double c2 = 2 * w[2], c3 = 3 * w[3], c4 = 4 * w[4];
+  const Pair cubic = d * c4;
+  const Pair stiffness = c2 + d * (2 * c3 + cubic * 3);
+  const Pair torque = w[1] + d * (c2 + d * (c3 + cubic));
+  const double step = d[1] - d[0], growth = stiffness[1] - stiffness[0];
+  return {0.5 * (torque[0] + torque[1]) - step * (1. / 12) * growth,
+          0.5 * stiffness[1] - growth * (1. / 12) -
+              step * (1. / 6) * (c3 + 3 * cubic[1]),
+          stiffness};
+}
+// Mean of the polynomial's values at two places.
+SWGJOINT_INLINE double MeanValue(const double w[5], const Pair& d) {
+  const Pair value = w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
+  return 0.5 * (value[0] + value[1]);
+}
+
 class DriveMap {
  public:
   // On failure returns false and names the invalid attribute in `error`.
@@ -99,6 +122,10 @@ class DriveMap {
   // Discrete gradient from the start state to start + (dtheta, dpsi):
   // (torque g + e) . (dtheta, dpsi) equals the change of V up to round-off.
   void Secant(double dtheta, double dpsi, DriveValue* out);
+
+  // The two parts of Secant: the sums over all harmonics with g, and all other values.
+  void SumHarmonics(double dtheta, double dpsi, DriveValue* out);
+  SWGJOINT_INLINE void FinishSecant(double dtheta, double dpsi, DriveValue* out);
 
  private:
   // Number of harmonics above which blocks are wide.
@@ -179,6 +206,31 @@ class DriveMap {
   int totals_of_ = -1;  // segment of totals_
   double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // weighted sums in segment j0_
 };
+
+SWGJOINT_INLINE void DriveMap::FinishSecant(double dtheta, double dpsi, DriveValue* out) {
+  const double x1 = torsion_ + Dot(out->g, Pair{dtheta, dpsi});
+  const int j1 = SegmentNear(j0_, x1);
+  const Pair d = {d0_, x1 - base_[j1]};
+
+  // torque: mean of dV/d(torsion) along the step, with cos and sin at their means
+  const MeanTorque mean = j0_ == j1 ? Mean(w_, d) : Work(j1, x1);
+  const double begin = mean.stiffness[0], end = mean.stiffness[1];
+  out->torque = scale_ * mean.torque;
+  out->slope = scale_ * std::clamp(mean.slope, 0.5 * std::min(begin, end),
+                                   0.5 * std::max(begin, end));
+  out->stiffness_begin = scale_ * begin;
+  out->stiffness_end = scale_ * end;
+
+  // secants of V for the angles: mean of their values at the two torsions
+  const auto angle = [&](const double u[5], Weighting by) {
+    if (j1 == j0_) return MeanValue(u, d);
+    double other[5] = {0, 0, 0, 0, 0};
+    Add(j1, by, other);
+    return 0.5 * (Value(u, d[0]) + Value(other, d[1]));
+  };
+  const double e_theta = scale_ * angle(u_theta_, Weighting::kTheta);
+  out->e = Pair{e_theta, moves_psi_ ? scale_ * angle(u_psi_, Weighting::kPsi) : 0.0};
+}
 
 }  // namespace swgjoint
 

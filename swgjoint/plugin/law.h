@@ -122,7 +122,8 @@ class Law {
                double damping, double* state, Step* step) {
     Start(h, x, v, weight, damping, state, step);
     for (int pass = 0; pass < passes_; ++pass) {
-      Secant(step);
+      SumHarmonics(step);
+      FinishSecant(step);
       Solve(pass, step);
     }
   }
@@ -150,8 +151,12 @@ class Law {
     step->torsion = map_.torsion();
   }
 
-  SWGJOINT_INLINE void Secant(Step* step) {
-    map_.Secant(trial_.dx[0], trial_.dx[1], &step->value);
+  SWGJOINT_INLINE void SumHarmonics(Step* step) {
+    map_.SumHarmonics(trial_.dx[0], trial_.dx[1], &step->value);
+  }
+
+  SWGJOINT_INLINE void FinishSecant(Step* step) {
+    map_.FinishSecant(trial_.dx[0], trial_.dx[1], &step->value);
   }
 
   SWGJOINT_INLINE void Solve(int pass, Step* step) {
