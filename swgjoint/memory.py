@@ -1,4 +1,4 @@
-"""Check that a computation fits in memory before it starts."""
+"""Memory of this process: what fits in, and what it keeps for reuse."""
 
 from __future__ import annotations
 
@@ -9,6 +9,30 @@ from swgjoint.errors import ComputationError
 
 INTERPRETER = 0.25e9
 """Memory of the Python process with its libraries [B]."""
+
+KEPT = 256 << 20
+"""Freed memory at the end of the heap that the process keeps [B]."""
+IN_HEAP = 32 << 20
+"""Size from which on an array gets pages of its own [B]; the largest that glibc takes.
+"""
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h of glibc
+
+
+def keep_freed_memory() -> None:
+    """Keep freed memory for the next arrays of this process.
+
+    By default, glibc returns the memory of arrays of a megabyte to the kernel as soon
+    as they are freed, and the kernel clears all pages of the next array. The function
+    does nothing with other C libraries.
+    """
+    import ctypes
+
+    if os.name != "posix":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_M_TRIM_THRESHOLD, KEPT)
+        mallopt(_M_MMAP_THRESHOLD, IN_HEAP)
 
 
 def available_memory() -> float | None:

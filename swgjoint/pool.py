@@ -13,6 +13,7 @@ from itertools import chain
 from typing import Any, Protocol, TypeVar
 
 from swgjoint.errors import ComputationError
+from swgjoint.memory import keep_freed_memory
 from swgjoint.progress import Progress, silent
 
 CACHE = "SWGJOINT_CACHE"
@@ -127,7 +128,7 @@ def _parallel(
         backend="loky",
         n_jobs=jobs,
         inner_max_num_threads=1,
-        initializer=_end_with,
+        initializer=_prepare_worker,
         initargs=(os.getpid(),),
     ):
         parallel = Parallel(
@@ -153,8 +154,8 @@ def _numbered(
     return number, function(task)
 
 
-def _end_with(parent: int) -> None:
-    """End this process soon after its parent has ended.
+def _prepare_worker(parent: int) -> None:
+    """Keep freed memory, and end this process soon after its parent has ended.
 
     No process would receive the result, and intermediate results are already stored.
     """
@@ -164,6 +165,7 @@ def _end_with(parent: int) -> None:
             time.sleep(WATCH_S)
         os._exit(1)
 
+    keep_freed_memory()
     threading.Thread(target=watch, daemon=True).start()
 
 

@@ -27,6 +27,7 @@ from typing import Any, NoReturn
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
+from swgjoint.memory import keep_freed_memory
 from swgjoint.progress import StderrProgress, silent
 
 COMMANDS = {
@@ -182,6 +183,7 @@ def _command(name: str, arguments: list[str]) -> int:
             parser.error(f"--{option} '': expected a path, not an empty text")
     progress = StderrProgress(verbose=args.verbose)
     args.progress = silent if args.quiet else progress
+    keep_freed_memory()
     incomplete: list[str] = []
     try:
         with warnings.catch_warnings(), _ended(progress), _rare_collections():
