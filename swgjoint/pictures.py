@@ -9,6 +9,8 @@ from typing import IO, Any
 
 LONGEST_WORD = 80
 """Largest length of a word in a picture [characters]; longer words are shortened."""
+_EFFORT = 3
+"""Effort of the PNG compression [-]. The default, 6, takes 40 % longer for 4 % less."""
 _UNSEEN = {"Cc", "Cs", "Cf", "Co", "Cn"}
 """Categories of invisible characters (Unicode Standard, table 4-4)."""
 
@@ -21,9 +23,11 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
         out: Binary stream that receives the file.
         dpi: Resolution [pixels per inch].
     """
+    import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
     from matplotlib.ticker import FixedFormatter, FuncFormatter
+    from PIL import Image
 
     for text in figure.findobj(Text):
         text.set_text(plain_text(text.get_text()))
@@ -37,8 +41,11 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
                     tick.label1.set_parse_math(False)
                     tick.label2.set_parse_math(False)
     figure.dpi = dpi
-    # one drawing; savefig draws twice
-    FigureCanvasAgg(figure).print_png(out)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # once; savefig draws twice
+    # figures have an opaque background, so all pixels are opaque
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.save(out, format="png", dpi=(dpi, dpi), compress_level=_EFFORT)
 
 
 def png(figure: Any, *, dpi: float) -> bytes:
