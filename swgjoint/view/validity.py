@@ -9,6 +9,7 @@ half the step, estimates the integration error.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +20,13 @@ from swgjoint.maps.sheet.validity_marks import joint_doubt
 from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.figures.signals import error_figures, ripple_figures
 from swgjoint.sim.own_drives import scene_of_run
+from swgjoint.sim.simulation import prepare_scene, simulate
 from swgjoint.units import arcmin, deg
 from swgjoint.view.ratings_text import rule_mark
-from swgjoint.view.run import run_scene
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
 STEP_KEYS = {
@@ -60,11 +62,10 @@ def step_error(run: Run) -> dict[str, Any]:
         return {"step_s": step, "reason": f"not run: it would take {steps:.3g} steps"}
     scene, drives = scene_of_run(run.assembly)
     try:
-        fine = run_scene(
-            scene.with_changes({"simulation.step_s": step, "cycle": []}),
-            drives=drives,
-            name=f"{run.name} at half the step",
+        assembly, _ = prepare_scene(
+            scene.with_changes({"simulation.step_s": step, "cycle": []}), drives=drives
         )
+        fine = simulate(_as_far_as_used(assembly), name=f"{run.name} at half the step")
     except SwgError as exc:
         return {"step_s": step, "reason": f"not run: {exc}"}
     joints = {}
@@ -75,6 +76,27 @@ def step_error(run: Run) -> dict[str, Any]:
             for key, path in STEP_KEYS.items()
         }
     return {"step_s": step, "joints": joints}
+
+
+def _as_far_as_used(assembly: Assembly) -> Assembly:
+    """The motion up to the end of the part that the figures use, without the tool."""
+    path, parts = assembly.trajectory, assembly.sub_steps
+    kept = slice(-(-(path.steady.stop - 1) // parts) * parts + 1)  # whole steps
+    return replace(
+        assembly,
+        arm=assembly.arm.without_tool(),
+        trajectory=replace(
+            path,
+            time=path.time[kept],
+            position=path.position[kept],
+            velocity=path.velocity[kept],
+            acceleration=path.acceleration[kept],
+        ),
+        link_torque=assembly.link_torque[kept],
+        feedforward=assembly.feedforward[kept],
+        prescribed=assembly.prescribed[kept],
+        prescribed_rate=assembly.prescribed_rate[kept],
+    )
 
 
 def _step_figures(run: Run, j: int) -> dict[str, Any]:

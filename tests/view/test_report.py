@@ -160,6 +160,25 @@ def test_halving_the_step_keeps_the_orders(synthetic_map):
     assert fine.assembly.load == run.assembly.load
 
 
+def test_the_finer_run_has_the_whole_window(synthetic_map):
+    """It ends with the constant speed, and its figures are those of the whole run."""
+    run = run_scene(
+        "ur5e-sweep",
+        overrides={"simulation.duration_s": 3.5},
+        drives={"reference-2d": synthetic_map},
+    )
+    assert run.steady.stop < 0.7 * run.time.size
+    scene, drives = scene_of_run(run.assembly)
+    fine = run_scene(scene.with_changes({"simulation.step_s": 0.0005}), drives=drives)
+    here, there = (one.metrics()["joints"]["elbow_joint"] for one in (run, fine))
+    found = step_error(run)["joints"]["elbow_joint"]
+    for key, (name, *parts) in STEP_KEYS.items():
+        values = here[name], there[name]
+        for part in parts:
+            values = values[0][part], values[1][part]
+        assert found[key] == abs(values[0] - values[1]) > 0.0
+
+
 def test_the_error_estimate_falls_with_the_step(synthetic_map):
     """The change at half the step is smaller from a smaller step, for every figure."""
     changes = [

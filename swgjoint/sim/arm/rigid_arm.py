@@ -79,6 +79,12 @@ class RigidArm:
         """A fresh editable copy of the arm."""
         return self._spec.copy()
 
+    def without_tool(self) -> RigidArm:
+        """This arm, whose tool positions are not computed."""
+        bare = copy(self)
+        bare.tool = -1
+        return bare
+
     def _mark_tool(self, name: str) -> None:
         """Add a tool site if the name denotes a body instead of a site."""
         spec = self._spec
