@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -28,16 +28,15 @@ from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.assembly_steps import (
     complete_sections,
     engine_addresses,
-    interpolate_samples,
     joints_in_contact,
     load_torque,
     motor_loops,
     output_bearings,
+    plan_torques,
     prescribed_errors,
     scaled_disturbances,
     site_of_force,
 )
-from swgjoint.sim.control import feedforward
 from swgjoint.sim.figures.transmission import Transmission, transmission_of
 from swgjoint.sim.gauges import JointGauges, joint_gauges
 from swgjoint.sim.motion.commanded import check_motion, trajectory_of
@@ -229,7 +228,7 @@ def assemble(
     )
     model = compile_spec(spec, where=f"scene {scene.name!r}")
 
-    link_torque, motor_torque = _planned_torques(
+    link_torque, motor_torque = plan_torques(
         scene, arm, known_arm, trajectory, transmissions, load, sub_steps
     )
     prescribed, prescribed_rate = prescribed_errors(
@@ -359,40 +358,3 @@ def _stable_sub_steps(
         if not region.ok:
             outside[name] = region.exceeded
     return sub_steps, outside
-
-
-def _planned_torques(
-    scene: Scene,
-    arm: RigidArm,
-    known_arm: RigidArm,
-    trajectory: Trajectory,
-    transmissions: Sequence[Transmission],
-    load: Array,
-    sub_steps: int,
-) -> tuple[Array, Array]:
-    """Drive torques of the rigid arm and motor torques of the feed-forward [N·m].
-
-    Returns:
-        Both torques on the commanded motion. Shapes (n, n_joints).
-    """
-    # torques of the rigid arm change little within a step, so they are interpolated
-    coarse = trajectory.every(sub_steps)
-    motion = (coarse.position, coarse.velocity, coarse.acceleration)
-    link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
-    kind = scene.controller.feedforward
-    if scene.controller.kind == "computed_torque":
-        kind = "gravity_inertia"  # for the start only: the loop computes its own torque
-    known_torque = link_torque
-    if kind == "gravity":
-        known_torque = load + interpolate_samples(
-            known_arm.gravity(coarse.position), sub_steps
-        )
-    elif known_arm is not arm:
-        known_torque = load + interpolate_samples(known_arm.torques(*motion), sub_steps)
-    return link_torque, feedforward(
-        kind,
-        link_torque=known_torque,
-        acceleration=trajectory.acceleration,
-        ratio=np.array([t.ratio for t in transmissions]),
-        rotor_inertia=np.array([t.rotor_inertia for t in transmissions]),
-    )

@@ -15,7 +15,7 @@ from swgjoint.joint.tilt import tilt_names
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import Loops
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.control import control_gains, integral_gain
+from swgjoint.sim.control import control_gains, feedforward, integral_gain
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
@@ -263,3 +263,49 @@ def engine_addresses(
         "tilt_position": np.array([j.qposadr[0] for j in tilts], dtype=np.intp),
         "tilt_velocity": np.array([j.dofadr[0] for j in tilts], dtype=np.intp),
     }
+
+
+def plan_torques(
+    scene: Scene,
+    arm: RigidArm,
+    known_arm: RigidArm,
+    trajectory: Trajectory,
+    transmissions: Sequence[Transmission],
+    load: Array,
+    sub_steps: int,
+) -> tuple[Array, Array]:
+    """Drive torques of the rigid arm and motor torques of the feed-forward [N·m].
+
+    Args:
+        scene: The scene.
+        arm: Its arm.
+        known_arm: The controller's model of the arm.
+        trajectory: Commanded motion, one sample per engine step.
+        transmissions: Compiled drives, one per joint.
+        load: Constant load torque against every joint [N·m]. Shape (n_joints,).
+        sub_steps: Engine steps per step of the scene.
+
+    Returns:
+        Both torques on the commanded motion. Shapes (n, n_joints).
+    """
+    # torques of the rigid arm change little within a step, so they are interpolated
+    coarse = trajectory.every(sub_steps)
+    motion = (coarse.position, coarse.velocity, coarse.acceleration)
+    link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
+    kind = scene.controller.feedforward
+    if scene.controller.kind == "computed_torque":
+        kind = "gravity_inertia"  # for the start only: the loop computes its own torque
+    known_torque = link_torque
+    if kind == "gravity":
+        known_torque = load + interpolate_samples(
+            known_arm.gravity(coarse.position), sub_steps
+        )
+    elif known_arm is not arm:
+        known_torque = load + interpolate_samples(known_arm.torques(*motion), sub_steps)
+    return link_torque, feedforward(
+        kind,
+        link_torque=known_torque,
+        acceleration=trajectory.acceleration,
+        ratio=np.array([t.ratio for t in transmissions]),
+        rotor_inertia=np.array([t.rotor_inertia for t in transmissions]),
+    )

@@ -18,7 +18,8 @@ def skip_contact_search(model: mujoco.MjModel) -> mujoco.MjModel:
             able to touch later.
     """
     touch = model.geom_contype.any() and model.geom_conaffinity.any()
-    if touch or model.npair or model.nflex:
+    skips = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+    if touch or model.npair or model.nflex or skips:
         return model
     quick = copy.copy(model)
     quick.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

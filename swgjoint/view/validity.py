@@ -19,8 +19,8 @@ from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
 from swgjoint.maps.sheet.validity_marks import joint_doubt
 from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.figures.signals import error_figures, ripple_figures
-from swgjoint.sim.own_drives import scene_of_run
-from swgjoint.sim.simulation import prepare_scene, simulate
+from swgjoint.sim.other_step import at_step
+from swgjoint.sim.simulation import simulate
 from swgjoint.units import arcmin, deg
 from swgjoint.view.ratings_text import rule_mark
 
@@ -54,25 +54,26 @@ def step_error(run: Run) -> dict[str, Any]:
     Returns:
         ``step_s``, the step of the finer run [s], and ``joints``, the absolute change
         of each figure of :data:`STEP_KEYS` by joint; ``reason`` instead of ``joints``
-        if the finer run would take too many steps or fails.
+        if the finer run would take too many steps, needs an external controller or
+        fails.
     """
     step = 0.5 * run.assembly.step
     steps = run.assembly.scene.simulation.duration_s / step
     if steps > MAX_STEPS:
         return {"step_s": step, "reason": f"not run: it would take {steps:.3g} steps"}
-    scene, drives = scene_of_run(run.assembly)
+    if (controller := run.assembly.controlled_by) is not None:
+        why = f"the scene does not contain its controller, {controller}"
+        return {"step_s": step, "reason": f"not run: {why}"}
     try:
-        assembly, _ = prepare_scene(
-            scene.with_changes({"simulation.step_s": step, "cycle": []}), drives=drives
-        )
-        fine = simulate(_as_far_as_used(assembly), name=f"{run.name} at half the step")
+        finer = _as_far_as_used(at_step(run.assembly, step))
+        fine = simulate(finer, name=f"{run.name} at half the step")
     except SwgError as exc:
         return {"step_s": step, "reason": f"not run: {exc}"}
     joints = {}
     for j, joint in enumerate(run.joints):
-        coarse, finer = _step_figures(run, j), _step_figures(fine, j)
+        here, there = _step_figures(run, j), _step_figures(fine, j)
         joints[joint] = {
-            key: abs(_at(coarse, path) - _at(finer, path))
+            key: abs(_at(here, path) - _at(there, path))
             for key, path in STEP_KEYS.items()
         }
     return {"step_s": step, "joints": joints}
