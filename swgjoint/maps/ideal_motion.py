@@ -136,10 +136,10 @@ class IdealMotion:
                 a, b = a * cos - b * sin, a * sin + b * cos
             # cosines are even and sines are odd in the number of waves
             terms = a - 1j * np.where(waves < 0, -1.0, 1.0)[:, None] * b
-            spectrum = np.zeros((count // 2 + 1, terms.shape[1]), dtype=complex)
-            np.add.at(spectrum, np.abs(waves), 0.5 * count * terms)
-            spectrum[0] *= 2.0
-            return np.asarray(np.fft.irfft(spectrum, count, axis=0))
+            spectrum = np.zeros((terms.shape[1], count // 2 + 1), dtype=complex)
+            np.add.at(spectrum.T, np.abs(waves), 0.5 * count * terms)
+            spectrum[:, 0] *= 2.0
+            return np.asarray(np.fft.irfft(spectrum, count).T)
 
         def sums(amplitudes: Array, there: Index | slice) -> Array:
             slope = amplitudes[:, ::-1] * (n_psi[:, None] * [1, -1])[..., None]

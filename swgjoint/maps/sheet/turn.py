@@ -36,6 +36,10 @@ transforms. Each takes 80 bytes for its coefficients, and 120 for its sums in ev
 interval of the torsion that occurs, usually two to five of them."""
 MAX_SAMPLES = 10_000_000
 """Largest number of samples per period."""
+FEW, SLOW, FAST = 4096, 64, 7
+"""A number of more than ``FEW`` samples per period with a prime factor above ``SLOW``
+is raised to one without factors above ``FAST``, because its Fourier transforms take
+several times as long."""
 LINES = 12
 """Largest number of orders that a sheet lists for each signal."""
 FLOOR = 1e-3
@@ -122,7 +126,25 @@ def period_of(drive: Potential) -> tuple[Fraction, int]:
             f" {float(period):g} turns need {samples} samples; accepted: up to"
             f" {MAX_SAMPLES}; remove the highest harmonics"
         )
+    if samples > FEW and _largest_factor(samples) > SLOW:
+        while _largest_factor(samples) > FAST:
+            samples += 1
     return period, samples
+
+
+def _largest_factor(number: int) -> int:
+    """Largest prime factor of a number above one.
+
+    >>> [_largest_factor(n) for n in (2, 15, 47_599, 47_600)]
+    [2, 5, 47599, 17]
+    """
+    factor = 2
+    while factor * factor <= number:
+        if number % factor:
+            factor += 1
+        else:
+            number //= factor
+    return number
 
 
 def _strengths(drive: Potential) -> Array:
