@@ -21,6 +21,7 @@ trigonometric polynomial with the cosine at its maximum).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import comb
 from typing import TYPE_CHECKING
 
@@ -56,8 +57,9 @@ def largest_sums(orders: NDArray[np.int64], amplitudes: Array) -> Array:
     bounds = np.hypot(amplitudes[..., 0], amplitudes[..., 1]).sum(axis=-1)
     if len(orders) <= MANY:
         return np.asarray(bounds)
-    found, least = _largest_at_points(orders, amplitudes, POINTS)
-    return np.asarray(np.minimum(bounds, found / least))
+    at_points = _sums_at_points(orders, POINTS)
+    found = np.array([at_points(pairs) for pairs in amplitudes])
+    return np.asarray(np.minimum(bounds, found / _least_share(orders, POINTS)))
 
 
 def largest_total(
@@ -75,10 +77,15 @@ def largest_total(
     """
     if len(orders) > MANY:
         most = constants + np.hypot(*np.moveaxis(amplitudes, -1, 0)).sum(axis=-1)
-        near = np.flatnonzero(most >= constants.max())
-        found, least = _largest_at_points(orders, amplitudes[near], COARSE)
-        least *= _least_share(orders, POINTS)
-        near = near[constants[near] + found / least >= (constants[near] + found).max()]
+        at_points = _sums_at_points(orders, COARSE)
+        found, best = np.full(len(most), -np.inf), float(constants.max())
+        for k in np.argsort(-most):
+            if most[k] < best:
+                break
+            found[k] = at_points(amplitudes[k])
+            best = max(best, float(constants[k] + found[k]))
+        least = _least_share(orders, COARSE) * _least_share(orders, POINTS)
+        near = np.flatnonzero(constants + found / least >= best)
         amplitudes, constants = amplitudes[near], constants[near]
     return float((constants + largest_sums(orders, amplitudes)).max())
 
@@ -95,39 +102,34 @@ def _least_share(orders: NDArray[np.int64], per_period: int) -> float:
     return float(np.prod(np.cos(np.pi * degree / _points(orders, per_period))))
 
 
-def _largest_at_points(
-    orders: NDArray[np.int64], amplitudes: Array, per_period: int
-) -> tuple[Array, float]:
-    """Largest magnitude at points, and its :func:`_least_share`.
+def _sums_at_points(
+    orders: NDArray[np.int64], per_period: int
+) -> Callable[[Array], float]:
+    """Function of amplitudes (n, 2) that finds the largest magnitude of their sum.
 
     Args:
         orders: Orders (p, q) of the harmonics (n, 2).
-        amplitudes: Cosine and sine amplitudes of m sums (m, n, 2).
         per_period: Smallest number of points per period of the fastest harmonic.
-
-    Returns:
-        Largest magnitudes (m,), and the share.
     """
     points = _points(orders, per_period)
-    # two real sums are the real and the imaginary part of one complex sum
-    waves = 0.5 * (amplitudes[..., 0] - 1j * amplitudes[..., 1])
-    mirrored = np.concatenate([orders, -orders])
-    rows, row = np.unique(mirrored[:, 0], return_inverse=True)
-    at = row * points[1] + mirrored[:, 1] % points[1]
-    largest = np.zeros(len(waves))
-    for first in range(0, len(waves), 2):
-        pair = waves[first : first + 2]
-        factor = np.array([1.0, 1j])[: len(pair)]
-        both = np.concatenate([factor @ pair, factor @ pair.conj()])
-        size = rows.size * points[1]
-        real, imaginary = (np.bincount(at, x, size) for x in (both.real, both.imag))
-        part = (real + 1j * imaginary).reshape(rows.size, points[1])
-        grid = np.zeros(points, dtype=complex)
-        grid[rows % points[0]] = np.fft.ifft(part, axis=1, norm="forward")
-        values = np.fft.ifft(grid, axis=0, norm="forward")
-        found = [np.abs(values.real).max(), np.abs(values.imag).max()][: len(pair)]
-        largest[first : first + 2] = found
-    return largest, _least_share(orders, per_period)
+    # waves with p < 0 are turned round, which leaves their real parts
+    sign = np.where(orders[:, 0] < 0, -1, 1)
+    p, q = sign * orders.T
+    rows, row = np.unique(p, return_inverse=True)
+    at, size = row * points[1] + q % points[1], rows.size * points[1]
+    # the even and the odd part in alpha yield the values at alpha and at -alpha
+    alpha = 2.0 * np.pi / points[0] * np.arange(points[0] // 2 + 1)
+    even, odd = (f(alpha[:, None] * rows) for f in (np.cos, np.sin))
+
+    def largest(amplitudes: Array) -> float:
+        cosine, sine = amplitudes.T
+        terms = np.bincount(at, cosine, size) - 1j * np.bincount(at, sign * sine, size)
+        waves = np.fft.ifft(terms.reshape(rows.size, -1), axis=1, norm="forward")
+        values = np.abs(even @ waves.real)
+        values += np.abs(odd @ waves.imag)
+        return float(values.max())
+
+    return largest
 
 
 def stiffness_range(drive: Potential) -> tuple[float, float]:

@@ -47,6 +47,20 @@ def test_equal_phases_reach_the_bound():
     assert largest_sums(orders, amplitudes) == pytest.approx([400 * 401 / 2], rel=1e-12)
 
 
+def test_a_harmonic_may_be_written_with_the_opposite_orders():
+    """Its sine then has the other sign; the bounds remain the same."""
+    rng = np.random.default_rng(2)
+    orders, amplitudes = random_orders(rng, 300), rng.normal(size=(3, 300, 2))
+    sign = rng.choice([-1, 1], 300)
+    turned = amplitudes * np.stack([np.ones(300), sign], axis=-1)
+    wanted = largest_sums(orders, amplitudes)
+    found = largest_sums(sign[:, None] * orders, turned)
+    assert found == pytest.approx(wanted, rel=1e-13)
+    # without the change of sign it is another sum
+    other = largest_sums(sign[:, None] * orders, amplitudes)
+    assert np.abs(other / wanted - 1.0).max() > 1e-3
+
+
 def test_few_harmonics_are_bounded_by_their_amplitudes():
     """As many as the limit: 3, 4, 5 per harmonic."""
     orders = random_orders(np.random.default_rng(0), phase_bounds.MANY)
