@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import pi
+from types import MappingProxyType
 
 import numpy as np
 
@@ -184,6 +186,40 @@ def solve_over_torque(
                 return found
             before = torque
     return found
+
+
+def recall_over_torque(
+    design: str, model: ThinRing, phase: float, levels: Array
+) -> Mapping[float, ThinRingState]:
+    """Result of :func:`solve_over_torque`, which this process solves once.
+
+    Drives that differ in the errors of their teeth alone share these equilibria.
+
+    Args:
+        design: Content hash of the design of the rings, without errors of the teeth.
+        model: The rings.
+        phase: Angle of ball 0 from the major axis [rad].
+        levels: Magnitudes of the torques, increasing (n_levels,) [N·m].
+    """
+    elements = model.rim.elements, model.race.elements
+    return _solved_once(_Rings(design, elements, phase, tuple(levels.tolist()), model))
+
+
+@dataclass(frozen=True)
+class _Rings:
+    """Rings under torques; hash of the design and elements stand for the model."""
+
+    design: str
+    elements: tuple[int, int]
+    phase: float
+    levels: tuple[float, ...]
+    model: ThinRing = field(compare=False)
+
+
+@lru_cache(maxsize=8)
+def _solved_once(rings: _Rings) -> Mapping[float, ThinRingState]:
+    levels = np.array(rings.levels)
+    return MappingProxyType(solve_over_torque(rings.model, rings.phase, levels))
 
 
 def _moved_along(

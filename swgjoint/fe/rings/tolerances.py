@@ -24,6 +24,7 @@ from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
 from swgjoint.fe.rings.loading import (
     GOLDEN,
+    recall_over_torque,
     solve_loaded,
     solve_over_torque,
     solve_unloaded,
@@ -237,7 +238,12 @@ class RingErrors:
         """
         reach = _largest_change(self.design)
         loaded = {}
-        found = solve_over_torque(model, phase, levels, nearby)
+        found: Mapping[float, ThinRingState]
+        if nearby:
+            found = solve_over_torque(model, phase, levels, nearby)
+        else:
+            design = with_perfect_teeth(self.design).content_hash()
+            found = recall_over_torque(design, model, phase, levels)
         for torque, state in found.items():
             solved = self._solved(state, torque, 0.0)
             if torque:

@@ -9,7 +9,12 @@ from solved import hundred_elements
 from swgjoint.fe.rings import sampling
 from swgjoint.fe.rings import tolerances as ring_tolerances
 from swgjoint.fe.rings.influence import tooth_influence, with_shifting_teeth
-from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
+from swgjoint.fe.rings.loading import (
+    recall_over_torque,
+    solve_loaded,
+    solve_over_torque,
+    solve_unloaded,
+)
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sampling import sample_thin_rings
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
@@ -64,6 +69,31 @@ def loaded():
             assert state.outcome.ok
             states[sign * torque] = state
     return model, states
+
+
+def test_drives_with_other_errors_of_the_teeth_share_their_equilibria(monkeypatch):
+    """They are solved once; other torques, elements and wave generators are not."""
+    solves = []
+
+    def counted(model, phase, levels, nearby=None):
+        solves.append(levels.tolist())
+        return solve_over_torque(model, phase, levels, nearby)
+
+    monkeypatch.setattr("swgjoint.fe.rings.loading.solve_over_torque", counted)
+    coarse = FLAWED.with_changes({"tolerances.random_pitch_um": 2.0})
+    worse = FLAWED.with_changes({"tolerances.wave_generator_eccentricity_um": 6.0})
+
+    def found(design, *levels):
+        rings = with_perfect_teeth(design)
+        model = with_shifting_teeth(thin_ring(rings))
+        return recall_over_torque(rings.content_hash(), model, 0.0, np.array(levels))
+
+    first = found(FLAWED, SMALL, 40.0)
+    assert found(coarse, SMALL, 40.0) is first and len(solves) == 1
+    assert found(worse, SMALL, 40.0)[40.0].rotation != first[40.0].rotation
+    assert found(coarse, SMALL) is not first and len(solves) == 3
+    monkeypatch.setattr("swgjoint.fe.rings.model.ELEMENTS", 200)
+    assert found(coarse, SMALL, 40.0)[40.0].q.size > first[40.0].q.size
 
 
 @pytest.mark.parametrize("torque", [SINGLE, -SINGLE, SMALL, -SMALL, 40.0, -40.0])
