@@ -41,7 +41,9 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
                     tick.label1.set_parse_math(False)
                     tick.label2.set_parse_math(False)
     figure.dpi = dpi
-    canvas = FigureCanvasAgg(figure)
+    canvas = figure.canvas
+    if not isinstance(canvas, FigureCanvasAgg):  # else it knows the sizes of its texts
+        canvas = FigureCanvasAgg(figure)
     canvas.draw()  # once; savefig draws twice
     # figures have an opaque background, so all pixels are opaque
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
