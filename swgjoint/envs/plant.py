@@ -15,7 +15,7 @@ from swgjoint.envs.rest import DriveRest, balance_specimens
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.response import responses
 from swgjoint.joint.variation import SIZE, Variation
-from swgjoint.sim.stepping import skip_contact_search
+from swgjoint.sim.stepping import skip_idle_stages
 from swgjoint.typing import Array
 
 Index = NDArray[np.intp]
@@ -55,7 +55,7 @@ class Plant:
         check_count("num_envs", count, 1)
         check_count("threads", threads, 0)
         self.model, self.drives, self.sub_steps = model, tuple(drives), sub_steps
-        self.batch = Batch(skip_contact_search(model), count, nthread=threads)
+        self.batch = Batch(skip_idle_stages(model), count, nthread=threads)
         self.ratio: Array = np.array([d.ratio for d in drives])
         links = [model.joint(d.joint) for d in drives]
         rotors = [model.joint(d.rotor) for d in drives]

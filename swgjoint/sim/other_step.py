@@ -10,7 +10,7 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.assembly_steps import plan_torques, prescribed_errors
 from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.run_memory import require_run_memory
-from swgjoint.sim.stepping import skip_contact_search
+from swgjoint.sim.stepping import skip_idle_stages
 
 
 def at_step(assembly: Assembly, step: float) -> Assembly:
@@ -34,7 +34,7 @@ def at_step(assembly: Assembly, step: float) -> Assembly:
     arm, known_arm = assembly.arm, assembly.known_arm
     require_run_memory(scene, len(arm.joints))
     trajectory = trajectory_of(scene, arm)
-    model = skip_contact_search(assembly.model)
+    model = skip_idle_stages(assembly.model)
     if model is assembly.model:
         model = copy(model)
     model.opt.timestep = step

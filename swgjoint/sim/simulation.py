@@ -23,7 +23,7 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
-from swgjoint.sim.stepping import skip_contact_search
+from swgjoint.sim.stepping import skip_idle_stages
 from swgjoint.sim.thermal import Warming
 from swgjoint.typing import Array
 
@@ -126,7 +126,7 @@ def simulate(
             them.
         ComputationError: If the motion diverges or the start has no equilibrium.
     """
-    model, path = skip_contact_search(assembly.model), assembly.trajectory
+    model, path = skip_idle_stages(assembly.model), assembly.trajectory
     inputs = control_inputs(assembly)
     data = mujoco.MjData(model)
     set_start(assembly, data)
