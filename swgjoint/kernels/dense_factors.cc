@@ -33,7 +33,7 @@ constexpr std::size_t kSmall = 4000;  // numbers of a matrix that is not divided
 // Eight numbers, which compilers with vector types keep in one or more registers.
 #if defined(__GNUC__)
 typedef double Lanes __attribute__((vector_size(64), aligned(8), may_alias));
-SWGJOINT_INLINE Lanes inverted(Lanes x) { return 1.0 / x; }
+SWGJOINT_INLINE void invert(Lanes* x) { *x = 1.0 / *x; }
 #else
 struct Lanes {
   double v[8];
@@ -50,9 +50,8 @@ inline Lanes operator*(const Lanes& a, Lanes x) {
   for (int k = 0; k < 8; ++k) x.v[k] *= a.v[k];
   return x;
 }
-inline Lanes inverted(Lanes x) {
-  for (int k = 0; k < 8; ++k) x.v[k] = 1.0 / x.v[k];
-  return x;
+inline void invert(Lanes* x) {
+  for (int k = 0; k < 8; ++k) x->v[k] = 1.0 / x->v[k];
 }
 #endif
 // Rows from end on, less the multiples of the kPanel rows from first = end - kPanel on.
@@ -297,9 +296,9 @@ SWGJOINT_WIDE void eliminate_lanes(double* matrices, std::size_t rows,
                                    std::size_t stride) {
   Lanes* a = reinterpret_cast<Lanes*>(matrices);
   for (std::size_t c = 0; c < rows; ++c) {
-    const Lanes* own = a + c * stride;
-    const Lanes inverse = inverted(own[c]);
-    a[c * stride + c] = inverse;
+    Lanes* own = a + c * stride;
+    invert(own + c);
+    const Lanes inverse = own[c];
     std::size_t i = c + 1;
     for (; i + 2 <= rows; i += 2) {
       Lanes *row = a + i * stride, *next = row + stride;
