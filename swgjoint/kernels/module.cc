@@ -85,6 +85,19 @@ void add_station_stiffness(In<3> weights, In<3> direction, In<2> stiffness,
                                   stiffness.data(), count, q / p, result.data());
 }
 
+void add_blocks(In<3> blocks, Index into, Out<3> result) {
+  const std::size_t count = blocks.shape(0), size = into.shape(0);
+  const std::size_t full = result.shape(1);
+  require(blocks.shape(1) == size && blocks.shape(2) == size, "blocks: (n, k, k)");
+  require(result.shape(0) == count && result.shape(2) == full, "result: (n, m, m)");
+  for (std::size_t i = 0; i < size; ++i) {
+    require(into.data()[i] >= 0 && into.data()[i] < static_cast<std::int64_t>(full),
+            "into: rows of result");
+  }
+  const nb::gil_scoped_release release;
+  swgjoint::add_blocks(blocks.data(), count, size, into.data(), result.data(), full);
+}
+
 void respond(Index offsets, In<3> blocks, In<2> force, Out<2> result) {
   const std::size_t count = offsets.shape(0), rows = blocks.shape(1);
   const std::size_t size = blocks.shape(2), teeth = force.shape(0);
@@ -259,6 +272,8 @@ NB_MODULE(compiled, m) {
   m.def("add_station_stiffness", &add_station_stiffness, nb::arg("weights").noconvert(),
         nb::arg("direction").noconvert(), nb::arg("stiffness").noconvert(),
         nb::arg("result").noconvert());
+  m.def("add_blocks", &add_blocks, nb::arg("blocks").noconvert(),
+        nb::arg("into").noconvert(), nb::arg("result").noconvert());
   m.def("respond", &respond, nb::arg("offsets").noconvert(),
         nb::arg("blocks").noconvert(), nb::arg("force").noconvert(),
         nb::arg("result").noconvert());

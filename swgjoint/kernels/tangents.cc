@@ -33,6 +33,16 @@ void add_station_stiffness(const double* weights, std::size_t p, std::size_t wid
   }
 }
 
+void add_blocks(const double* blocks, std::size_t count, std::size_t size,
+                const std::int64_t* into, double* result, std::size_t full) {
+  for (std::size_t s = 0; s < count; ++s, result += full * full) {
+    for (std::size_t i = 0; i < size; ++i, blocks += size) {
+      double* row = result + full * into[i];
+      for (std::size_t k = 0; k < size; ++k) row[into[k]] += blocks[k];
+    }
+  }
+}
+
 SWGJOINT_WIDE void respond(const std::int64_t* offsets, const double* blocks,
                            std::size_t count, std::size_t rows, std::size_t size,
                            const double* force, std::size_t teeth, double* result) {

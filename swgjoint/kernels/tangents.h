@@ -16,6 +16,11 @@ void add_station_stiffness(const double* weights, std::size_t p, std::size_t wid
                            const double* direction, const double* stiffness,
                            std::size_t count, std::size_t intervals, double* result);
 
+// Add blocks (count, size, size) in given rows and columns (size,) of matrices
+// (count, full, full).
+void add_blocks(const double* blocks, std::size_t count, std::size_t size,
+                const std::int64_t* into, double* result, std::size_t full);
+
 // Twin of respond in swgjoint/fe/common/block_circulant.py, added to result
 // (teeth, rows): offsets (count,), blocks (count, rows, size), force (teeth, size).
 void respond(const std::int64_t* offsets, const double* blocks, std::size_t count,

@@ -7,6 +7,7 @@ import pytest
 
 from swgjoint.fe.common.block_circulant import contact_compliance, respond
 from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.compiled_tangent import add_blocks
 from swgjoint.kernels import kernels
 
 pytestmark = pytest.mark.skipif(
@@ -43,6 +44,28 @@ def test_springs_at_the_nodes_themselves(monkeypatch):
     ours = stations.stiffness_of(direction, stiffness)
     monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
     near(ours, stations.stiffness_of(direction, stiffness))
+
+
+def test_blocks_are_added_in_their_rows_and_columns(monkeypatch):
+    """Rows in any order; all other numbers stay, and no row beyond the end is written.
+
+    The result is bit for bit that of numpy.
+    """
+    rng = np.random.default_rng(5)
+    into, blocks = np.array([4, 0, 5]), rng.normal(size=(7, 3, 3))
+    before = rng.normal(size=(7, 6, 6))
+    ours, theirs = before.copy(), before.copy()
+    add_blocks(blocks, into, ours)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    add_blocks(blocks, into, theirs)
+    np.testing.assert_array_equal(ours, theirs)
+    assert (ours != before).sum() == blocks.size
+    monkeypatch.delenv("SWGJOINT_KERNELS")
+    with pytest.raises(ValueError):
+        add_blocks(blocks, np.array([4, 0, 6]), ours)
+    with pytest.raises(ValueError):
+        add_blocks(blocks, into, ours[:6])
+    np.testing.assert_array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize("most", [2, 5, 11])

@@ -119,6 +119,20 @@ class CompiledBore:
         return result
 
 
+def add_blocks(blocks: Array, into: Index, matrices: Array) -> None:
+    """Add blocks in the same rows and columns of all matrices.
+
+    Args:
+        blocks: Blocks (n, k, k).
+        into: Rows and columns (k,).
+        matrices: Matrices (n, m, m), which are changed.
+    """
+    if (native := kernels()) is None:
+        matrices[:, into[:, None], into] += blocks
+    else:  # numpy copies the blocks of the matrices twice
+        native.add_blocks(np.ascontiguousarray(blocks), into, matrices)
+
+
 def add_sector_tangents(
     element: Superelement,
     place: Array,

@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from swgjoint.fe.plane.bore_contact import BoreStations
-from swgjoint.fe.plane.compiled_tangent import CompiledBore, add_sector_tangents
+from swgjoint.fe.plane.compiled_tangent import (
+    CompiledBore,
+    add_blocks,
+    add_sector_tangents,
+)
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import (
     Frames,
@@ -330,7 +334,7 @@ def _add_bore(
         )
         gradient[:, into] += race.gradient
         if hessian is not None:
-            hessian[:, into[:, None], into] += race.hessian
+            add_blocks(race.hessian, into, hessian)
         return _Bore(gap=race.gap, normal=race.normal, rows=race.rows, fixed=race.fixed)
     # a rigid wave generator supports the bore through the compliant layer
     stations, touching = model.stations, state.touching
