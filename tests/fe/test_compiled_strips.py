@@ -141,17 +141,20 @@ def test_compiled_loop_gives_what_numpy_gives(monkeypatch, indents, few):
             assert np.abs(getattr(one_of, key) - wanted).max(initial=0.0) < limit
 
 
-def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+@pytest.mark.parametrize("guessed", [False, True])
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch, guessed):
     """Groups of fixed length are solved one after another."""
     import os
 
     monkeypatch.setattr(strip_problems, "GROUP", 2)
+    monkeypatch.setattr(strip_problems, "TOGETHER", PART)
     one = drive()
     _, offset = offsets(one, 5 * PART)
+    start = one.problems.solve(offset).active if guessed else None
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    alone = one.problems.solve(offset)
+    alone = one.problems.solve(offset, start)
     monkeypatch.setattr(os, "cpu_count", lambda: 3)
-    assert np.array_equal(one.problems.solve(offset).value, alone.value)
+    assert np.array_equal(one.problems.solve(offset, start).value, alone.value)
 
 
 def test_parts_are_similar():

@@ -39,7 +39,7 @@ PART = 128
 TOGETHER = 512
 """Largest number of consecutive problems with guesses that share a base."""
 GROUP = 4
-"""Number of parts that are solved one after another. Without a guess, the first problem
+"""Number of parts without guesses that are solved one after another: the first problem
 of a part starts from a solution of the part before it."""
 SAMPLES = 12
 """Number of problems that are solved first to find a base for judging similarity."""
@@ -363,15 +363,16 @@ class StripProblems:
             crowded = count > PART and first_sets.sum(axis=1).mean() > FEW
             similar_at = common[0].offset_of(q)
             parts, solve_parts = similar_parts(similar_at, PART), solve_unguessed
+            groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
         elif count < PART:
-            parts, solve_parts = similar_sets(start, PART), solve_guessed
+            groups, solve_parts = [similar_sets(start, PART)], solve_guessed
         else:
-            rows = np.arange(count)
-            parts = np.array_split(rows, -(-count // TOGETHER))
-            solve_parts, samples = solve_together, rows[:: -(-count // SAMPLES)]
+            numbers = np.arange(count)
+            parts = np.array_split(numbers, -(-count // TOGETHER))
+            groups, solve_parts = [[part] for part in parts], solve_together
+            samples = numbers[:: -(-count // SAMPLES)]
             solve(samples, self._origin, self._native_origin, np.full(samples.size, -1))
             lined = self._with_lines_at(self._forces(active[samples], result[samples]))
-        groups = [parts[k : k + GROUP] for k in range(0, len(parts), GROUP)]
         if len(groups) == 1:
             solve_parts(groups[0])
         else:
