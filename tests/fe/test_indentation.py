@@ -108,6 +108,27 @@ def test_points_of_a_pair_of_flanks_are_one_strip():
     assert strips.error(np.array([40.0, 70.0])) > 1e-12
 
 
+def test_energy_beyond_the_lines_is_the_work_of_the_approach_beyond_them():
+    """By differences over the force; nothing at the forces of the lines or below zero.
+
+    A strip without force keeps the energy that it has there, beside loaded ones.
+    """
+    strips = Strips(law=LAW, strip=np.arange(3), force=np.array([0.0, 40.0, 10.0]))
+    assert strips.excess_energy(strips.force) == pytest.approx(0.0, abs=1e-18)
+    rng = np.random.default_rng(8)
+    force, step = rng.uniform(5.0, 80.0, size=(20, 3)), 1e-3
+    force[::4, 1] = 0.0
+    for j in range(3):
+        move = step * (np.arange(3) == j)
+        ends = [strips.excess_energy(force + part * move) for part in (1.0, -1.0)]
+        slope = force[:, j] * strips.excess(force)[1][:, j]
+        loaded = force[:, j] > 0.0
+        change = (ends[0] - ends[1])[loaded] / (2.0 * step)
+        assert change == pytest.approx(slope[loaded], rel=1e-5, abs=1e-12)
+    below = np.where(force > 0.0, force, -3.0)
+    assert np.array_equal(strips.excess_energy(below), strips.excess_energy(force))
+
+
 def test_curvature_of_a_drive():
     """Arcs of one module against the straight flank and the arcs beside it."""
     flanks = [

@@ -119,6 +119,9 @@ def test_a_contact_that_is_missing_is_noticed():
     found, right = near.respond(change, 3.0, None)
     assert 0 < (~right).sum() < SETS // 2
     assert np.array_equal(~right, whole.active[:, rare])
+    # a single set, whose inputs have no range
+    for k in [*np.flatnonzero(~right)[:5], *np.flatnonzero(right)[:5]]:
+        assert near.respond(change[k : k + 1], 3.0, None)[1] == right[k]
     apart = np.abs(found.output_angle - whole.output_angle)
     good = apart < 1e-7 * np.ptp(whole.output_angle)
     assert good[right].all() and not good[~right].all()
