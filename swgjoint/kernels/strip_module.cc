@@ -37,8 +37,8 @@ class StripProblems {
 
   // Each problem starts from the solution of an earlier one; if before is -1 or that one
   // is unsolved, it starts from its own active set. If before is empty, all do, and those
-  // that can be are solved eight at a time.
-  void solve(In<2> offset, In<1> tolerance, double tolerance_m, int tries, int singles,
+  // that can be are solved eight at a time. Returns how many that are.
+  std::size_t solve(In<2> offset, In<1> tolerance, double tolerance_m, int tries, int singles,
              Index before, MasksOut active, Out<2> result, Out<2> approach, Out<1> slope,
              MaskOut solved) const {
     const std::size_t count = offset.shape(0), n = columns_.shape(0);
@@ -79,6 +79,7 @@ class StripProblems {
                     approach.data() + strips * i, slope.data() + i, solved.data() + i);
       }
     }
+    const std::size_t at_once = std::count(solved.data(), solved.data() + count, true);
     swgjoint::StripSolver solver(problem, law_);
     for (std::size_t i = 0; i < count; ++i) {
       if (solved.data()[i]) continue;
@@ -89,6 +90,7 @@ class StripProblems {
           offset.data() + n * i, tolerance.data()[i], own, result.data() + n * i,
           approach.data() + strips * i, slope.data() + i);
     }
+    return at_once;
   }
 
  private:

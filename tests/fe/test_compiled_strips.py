@@ -11,7 +11,7 @@ from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.common.pivot_base import next_to, similar_parts
-from swgjoint.fe.common.pivoting import exchange
+from swgjoint.fe.common.pivoting import TOLERANCE, exchange
 from swgjoint.fe.common.strip_problems import EXACT, FEW, PART, StripProblems
 from swgjoint.kernels import kernels
 
@@ -225,7 +225,8 @@ def test_other_lines_of_the_strips_change_no_solution():
     load = rng.normal(size=(3, 1))
     value = rng.normal(size=(3, len(origin.matrix)))
     beyond = rng.normal(size=(3, TEETH)) * 1e-7
-    value[0], beyond[0] = 0.0, 0.0  # the load alone
+    # the load alone, approaches alone, all together
+    value[:2], beyond[0], load[1] = 0.0, 0.0, 0.0
     closed = problems.closed
     by_contact = np.zeros((TEETH, closed.size))
     by_contact[problems.strips.strip, np.arange(TEETH * STATIONS)] = 1.0
@@ -249,6 +250,26 @@ def test_other_lines_of_the_strips_change_no_solution():
         outputs = unknown @ one.by_value + beyond @ one.output_by_strip
         outputs += one.slope * load[:, 0]
         assert outputs == pytest.approx(output, rel=1e-9)
+
+
+@pytest.mark.skipif(kernels() is None, reason="built without compiled loops")
+def test_problems_with_good_guesses_are_solved_together():
+    """None of them is left to the solver for one problem."""
+    problems = drive().problems
+    _, offset = offsets(drive(), 40)
+    found = problems.solve(offset)
+    usual = found.active.mean(axis=0) > 0.5
+    base = problems._with_lines_at(found.force).exchange(usual)
+    scaled = offset / problems._scale
+    tolerance, none = TOLERANCE * np.abs(scaled).max(axis=1), np.zeros(0, np.int64)
+    own = base.offset_of(scaled)
+    values, approach = np.empty(own.shape), np.empty((40, TEETH))
+    slope, solved = np.empty(40), np.empty(40, dtype=bool)
+    outputs = found.active ^ usual, values, approach, slope, solved
+    options = EXACT, 20, 60, none
+    together = problems._native(base).solve(own, tolerance, *options, *outputs)
+    assert together == 40 and solved.all()
+    assert slope + base.slope == pytest.approx(found.slope, rel=1e-6)
 
 
 @pytest.mark.skipif(kernels() is None, reason="built without compiled loops")
