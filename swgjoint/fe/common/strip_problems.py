@@ -246,15 +246,18 @@ class StripProblems:
             self._by_contact * ~self.closed,
         )
 
+    @cached_property
+    def _law(self) -> tuple[Array, Array, Array]:
+        """Constants of the law, and compliances [m/N] and offsets [m] of its lines."""
+        if self.strips is None:
+            return np.zeros(4), np.zeros(0), np.zeros(0)
+        return self.strips.law.constants, self.strips.line, self.strips.line_offset
+
     def _native(self, base: Base) -> Any:
         """Matrix and strips of a base as the compiled loop takes them."""
         native = kernels()
         assert native is not None
-        strips, none = self.strips, np.zeros(0)
-        law, line, offset = np.zeros(4), none, none
-        if strips is not None:
-            law, offset = strips.law.constants, strips.line_offset
-            line = strips.line + base.line
+        law, line, line_offset = self._law
         closed = self.closed.copy()
         closed[base.inside] ^= True
         return native.StripProblems(
@@ -266,8 +269,8 @@ class StripProblems:
             np.ascontiguousarray(base.by_load),
             np.ascontiguousarray(base.by_value),
             np.ascontiguousarray(base.output_by_strip),
-            line,
-            offset,
+            line + base.line,
+            line_offset,
             law,
         )
 
