@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 MOST = 8
 """Largest number of joints with a line of their own; more lines could not be told
 apart."""
+ROW = 80
+"""Number of characters of the names below the bars of all joints that fit in a line."""
 FINEST = 1e-3
 """Smallest height of an axis in its own unit (%, arcmin, mm): a finer one would show
 rounding errors as if they were results."""
@@ -109,6 +112,10 @@ def _ripple_bars(axis: Any, run: Run) -> None:
         )
     many = len(joints) > MOST
     names = [short(name) for name in joints]
+    if not many:
+        # long names take several lines, so that they do not overlap
+        width = ROW // max(len(joints), 1)
+        names = [fill(name, width, break_long_words=False) for name in names]
     if not any(heights[0]):
         axis.set_ylim(top=1.0)
     axis.set_xticks(places, names, fontsize=8, rotation=90 if many else 0)
