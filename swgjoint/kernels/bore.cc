@@ -58,23 +58,25 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
   }
 }
 
-void bore_forces(const Stations& stations, const double* stiffness, const bool* touching,
-                 const double* gap, const double* normal, const double* curvature,
-                 const std::int64_t* into, std::size_t count, std::size_t n,
-                 double* gradient, double* tangent) {
+void bore_forces(const Stations& stations, const double* spring, const double* gap,
+                 const double* normal, const double* curvature, const std::int64_t* into,
+                 const double* sign, std::size_t count, std::size_t n, double* gradient,
+                 double* tangent) {
   const std::size_t p = stations.p, width = stations.width, q = stations.count();
   const std::size_t size = 2 * stations.nodes();
   std::vector<double> force(size), matrix(size * size), along(width), across(width);
+  std::vector<double> signs(size, 1.0);
   for (std::size_t s = 0; s < count; ++s) {
-    if (std::any_of(touching, touching + q, [](bool on) { return on; })) {
+    if (std::any_of(spring, spring + q, [](double k) { return k != 0.0; })) {
       std::fill(force.begin(), force.end(), 0.0);
       std::fill(matrix.begin(), matrix.end(), 0.0);
       for (std::size_t i = 0; i < q; ++i) {
-        if (!touching[i]) continue;
+        if (spring[i] == 0.0) continue;
         const double *x = stations.weights + 2 * width * (i % p), *y = x + width;
         const Vec to{normal[2 * i], normal[2 * i + 1]};
         // sliding over a curved outline turns the contact force
-        const double push = stiffness[i] * gap[i], bend = push * curvature[i];
+        const double push = spring[i] * gap[i];
+        const double bend = curvature ? push * curvature[i] : 0.0;
         for (std::size_t j = 0; j < width; ++j) {
           along[j] = to.x * x[j] + to.y * y[j];
           across[j] = to.x * y[j] - to.y * x[j];
@@ -83,23 +85,26 @@ void bore_forces(const Stations& stations, const double* stiffness, const bool* 
         for (std::size_t j = 0; j < width; ++j) {
           force[first + j] += push * along[j];
           if (!tangent) continue;
-          const double a = stiffness[i] * along[j], b = bend * across[j];
+          const double a = spring[i] * along[j], b = bend * across[j];
           double* row = matrix.data() + (first + j) * size + first;
           for (std::size_t l = 0; l < width; ++l) row[l] += a * along[l] + b * across[l];
         }
       }
+      for (std::size_t i = 0; sign && i < size; ++i) signs[i] = sign[into[i]];
       for (std::size_t i = 0; i < size; ++i) {
         const auto row = static_cast<std::size_t>(into[i]);
-        gradient[row] += force[i];
+        gradient[row] += signs[i] * force[i];
         for (std::size_t j = 0; tangent && j < size; ++j) {
-          tangent[row * n + static_cast<std::size_t>(into[j])] += matrix[i * size + j];
+          tangent[row * n + static_cast<std::size_t>(into[j])] +=
+              signs[i] * signs[j] * matrix[i * size + j];
         }
       }
     }
-    touching += q;
+    spring += q;
     gap += q;
     normal += 2 * q;
-    curvature += q;
+    if (curvature) curvature += q;
+    if (sign) sign += n;
     gradient += n;
     if (tangent) tangent += n * n;
   }

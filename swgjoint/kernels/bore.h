@@ -37,13 +37,14 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
                const bool* touching, std::size_t count, double* gap, double* normal,
                double* curvature);
 
-// Adds energy gradient (count, n) and tangent (count, n, n) of the stations that touch.
-// Without a tangent (null) only the gradient.
-// into: degrees of freedom of the nodes (2 m,).
-void bore_forces(const Stations& stations, const double* stiffness, const bool* touching,
-                 const double* gap, const double* normal, const double* curvature,
-                 const std::int64_t* into, std::size_t count, std::size_t n,
-                 double* gradient, double* tangent);
+// Adds energy gradient (count, n) and tangent (count, n, n) of springs at the stations,
+// zero where there is none. Without a tangent (null) only the gradient; without
+// curvatures (null) the forces do not turn.
+// into: degrees of freedom of the nodes (2 m,); sign: their signs (count, n), null for 1.
+void bore_forces(const Stations& stations, const double* spring, const double* gap,
+                 const double* normal, const double* curvature, const std::int64_t* into,
+                 const double* sign, std::size_t count, std::size_t n, double* gradient,
+                 double* tangent);
 
 // Gaps after an increment of the degrees of freedom (count, n): result = gap plus the
 // shift of each station along its normal.

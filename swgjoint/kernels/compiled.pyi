@@ -81,7 +81,7 @@ class Search:
     ) -> None: ...
 
 class Bore:
-    def __init__(self, weights: Array, stiffness: Array) -> None: ...
+    def __init__(self, weights: Array, stations: int) -> None: ...
     def gaps(
         self,
         nodes: Array,
@@ -96,11 +96,12 @@ class Bore:
     ) -> None: ...
     def forces(
         self,
-        touching: Mask,
+        spring: Array,
         gap: Array,
         normal: Array,
-        curvature: Array,
+        curvature: Array | None,
         into: Index,
+        sign: Array | None,
         gradient: Array,
         tangent: Array | None,
     ) -> None: ...

@@ -29,19 +29,20 @@ void check_assembly(std::size_t count, std::size_t n, const Out<2>& gradient,
           "tangent: (n, dofs, dofs)");
 }
 
-double* data_of(const Out<3>& tangent) {
-  return tangent.is_valid() ? tangent.data() : nullptr;
+template <typename Values>
+auto data_of(const Values& values) {
+  return values.is_valid() ? values.data() : nullptr;
 }
 
 // Contact stations of the bore. It holds references to the arrays that it reads.
 class Bore {
  public:
-  Bore(In<3> weights, In<1> stiffness) : weights_(weights), stiffness_(stiffness) {
+  Bore(In<3> weights, std::size_t stations) : weights_(weights) {
     const std::size_t p = weights.shape(0), width = weights.shape(2);
     require(p > 0 && weights.shape(1) == 2 && width > 1 && width % 2 == 0,
             "weights: (p, 2, 2 s)");
-    require(stiffness.shape(0) > 0 && stiffness.shape(0) % p == 0, "stiffness: (q,)");
-    stations_ = {weights.data(), p, width, stiffness.shape(0) / p};
+    require(stations > 0 && stations % p == 0, "stations: a multiple of p");
+    stations_ = {weights.data(), p, width, stations / p};
   }
 
   void gaps(In<3> nodes, Masks touching, In<2> outline, double angle, In<1> offset,
@@ -63,19 +64,20 @@ class Bore {
                         gap.data(), normal.data(), curvature.data());
   }
 
-  void forces(Masks touching, In<2> gap, In<3> normal, In<2> curvature, Index into,
-              Out<2> gradient, Out<3> tangent) const {
+  void forces(In<2> spring, In<2> gap, In<3> normal, In<2> curvature, Index into,
+              In<2> sign, Out<2> gradient, Out<3> tangent) const {
     const std::size_t count = gap.shape(0), n = gradient.shape(1);
     check(count, gap, normal);
-    check(count, curvature, normal);
-    require(touching.shape(0) == count && touching.shape(1) == stations_.count(),
-            "touching: (n, q)");
+    check(count, spring, normal);
+    if (curvature.is_valid()) check(count, curvature, normal);
+    require(!sign.is_valid() || (sign.shape(0) == count && sign.shape(1) == n),
+            "sign: (n, dofs)");
     require(into.shape(0) == 2 * stations_.nodes(), "into: (2 m,)");
     check_assembly(count, n, gradient, tangent);
     check_dofs(into, n);
     const nb::gil_scoped_release release;
-    swgjoint::bore_forces(stations_, stiffness_.data(), touching.data(), gap.data(),
-                          normal.data(), curvature.data(), into.data(), count, n,
+    swgjoint::bore_forces(stations_, spring.data(), gap.data(), normal.data(),
+                          data_of(curvature), into.data(), data_of(sign), count, n,
                           gradient.data(), data_of(tangent));
   }
 
@@ -103,7 +105,6 @@ class Bore {
   }
 
   In<3> weights_;
-  In<1> stiffness_;
   swgjoint::Stations stations_{};
 };
 
@@ -292,17 +293,17 @@ void bind_plane(nb::module_& m) {
         nb::arg("normal").noconvert(), nb::arg("rows").noconvert(),
         nb::arg("gradient").noconvert(), nb::arg("hessian").noconvert());
   nb::class_<Bore>(m, "Bore")
-      .def(nb::init<In<3>, In<1>>(), nb::arg("weights").noconvert(),
-           nb::arg("stiffness").noconvert())
+      .def(nb::init<In<3>, std::size_t>(), nb::arg("weights").noconvert(),
+           nb::arg("stations"))
       .def("gaps", &Bore::gaps, nb::arg("nodes").noconvert(),
            nb::arg("touching").noconvert(), nb::arg("outline").noconvert(),
            nb::arg("angle"), nb::arg("offset").noconvert(), nb::arg("far"),
            nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
            nb::arg("curvature").noconvert())
-      .def("forces", &Bore::forces, nb::arg("touching").noconvert(),
+      .def("forces", &Bore::forces, nb::arg("spring").noconvert(),
            nb::arg("gap").noconvert(), nb::arg("normal").noconvert(),
-           nb::arg("curvature").noconvert(), nb::arg("into").noconvert(),
-           nb::arg("gradient").noconvert(), nb::arg("tangent").noconvert().none())
+           nb::arg("curvature").noconvert().none(), nb::arg("into").noconvert(),
+           nb::arg("sign").noconvert().none(), nb::arg("gradient").noconvert(), nb::arg("tangent").noconvert().none())
       .def("gaps_after", &Bore::gaps_after, nb::arg("gap").noconvert(),
            nb::arg("normal").noconvert(), nb::arg("into").noconvert(),
            nb::arg("increment").noconvert(), nb::arg("result").noconvert());

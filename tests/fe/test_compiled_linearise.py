@@ -106,31 +106,60 @@ def test_gaps_after_a_step_are_those_of_numpy(loaded, monkeypatch):
     near(ours, linear.gap_after(step))
 
 
+@pytest.mark.fe
+def test_exchanges_of_stations_are_those_of_numpy(loaded, monkeypatch):
+    """Of some stations in every sector; the last one of a half ring has signs."""
+    model, state = loaded
+    ours, theirs = (linearise(model, state, 5.0) for _ in range(2))
+    stations = np.random.default_rng(9).uniform(size=ours.gap.shape) < 0.3
+    changed = ours.exchange(stations, state.touching)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    assert np.array_equal(changed, theirs.exchange(stations, state.touching))
+    for name in ("gradient", "hessian"):
+        near(getattr(ours, name), getattr(theirs, name))
+
+
+@pytest.mark.fe
+def test_frames_are_those_of_the_linearised_ring(loaded, monkeypatch):
+    """In compiled code and in numpy."""
+    model, state = loaded
+    ours, linear = model.frames(state), linearise(model, state, 5.0)
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    theirs = model.frames(state)
+    for name in FRAMES.split():
+        near(getattr(ours, name), getattr(linear.frames, name))
+        bound = 1e-12 if name != "deformation" else 1e-9
+        near(getattr(ours, name), getattr(theirs, name), bound)
+
+
 def test_shapes_that_do_not_fit_are_refused():
     """Nothing is read or written beyond an array, whatever the caller passes."""
     native = kernels()
-    for weights, stiffness in (
-        (np.zeros((2, 3, 4)), np.zeros(4)),
-        (np.zeros((2, 2, 3)), np.zeros(4)),
-        (np.zeros((2, 2, 4)), np.zeros(3)),
-        (np.zeros((0, 2, 4)), np.zeros(0)),
+    for weights, stations in (
+        (np.zeros((2, 3, 4)), 4),
+        (np.zeros((2, 2, 3)), 4),
+        (np.zeros((2, 2, 4)), 3),
+        (np.zeros((0, 2, 4)), 0),
     ):
         with pytest.raises(ValueError):
-            native.Bore(weights, stiffness)
+            native.Bore(weights, stations)
     # two stations in each of two intervals, which follow two of three nodes
-    bore = native.Bore(np.zeros((2, 2, 4)), np.zeros(4))
+    bore = native.Bore(np.zeros((2, 2, 4)), 4)
     good = dict(
-        touching=np.zeros((5, 4), bool),
+        spring=np.zeros((5, 4)),
         gap=np.zeros((5, 4)),
         normal=np.zeros((5, 4, 2)),
         curvature=np.zeros((5, 4)),
         into=np.arange(6),
+        sign=np.ones((5, 7)),
         gradient=np.zeros((5, 7)),
         tangent=np.zeros((5, 7, 7)),
     )
     bore.forces(**good)
+    bore.forces(**(good | dict(curvature=None, sign=None, tangent=None)))
     for name, wrong in (
-        ("touching", np.zeros((5, 3), bool)),
+        ("spring", np.zeros((5, 3))),
+        ("sign", np.zeros((5, 6))),
         ("gap", np.zeros((4, 4))),
         ("normal", np.zeros((5, 4, 3))),
         ("curvature", np.zeros((5, 2))),
@@ -159,7 +188,7 @@ def test_shapes_that_do_not_fit_are_refused():
             bore.gaps_after(**(after | {name: wrong}))
     gaps = dict(
         nodes=np.ones((5, 3, 2)),
-        touching=good["touching"],
+        touching=np.zeros((5, 4), bool),
         outline=np.array([[Kind.ELLIPSE, 0.03, 0.02, 0.0, 0.0, 0.0, 0.0]]),
         angle=0.1,
         offset=np.zeros(2),

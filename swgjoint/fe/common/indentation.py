@@ -28,6 +28,7 @@ R is a constant of the drive, so the law depends on the force alone and has a po
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, log, pi
 
 import numpy as np
@@ -240,11 +241,20 @@ class Strips:
         total = np.bincount(self.strip, weights=force, minlength=self.force.size)
         return np.asarray(total, dtype=np.float64)
 
+    @cached_property
+    def _tangent(self) -> tuple[Array, Array]:
+        """Tangent of the law at the forces of the strips, each (n_strips,).
+
+        The slope [m/N] and the approach at zero force [m].
+        """
+        slope = self.law.slope(self.force)
+        return slope, self.law.approach(self.force) - slope * self.force
+
     @property
     def compliance(self) -> Array:
         """Approach of each contact per force on each contact (n, n) [m/N]."""
         same = self.strip[:, None] == self.strip
-        return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
+        return np.where(same, self._tangent[0][self.strip], 0.0)
 
     def linearise(self) -> tuple[Array, Array]:
         """Linear law for a drive that is linearised once to superpose tooth errors.
@@ -267,13 +277,12 @@ class Strips:
         law, force = self.law, self.force
         usual = force[force > 0.0].mean()
         secant = law.approach(usual) / usual
-        return np.where(force > 0.0, law.slope(force), secant)
+        return np.where(force > 0.0, self._tangent[0], secant)
 
     @property
     def line_offset(self) -> Array:
         """Approach of each strip at zero force in that law (n_strips,) [m]."""
-        law, force = self.law, self.force
-        return np.asarray(law.approach(force) - law.slope(force) * force)
+        return self._tangent[1]
 
     def excess(self, force: Array) -> tuple[Array, Array]:
         """Approach of the strips beyond the linear law of :meth:`linearise`.
@@ -311,9 +320,8 @@ class Strips:
 
     def error(self, force: Array) -> float:
         """Largest error [m] of the linearised law under contact forces (n,) [N]."""
-        total, law = self.sums(force), self.law
-        linear = law.approach(self.force) + law.slope(self.force) * (total - self.force)
-        wrong = linear - law.approach(np.maximum(total, 0.0))
+        total, (slope, offset) = self.sums(force), self._tangent
+        wrong = offset + slope * total - self.law.approach(np.maximum(total, 0.0))
         return float(np.abs(wrong).max(initial=0.0))
 
 

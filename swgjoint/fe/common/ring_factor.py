@@ -32,7 +32,7 @@ class RingFactor:
         Args:
             blocks: Symmetric sector matrices as in
                 :class:`swgjoint.fe.common.cyclic.CyclicFactor` (N, n, n). The array is
-                kept, and updates change it.
+                kept for updates.
             face: Number of degrees of freedom of a face.
             loaded: Sectors (k,) whose rows are passed to :meth:`condense`; others are
                 possible as well.
@@ -45,23 +45,17 @@ class RingFactor:
         self._native: compiled.RingFactor | None = None
         if (native := kernels()) is not None:
             self._native = native.RingFactor(*blocks.shape[:2], face)
-        self._factorise(np.arange(len(blocks)))
+        self.update(np.arange(len(blocks)))
 
-    def update(self, blocks: Array, changed: Index) -> None:
-        """Factorise the ring anew after a change of some sectors, in place.
+    def update(self, changed: Index) -> None:
+        """Factorise the ring anew after some of its matrices were changed, in place.
 
         Args:
-            blocks: Matrices of these sectors after the change (k, n, n).
             changed: Sectors whose matrices changed (k,).
 
         Raises:
             SingularCyclicError: If the matrix becomes singular.
         """
-        self._blocks[changed] = blocks
-        self._factorise(changed)
-
-    def _factorise(self, changed: Index) -> None:
-        """Factorise the ring anew after a change of some matrices."""
         if self._native is not None:
             if self._native.update(np.ascontiguousarray(self._blocks), changed):
                 return

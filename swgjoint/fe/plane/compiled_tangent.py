@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swgjoint.fe.plane.bore_contact import BoreStations
-from swgjoint.fe.plane.corotation import Frames
+from swgjoint.fe.plane.corotation import Frames, sector_frames
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
@@ -29,7 +29,7 @@ class CompiledBore:
         """Compiled loops for the stations of a sector; None without compiled loops."""
         if (native := kernels()) is None:
             return None
-        return cls(bore=native.Bore(stations.weights, stations.stiffness))
+        return cls(bore=native.Bore(stations.weights, len(stations.stiffness)))
 
     def gaps(
         self,
@@ -67,32 +67,36 @@ class CompiledBore:
 
     def add_forces(
         self,
-        touching: Mask,
+        spring: Array,
         gap: Array,
         normal: Array,
-        curvature: Array,
         into: Index,
         gradient: Array,
         hessian: Array | None,
+        *,
+        curvature: Array | None = None,
+        sign: Array | None = None,
     ) -> None:
-        """Add the forces and tangents of the stations in contact.
+        """Add the forces and tangents of springs at the stations.
 
         Args:
-            touching: Whether each station is in contact (N, q).
+            spring: Stiffness of each spring, zero where there is none (N, q) [N/m].
             gap: Gaps of the stations (N, q) [m].
             normal: Outward normals of the outline (N, q, 2).
-            curvature: Curvatures of the parallel curves through the stations (N, q)
-                [1/m].
             into: Degrees of freedom of the nodes that the stations follow (2 m,).
             gradient: Gradient to add to (N, n) [N].
             hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
+            curvature: Curvatures of the parallel curves through the stations (N, q)
+                [1/m]; None neglects them.
+            sign: Signs of the degrees of freedom (N, n); None if all are 1.
         """
         self.bore.forces(
-            np.ascontiguousarray(touching),
+            np.ascontiguousarray(spring),
             np.ascontiguousarray(gap),
             np.ascontiguousarray(normal),
-            np.ascontiguousarray(curvature),
+            curvature,
             into,
+            sign,
             gradient,
             hessian,
         )
@@ -131,6 +135,25 @@ def add_blocks(blocks: Array, into: Index, matrices: Array) -> None:
         matrices[:, into[:, None], into] += blocks
     else:  # numpy copies the blocks of the matrices twice
         native.add_blocks(np.ascontiguousarray(blocks), into, matrices)
+
+
+def find_frames(
+    element: Superelement,
+    positions: Array,
+    place: Array,
+    *,
+    fixed: Array | None = None,
+) -> Frames:
+    """Frames of the sectors, see :func:`swgjoint.fe.plane.corotation.sector_frames`."""
+    if fixed is not None or kernels() is None:
+        return sector_frames(element, positions, place, fixed=fixed)
+    force = np.zeros((len(place), len(element.flank_compliance)))
+    dofs = np.arange(element.skeleton.size)
+    gradient = np.zeros((len(place), dofs.size))
+    frames, _ = add_sector_tangents(
+        element, place, positions, force, dofs, gradient, None
+    )
+    return frames
 
 
 def add_sector_tangents(

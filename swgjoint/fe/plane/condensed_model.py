@@ -50,7 +50,7 @@ class CondensedModel:
     def _factor(self) -> RingFactor:
         """Factorised tangent with the anchor spring."""
         return RingFactor(
-            self.linear.anchor_tangent(),
+            self.linear.hessian,
             self.linear.face_dofs,
             np.unique(self.contacts.sector),
         )

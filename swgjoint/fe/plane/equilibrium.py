@@ -24,6 +24,7 @@ from swgjoint.fe.plane.newton_step import (
     NewtonProblem,
     NewtonStep,
 )
+from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Mask
@@ -239,13 +240,18 @@ def _advance(
     # a sector stores its first face and its bore nodes; its last face is stored as the
     # first face of the next one
     size, inside = model.element.face_size, model.element.bore_size
-    moved = model.skeleton(state) + damping * step.shift
+    moved = model.skeleton(state) + damping * linear.rotate_to_global(step.increment)
+    race = state.race
+    if race is not None:
+        shift = step.increment[:, model.race_dofs[:-NODE]]
+        race = race + damping * shift.reshape(race.shape)
+    push = -model.stations.stiffness * step.gap
     new = replace(
         state,
         faces=moved[:, :size],
         bores=moved[:, size : size + inside],
-        race=None if state.race is None else state.race + damping * step.race_shift,
-        pressure=step.pressure,
+        race=race,
+        pressure=np.where(state.touching, push, 0.0),
         touching=state.touching ^ bad,
         flank_force=flank_force,
         circular_spline_force=circular_spline_force,

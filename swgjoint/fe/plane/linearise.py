@@ -56,7 +56,9 @@ class Linearised:
     gradient: Array
     """Gradient of energy and load potential (N, n) [N]."""
     hessian: Array
-    """Second derivative of energy and load potential (N, n, n) [N/m]."""
+    """Tangent: second derivative of energy and load potential with the anchor spring
+    (N, n, n) [N/m]. Rows and columns of fixed degrees of freedom are zero except for
+    their diagonal."""
     gap: Array
     """Gap at the stations of the bore (N, q) [m]."""
     gap_dofs: Index
@@ -92,25 +94,6 @@ class Linearised:
         """An empty set of candidates."""
         circular_spline = self.search.circular_spline
         return Contacts.none(self.flank.shape[1], circular_spline.flank_dofs)
-
-    def anchor_tangent(self, sectors: Index | None = None) -> Array:
-        """Tangent with the anchor spring (k, n, n) [N/m].
-
-        Rows and columns of fixed degrees of freedom are zero except for their diagonal.
-
-        Args:
-            sectors: Sectors whose matrices are needed (k,); None for all.
-        """
-        some = np.arange(len(self.hessian)) if sectors is None else sectors
-        matrix = self.hessian.copy() if sectors is None else self.hessian[some]
-        spring = self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
-        matrix[np.flatnonzero(some == 0)] += spring
-        fixed = self.fixed[some]
-        if fixed.any():
-            matrix[fixed] = 0.0
-            matrix.transpose(0, 2, 1)[fixed] = 0.0
-            np.einsum("sii->si", matrix)[fixed] = self.anchor_stiffness
-        return matrix
 
     def gap_gradient(self, contacts: Contacts) -> Array:
         """Derivatives of tooth gaps with respect to their sectors' degrees of freedom.
@@ -159,10 +142,16 @@ class Linearised:
         Returns:
             Sectors whose forces and tangents changed (k,).
         """
-        sectors = np.flatnonzero(stations.any(axis=1))
-        change = np.where(touching[sectors], -1.0, 1.0) * stations[sectors]
-        k, normal = change * self.stations.stiffness, self.normal[sectors]
-        push, into = k * self.gap[sectors], self.gap_dofs
+        sectors, into = np.flatnonzero(stations.any(axis=1)), self.gap_dofs
+        spring = np.where(touching, -self.stations.stiffness, self.stations.stiffness)
+        spring *= stations
+        bore = CompiledBore.for_stations(self.stations)
+        if self.race_rows is None and bore is not None:
+            at = spring, self.gap, self.normal, into
+            bore.add_forces(*at, self.gradient, self.hessian, sign=self.sign)
+            return sectors
+        k, normal = spring[sectors], self.normal[sectors]
+        push = k * self.gap[sectors]
         if self.race_rows is None:
             forces = self.stations.forces_of(push[..., None] * normal)
             springs = self.stations.stiffness_of(normal, k)
@@ -176,6 +165,7 @@ class Linearised:
         self.hessian[sectors[:, None, None], into[:, None], into] += (
             sign[:, :, None] * springs * sign[:, None, :]
         )
+        _hold(self.hessian, sectors, self.fixed[sectors], self.anchor_stiffness)
         return sectors
 
     def mean_gap_gradient(self, sector: Index, weight: Array) -> Array:
@@ -241,14 +231,17 @@ def linearise(
     if torque is not None:
         gradient += torque / model.copies * rotation_gradient
 
+    anchor = np.zeros(sign.shape)
+    anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
+    stiffness = float(np.mean(np.diag(model.element.stiffness)))
     if hessian is None:
         assert kept is not None
         hessian = kept.hessian
     else:
         # signs other than 1 occur in the last sector only
         hessian[-1] *= np.outer(sign[-1], sign[-1])
-    anchor = np.zeros(sign.shape)
-    anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
+        hessian[0] += stiffness * np.outer(anchor[0], anchor[0])
+        _hold(hessian, np.arange(len(hessian)), fixed, stiffness)
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
     angle = frames.angle - state.circular_spline_rotation
     circular_spline_elastic = model.circular_spline_displacement(state)
@@ -269,7 +262,7 @@ def linearise(
         rotation=rotation,
         rotation_gradient=sign * rotation_gradient,
         anchor=anchor,
-        anchor_stiffness=float(np.mean(np.diag(model.element.stiffness))),
+        anchor_stiffness=stiffness,
         flank=model.shift_flank(flank, model.tooth_shift),
         circular_spline_elastic=circular_spline_elastic,
         search=ToothContact(
@@ -283,6 +276,15 @@ def linearise(
             bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
         ),
     )
+
+
+def _hold(hessian: Array, sectors: Index, fixed: Mask, stiffness: float) -> None:
+    """Uncouple the fixed degrees of freedom (k, n) of k sectors, in place."""
+    k, dof = np.nonzero(fixed)
+    sector = sectors[k]
+    hessian[sector, dof] = 0.0
+    hessian[sector, :, dof] = 0.0
+    hessian[sector, dof, dof] = stiffness
 
 
 def _add_sectors(
@@ -340,7 +342,9 @@ def _add_bore(
     stations, touching = model.stations, state.touching
     gap, normal, curvature = _gaps(model, state)
     if (bore := CompiledBore.for_stations(stations)) is not None:
-        bore.add_forces(touching, gap, normal, curvature, into, gradient, hessian)
+        spring = np.where(touching, stations.stiffness, 0.0)
+        at = spring, gap, normal, into
+        bore.add_forces(*at, gradient, hessian, curvature=curvature)
         return _Bore(gap=gap, normal=normal)
     # only sectors in contact exert a force
     on = np.flatnonzero(touching.any(axis=1))

@@ -12,7 +12,6 @@ from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.force_lines import ForceLines, Solution, solve_condensed
 from swgjoint.fe.plane.linearise import Linearised
-from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Index, Mask
@@ -74,22 +73,16 @@ class NewtonStep:
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
     """Increment of the degrees of freedom of every sector (N, n_dofs) [m]."""
-    shift: Array
-    """Shift of the skeleton nodes in the global frame (N, n_a, 2) [m]."""
-    race_shift: Array
-    """Shift of the race nodes (N, m, 2, 2) [m]; empty without a race."""
     gap: Array
     """Gaps of the stations of the bore after the step (N, q) [m]."""
-    pressure: Array
-    """Normal force on the bore at each of its stations (N, q) [N]."""
     strip_error: float
     """Largest error of the linearised indentation law [m]; zero without indentation."""
 
     @cached_property
     def largest(self) -> float:
         """Largest increment of a node, or the error of the indentation law [m]."""
-        of_race = float(np.abs(self.race_shift).max(initial=0.0))
-        return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
+        increment = self.increment
+        return max(float(increment.max()), -float(increment.min()), self.strip_error)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,7 +149,7 @@ class NewtonProblem:
         """
         if factor is None:
             factor = RingFactor(
-                linear.anchor_tangent(), linear.face_dofs, np.unique(contacts.sector)
+                linear.hessian, linear.face_dofs, np.unique(contacts.sector)
             )
         return cls(
             model=model,
@@ -180,8 +173,7 @@ class NewtonProblem:
             SingularCyclicError: If the tangent becomes singular.
         """
         touching = self.state.touching
-        changed = self.linear.exchange(stations, touching)
-        self.factor.update(self.linear.anchor_tangent(changed), changed)
+        self.factor.update(self.linear.exchange(stations, touching))
         return replace(self, state=replace(self.state, touching=touching ^ stations))
 
     def solve(self, pressing: Index | None = None) -> NewtonStep:
@@ -333,11 +325,8 @@ class NewtonProblem:
             solution: Unknowns of the condensed system.
             increment: Increment of the degrees of freedom (N, n_dofs) [m].
         """
-        model, linear, load, lines = self.model, self.linear, self.load, self.lines
+        model, load, lines = self.model, self.load, self.lines
         force, strips = solution.force, lines.strips
-        race_shift = increment[:, model.race_dofs[:-NODE]]
-        gap = linear.gap_after(increment)
-        push = -model.stations.stiffness * gap
         holding = model.copies * solution.multiplier
         on_flexspline = load.on_flexspline
         return NewtonStep(
@@ -350,10 +339,7 @@ class NewtonProblem:
             compliance=solution.compliance / model.copies,
             circular_spline_turn=solution.circular_spline_turn,
             increment=increment,
-            shift=linear.rotate_to_global(increment),
-            race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
-            gap=gap,
-            pressure=np.where(self.state.touching, push, 0.0),
+            gap=self.linear.gap_after(increment),
             strip_error=0.0
             if strips is None
             else strips.error(force[: len(lines.contacts)]),

@@ -19,12 +19,8 @@ from swgjoint.fe.common.friction import CoulombFriction
 from swgjoint.fe.common.indentation import Indentation
 from swgjoint.fe.plane.bore_contact import POINTS, BoreStations
 from swgjoint.fe.plane.circular_spline import CircularSpline
-from swgjoint.fe.plane.corotation import (
-    Frames,
-    rotate,
-    rotate_right_angle,
-    sector_frames,
-)
+from swgjoint.fe.plane.compiled_tangent import find_frames
+from swgjoint.fe.plane.corotation import Frames, rotate, rotate_right_angle
 from swgjoint.fe.plane.race import NODE, PlaneRace
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
@@ -218,9 +214,7 @@ class SectorModel:
         fixed = None
         if not self.nonlinear:
             fixed = np.full(self.sectors, state.rotation)
-        return sector_frames(
-            self.element, self.skeleton(state), self.place, fixed=fixed
-        )
+        return find_frames(self.element, self.skeleton(state), self.place, fixed=fixed)
 
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
         """Start of a search: the inextensional shape of a thin ring on n lobes.
