@@ -62,66 +62,58 @@ SWGJOINT_WIDE bool factorise(double* matrix, std::size_t size, std::size_t pivot
   return true;
 }
 
-// Elimination of a few loads (size, width), in place: the compiler unrolls their loop.
-template <int width>
-void forward_few(const double* matrix, std::size_t size, std::size_t pivots,
-                 double* loads) {
-  for (std::size_t k = 0; k < pivots; ++k) {
-    const double* row = matrix + k * size;
-    double own[width];
-    for (int c = 0; c < width; ++c) {
-      own[c] = loads[k * width + c] *= row[k];
+// Elimination of loads, in place: `width` columns of `size` unknowns.
+SWGJOINT_WIDE void forward(const double* matrix, std::size_t size, std::size_t pivots,
+                           double* columns, std::size_t width) {
+  constexpr std::size_t panel = 4;
+  for (std::size_t c = 0; c < width; ++c, columns += size) {
+    double* __restrict x = columns;
+    std::size_t pivot = 0;
+    for (; pivot + panel <= pivots; pivot += panel) {
+      const double *one = matrix + pivot * size, *two = one + size, *three = two + size,
+                   *four = three + size;
+      const double *rows[panel] = {one, two, three, four};
+      for (std::size_t k = 0; k < panel; ++k) {
+        const double own = x[pivot + k] *= rows[k][pivot + k];
+        for (std::size_t j = k + 1; j < panel; ++j) {
+          x[pivot + j] -= rows[k][pivot + j] * own;
+        }
+      }
+      const double a = x[pivot], b = x[pivot + 1], d = x[pivot + 2], e = x[pivot + 3];
+      for (std::size_t j = pivot + panel; j < size; ++j) {
+        x[j] = (((x[j] - one[j] * a) - two[j] * b) - three[j] * d) - four[j] * e;
+      }
     }
-    for (std::size_t j = k + 1; j < size; ++j) {
-      for (int c = 0; c < width; ++c) loads[j * width + c] -= row[j] * own[c];
-    }
-  }
-}
-
-// Elimination of loads (size, width), in place.
-void forward(const double* matrix, std::size_t size, std::size_t pivots, double* loads,
-             std::size_t width) {
-  if (width == 1) return forward_few<1>(matrix, size, pivots, loads);
-  if (width == 2) return forward_few<2>(matrix, size, pivots, loads);
-  if (width == 3) return forward_few<3>(matrix, size, pivots, loads);
-  if (width == 4) return forward_few<4>(matrix, size, pivots, loads);
-  for (std::size_t k = 0; k < pivots; ++k) {
-    const double* row = matrix + k * size;
-    double* own = loads + k * width;
-    for (std::size_t c = 0; c < width; ++c) own[c] *= row[k];
-    for (std::size_t j = k + 1; j < size; ++j) {
-      double* other = loads + j * width;
-      for (std::size_t c = 0; c < width; ++c) other[c] -= row[j] * own[c];
+    for (; pivot < pivots; ++pivot) {
+      const double* row = matrix + pivot * size;
+      const double own = x[pivot] *= row[pivot];
+      for (std::size_t j = pivot + 1; j < size; ++j) x[j] -= row[j] * own;
     }
   }
 }
 
-// Sum of products, in four parts that do not wait for each other.
-double dot(const double* a, const double* b, std::size_t count) {
-  double sum[4] = {0.0, 0.0, 0.0, 0.0};
-  std::size_t i = 0;
-  for (; i + 4 <= count; i += 4) {
-    for (int k = 0; k < 4; ++k) sum[k] += a[i + k] * b[i + k];
-  }
-  for (; i < count; ++i) sum[0] += a[i] * b[i];
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
-
-// Substitution of eliminated unknowns (size, width), in place.
-void backward(const double* matrix, std::size_t size, std::size_t pivots, double* values,
-              std::size_t width) {
+// Substitution of eliminated unknowns (size,), in place.
+SWGJOINT_WIDE void backward(const double* matrix, std::size_t size, std::size_t pivots,
+                            double* values) {
   for (std::size_t k = pivots; k-- > 0;) {
     const double* row = matrix + k * size;
-    double* own = values + k * width;
-    if (width == 1) {
-      *own = (*own - dot(row + k + 1, values + k + 1, size - k - 1)) * row[k];
-      continue;
+    const double sum = sum_of_products(row + k + 1, values + k + 1, size - k - 1);
+    values[k] = (values[k] - sum) * row[k];
+  }
+}
+
+// Adds the products of all pairs of `width` columns, over their first `count` entries, to
+// the upper triangle of a matrix (total, total): the first d columns are those of the
+// matrix, the others follow after `start` more.
+SWGJOINT_WIDE void add_products(const double* columns, std::size_t size,
+                                std::size_t count, std::size_t d, std::size_t width,
+                                std::size_t start, std::size_t total, double* sum) {
+  const auto place = [&](std::size_t a) { return a < d ? a : a + start; };
+  for (std::size_t a = 0; a < width; ++a) {
+    for (std::size_t b = a; b < width; ++b) {
+      sum[place(a) * total + place(b)] +=
+          sum_of_products(columns + a * size, columns + b * size, count);
     }
-    for (std::size_t j = k + 1; j < size; ++j) {
-      const double* other = values + j * width;
-      for (std::size_t c = 0; c < width; ++c) own[c] -= row[j] * other[c];
-    }
-    for (std::size_t c = 0; c < width; ++c) own[c] *= row[k];
   }
 }
 
@@ -245,61 +237,68 @@ bool RingFactor::update(const double* blocks, const std::int64_t* changed,
   return true;
 }
 
+// Load of one sector (n,), with entries `apart` from each other, interior unknowns first.
+void RingFactor::place(const double* load, std::size_t apart, double* to) const {
+  const std::size_t f = face_, m = inner_;
+  for (std::size_t j = 0; j < f; ++j) to[m + j] = load[j * apart];
+  for (std::size_t j = 0; j < m; ++j) to[j] = load[(f + j) * apart];
+  for (std::size_t j = m + f; j < size_; ++j) to[j] = load[j * apart];
+}
+
 void RingFactor::solve(double* loads, std::size_t width) const {
-  const std::size_t n = size_, f = face_ * width, m = inner_ * width;
+  const std::size_t n = size_, f = face_, m = inner_;
   std::vector<std::size_t> begin(parts_.size() + 1, 0);
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    begin[i + 1] = begin[i] + parts_[i].size * width;
+    begin[i + 1] = begin[i] + parts_[i].size;
   }
   std::vector<double> values(begin.back());
   // values of a part at its two faces
   const auto faces = [&](std::int64_t i) {
-    return values.data() + begin[i] + parts_[i].pivots * width;
+    return values.data() + begin[i] + parts_[i].pivots;
   };
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const Part& part = parts_[i];
-    double* own = values.data() + begin[i];
-    if (i < sectors_) {
-      const double* from = loads + i * n * width;
-      std::copy(from, from + f, own + m);
-      std::copy(from + f, from + f + m, own);
-      std::copy(from + f + m, from + n * width, own + m + f);
-    } else {
-      const double* left = faces(part.left);
-      if (part.right >= 0) {
-        const double* right = faces(part.right);
-        std::copy(left + f, left + 2 * f, own);
-        add_to(own, right, f);
-        std::copy(left, left + f, own + f);
-        std::copy(right + f, right + 2 * f, own + 2 * f);
+  for (std::size_t c = 0; c < width; ++c, ++loads) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const Part& part = parts_[i];
+      double* own = values.data() + begin[i];
+      if (i < sectors_) {
+        place(loads + i * n * width, width, own);
       } else {
-        std::copy(left, left + f, own);
-        add_to(own, left + f, f);
+        const double* left = faces(part.left);
+        if (part.right >= 0) {
+          const double* right = faces(part.right);
+          std::copy(left + f, left + 2 * f, own);
+          add_to(own, right, f);
+          std::copy(left, left + f, own + f);
+          std::copy(right + f, right + 2 * f, own + 2 * f);
+        } else {
+          std::copy(left, left + f, own);
+          add_to(own, left + f, f);
+        }
       }
+      forward(part.matrix, part.size, part.pivots, own, 1);
     }
-    forward(part.matrix, part.size, part.pivots, own, width);
-  }
-  for (std::size_t i = parts_.size(); i-- > 0;) {
-    const Part& part = parts_[i];
-    double* own = values.data() + begin[i];
-    backward(part.matrix, part.size, part.pivots, own, width);
-    if (i < sectors_) {
-      double* to = loads + i * n * width;
-      std::copy(own + m, own + m + f, to);
-      std::copy(own, own + m, to + f);
-      std::copy(own + m + f, own + n * width, to + f + m);
-      continue;
-    }
-    double* left = faces(part.left);
-    if (part.right >= 0) {
-      double* right = faces(part.right);
-      std::copy(own + f, own + 2 * f, left);
-      std::copy(own, own + f, left + f);
-      std::copy(own, own + f, right);
-      std::copy(own + 2 * f, own + 3 * f, right + f);
-    } else {
-      std::copy(own, own + f, left);
-      std::copy(own, own + f, left + f);
+    for (std::size_t i = parts_.size(); i-- > 0;) {
+      const Part& part = parts_[i];
+      double* own = values.data() + begin[i];
+      backward(part.matrix, part.size, part.pivots, own);
+      if (i < sectors_) {
+        double* to = loads + i * n * width;
+        for (std::size_t j = 0; j < f; ++j) to[j * width] = own[m + j];
+        for (std::size_t j = 0; j < m; ++j) to[(f + j) * width] = own[j];
+        for (std::size_t j = m + f; j < n; ++j) to[j * width] = own[j];
+        continue;
+      }
+      double* left = faces(part.left);
+      if (part.right >= 0) {
+        double* right = faces(part.right);
+        std::copy(own + f, own + 2 * f, left);
+        std::copy(own, own + f, left + f);
+        std::copy(own, own + f, right);
+        std::copy(own + 2 * f, own + 3 * f, right + f);
+      } else {
+        std::copy(own, own + f, left);
+        std::copy(own, own + f, left + f);
+      }
     }
   }
 }
@@ -307,7 +306,7 @@ void RingFactor::solve(double* loads, std::size_t width) const {
 void RingFactor::condense(const double* loads, std::size_t d,
                           const std::int64_t* sector, const double* rows,
                           std::size_t k, double* result) const {
-  const std::size_t n = size_, f = face_, m = inner_, total = d + k;
+  const std::size_t n = size_, f = face_, total = d + k;
   // columns of a part: the loads on all sectors, then the rows on its own sectors
   std::vector<std::size_t> order(k), begin(sectors_ + 1, 0);
   std::iota(order.begin(), order.end(), 0);
@@ -316,41 +315,34 @@ void RingFactor::condense(const double* loads, std::size_t d,
   });
   for (std::size_t i = 0; i < k; ++i) ++begin[sector[i] + 1];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<double> gram(total * total, 0.0);
-  std::vector<std::vector<double>> values(parts_.size());
+  const auto width_of = [&](const Part& part) {
+    return d + begin[part.last] - begin[part.first];
+  };
+  std::vector<std::size_t> at(parts_.size() + 1, 0);
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    at[i + 1] = at[i] + parts_[i].size * width_of(parts_[i]);
+  }
+  std::vector<double> gram(total * total, 0.0), values(at.back(), 0.0);
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Part& part = parts_[i];
-    const std::size_t start = begin[part.first], own_rows = begin[part.last] - start;
-    const std::size_t width = d + own_rows;
-    if (width == 0) continue;
-    std::vector<double>& own = values[i];
-    own.assign(part.size * width, 0.0);
+    const std::size_t start = begin[part.first], width = width_of(part);
+    double* own = values.data() + at[i];
     if (i < sectors_) {
-      for (std::size_t j = 0; j < n; ++j) {
-        // interior unknowns first
-        const std::size_t at = j < f ? m + j : j < f + m ? j - f : j;
-        double* to = own.data() + at * width;
-        const double* from = loads + (i * n + j) * d;
-        std::copy(from, from + d, to);
-        for (std::size_t c = 0; c < own_rows; ++c) {
-          to[d + c] = rows[order[start + c] * n + j];
-        }
+      for (std::size_t c = 0; c < d; ++c) place(loads + i * n * d + c, d, own + c * n);
+      for (std::size_t c = d; c < width; ++c) {
+        place(rows + order[start + c - d] * n, 1, own + c * n);
       }
     } else {
       // loads of a child on its faces, at given rows of the part
       const auto take = [&](std::int64_t child, std::size_t first, std::size_t last) {
         const Part& from = parts_[child];
-        const std::size_t there = begin[from.first], count = begin[from.last] - there;
-        if (d + count == 0) return;
-        const double* at = values[child].data() + from.pivots * (d + count);
-        for (std::size_t side = 0; side < 2; ++side) {
-          for (std::size_t j = 0; j < f; ++j, at += d + count) {
-            double* to = own.data() + ((side ? last : first) + j) * width;
-            add_to(to, at, d);
-            add_to(to + d + there - start, at + d, count);
-          }
+        const std::size_t before = begin[from.first] - start, count = width_of(from);
+        for (std::size_t c = 0; c < count; ++c) {
+          const double* faces = values.data() + at[child] + c * from.size + from.pivots;
+          double* to = own + (c < d ? c : c + before) * part.size;
+          add_to(to + first, faces, f);
+          add_to(to + last, faces + f, f);
         }
-        values[child].clear();
       };
       if (part.right >= 0) {
         take(part.left, f, 0);
@@ -359,22 +351,13 @@ void RingFactor::condense(const double* loads, std::size_t d,
         take(part.left, 0, 0);
       }
     }
-    forward(part.matrix, part.size, part.pivots, own.data(), width);
-    for (std::size_t j = 0; j < part.pivots; ++j) {
-      const double* row = own.data() + j * width;
-      for (std::size_t a = 0; a < width; ++a) {
-        double* to = gram.data() + (a < d ? a : a + start) * total;
-        for (std::size_t b = a; b < d; ++b) to[b] += row[a] * row[b];
-        for (std::size_t b = std::max(a, d); b < width; ++b) {
-          to[start + b] += row[a] * row[b];
-        }
-      }
-    }
+    forward(part.matrix, part.size, part.pivots, own, width);
+    add_products(own, part.size, part.pivots, d, width, start, total, gram.data());
   }
-  const auto place = [&](std::size_t a) { return a < d ? a : d + order[a - d]; };
+  const auto number = [&](std::size_t a) { return a < d ? a : d + order[a - d]; };
   for (std::size_t a = 0; a < total; ++a) {
     for (std::size_t b = a; b < total; ++b) {
-      const std::size_t i = place(a), j = place(b);
+      const std::size_t i = number(a), j = number(b);
       result[i * total + j] = result[j * total + i] = gram[a * total + b];
     }
   }

@@ -51,6 +51,7 @@ class RingFactor {
   std::int64_t add(std::size_t first, std::size_t last);
   bool eliminate(Part& part) const;
   void gather(Part& part, const double* block) const;
+  void place(const double* load, std::size_t apart, double* to) const;
   void merge(Part& part) const;
   void close();
 
