@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "wide.h"
+
 namespace swgjoint {
 namespace {
 
@@ -18,6 +20,21 @@ Vec station_of(const Stations& stations, std::size_t i, const double* window) {
   return sum;
 }
 
+// The same sums for all stations of an interval (p,).
+SWGJOINT_WIDE void stations_of(const Stations& stations, const double* window,
+                               double* __restrict x, double* __restrict y) {
+  const std::size_t p = stations.p;
+  std::fill(x, x + p, 0.0);
+  std::fill(y, y + p, 0.0);
+  for (std::size_t j = 0; j < stations.width; ++j) {
+    const double *along = stations.by_node + 2 * p * j, *across = along + p;
+    for (std::size_t i = 0; i < p; ++i) {
+      x[i] += along[i] * window[j];
+      y[i] += across[i] * window[j];
+    }
+  }
+}
+
 }  // namespace
 
 void bore_gaps(const Stations& stations, const Support& support, const double* nodes,
@@ -26,12 +43,12 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
   const double cos = std::cos(support.angle), sin = std::sin(support.angle);
   const std::size_t p = stations.p;
   std::vector<Vec> seen(p);
+  std::vector<double> x(p), y(p);
   std::vector<Nearest> feet(p);
   for (std::size_t s = 0; s < count; ++s, nodes += 2 * stations.nodes()) {
     for (std::size_t k = 0; k < stations.intervals; ++k) {
       const double* window = nodes + 2 * k;
-      const auto see = [&](std::size_t i) {
-        const Vec at = station_of(stations, i, window);
+      const auto see = [&](Vec at) {
         return Vec{cos * at.x + sin * at.y - support.offset.x,
                    cos * at.y - sin * at.x - support.offset.y};
       };
@@ -41,10 +58,11 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
         normal[2 * i + 1] = sin * foot.normal.x + cos * foot.normal.y;
         curvature[i] = foot.curvature / (1.0 + foot.curvature * foot.gap);
       };
-      feet[0] = support.outline.nearest(see(p / 2));
+      feet[0] = support.outline.nearest(see(station_of(stations, p / 2, window)));
       if (feet[0].gap < support.far ||
           std::any_of(touching, touching + p, [](bool on) { return on; })) {
-        for (std::size_t i = 0; i < p; ++i) seen[i] = see(i);
+        stations_of(stations, window, x.data(), y.data());
+        for (std::size_t i = 0; i < p; ++i) seen[i] = see({x[i], y[i]});
         support.outline.nearest(seen.data(), p, feet.data());
       } else {
         std::fill(feet.begin() + 1, feet.end(), feet[0]);
@@ -113,13 +131,13 @@ void bore_forces(const Stations& stations, const double* spring, const double* g
 void bore_gaps_after(const Stations& stations, const double* gap, const double* normal,
                      const std::int64_t* into, const double* increment,
                      std::size_t count, std::size_t n, double* result) {
-  std::vector<double> moved(2 * stations.nodes());
+  std::vector<double> moved(2 * stations.nodes()), x(stations.p), y(stations.p);
   for (std::size_t s = 0; s < count; ++s, increment += n) {
     for (std::size_t j = 0; j < moved.size(); ++j) moved[j] = increment[into[j]];
     for (std::size_t k = 0; k < stations.intervals; ++k) {
+      stations_of(stations, moved.data() + 2 * k, x.data(), y.data());
       for (std::size_t i = 0; i < stations.p; ++i, ++gap, normal += 2, ++result) {
-        const Vec shift = station_of(stations, i, moved.data() + 2 * k);
-        *result = *gap + shift.x * normal[0] + shift.y * normal[1];
+        *result = *gap + x[i] * normal[0] + y[i] * normal[1];
       }
     }
   }

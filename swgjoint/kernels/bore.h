@@ -17,6 +17,7 @@ namespace swgjoint {
 // Stations between bore nodes: p in each interval, which follow width / 2 nodes.
 struct Stations {
   const double* weights;  // derivatives by the nodes of an interval (p, 2, width)
+  const double* by_node;  // the same (width, 2, p)
   std::size_t p, width, intervals;
 
   std::size_t count() const { return p * intervals; }

@@ -42,7 +42,12 @@ class Bore {
     require(p > 0 && weights.shape(1) == 2 && width > 1 && width % 2 == 0,
             "weights: (p, 2, 2 s)");
     require(stations > 0 && stations % p == 0, "stations: a multiple of p");
-    stations_ = {weights.data(), p, width, stations / p};
+    for (std::size_t j = 0; j < width; ++j) {
+      for (std::size_t i = 0; i < 2 * p; ++i) {
+        by_node_.push_back(weights.data()[(i % p * 2 + i / p) * width + j]);
+      }
+    }
+    stations_ = {weights.data(), by_node_.data(), p, width, stations / p};
   }
 
   void gaps(In<3> nodes, Masks touching, In<2> outline, double angle, In<1> offset,
@@ -105,6 +110,7 @@ class Bore {
   }
 
   In<3> weights_;
+  std::vector<double> by_node_;
   swgjoint::Stations stations_{};
 };
 

@@ -205,10 +205,10 @@ def _stations_to_exchange(
     state = problem.state
     if not step.largest < below:
         return None
-    bad = _wrong_stations(state, step.gap) > TOUCH
+    bad = _wrong_stations(state, step.gap)
     if not bad.any() or not (state.touching ^ bad).any():
         return None
-    return np.asarray(bad)
+    return bad
 
 
 def _advance(
@@ -226,10 +226,10 @@ def _advance(
         The new state, and whether the bore contact remained the same.
     """
     after = linear.gap + damping * (step.gap - linear.gap)
-    wrong = _wrong_stations(state, after)
-    bad = wrong > TOUCH
+    bad = _wrong_stations(state, after)
     # if all stations opened, the rim would spring back: release the worst one only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
+        wrong = np.where(state.touching, after, -after)
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
     flank_force = np.zeros_like(state.flank_force)
@@ -271,18 +271,15 @@ def _advance(
     return new, not bool(bad.any())
 
 
-def _wrong_stations(state: State, gap: Array) -> Array:
-    """Violation of the assumed contact state at each station.
+def _wrong_stations(state: State, gap: Array) -> Mask:
+    """Stations assumed in contact that have a gap, and others that overlap (N, q).
 
     Args:
         state: State whose bore contact is assumed.
         gap: Gap at each station (N, q) [m].
-
-    Returns:
-        Gap of the stations assumed in contact, overlap of the others (N, q) [m].
-        Positive values are violations.
     """
-    return np.asarray(np.where(state.touching, gap, -gap))
+    touching = state.touching
+    return np.asarray((gap > TOUCH) & touching | (gap < -TOUCH) & ~touching)
 
 
 def _finished(

@@ -143,8 +143,10 @@ class Linearised:
             Sectors whose forces and tangents changed (k,).
         """
         sectors, into = np.flatnonzero(stations.any(axis=1)), self.gap_dofs
-        spring = np.where(touching, -self.stations.stiffness, self.stations.stiffness)
-        spring *= stations
+        sector, station = np.nonzero(stations)
+        change = np.where(touching[sector, station], -1.0, 1.0)
+        spring = np.zeros(stations.shape)
+        spring[sector, station] = change * self.stations.stiffness[station]
         bore = CompiledBore.for_stations(self.stations)
         if self.race_rows is None and bore is not None:
             at = spring, self.gap, self.normal, into
@@ -233,7 +235,7 @@ def linearise(
 
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
-    stiffness = float(np.mean(np.diag(model.element.stiffness)))
+    stiffness = model.element.mean_stiffness
     if hessian is None:
         assert kept is not None
         hessian = kept.hessian

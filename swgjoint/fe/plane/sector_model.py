@@ -305,12 +305,19 @@ class SectorModel:
         force[:, :2] += self._of_last(nodal[:, -2:])
         return np.asarray(force)
 
+    @cached_property
+    def _undeformed_bore(self) -> tuple[Array, Array]:
+        """Undeformed bore nodes, and turned by a right angle (N, n_bore + 1, 2) [m]."""
+        nodes = self.reference[:, self.bore_nodes]
+        return nodes, rotate_right_angle(nodes)
+
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
         """Best-fit rotation of bore nodes (N, n_bore + 1, 2) [rad] and its gradient."""
-        x0 = self.reference[:, self.bore_nodes]
-        sine = float(np.einsum("sni,sni->", rotate_right_angle(x0), nodes))
-        cosine = float(np.einsum("sni,sni->", x0, nodes))
-        gradient = (cosine * rotate_right_angle(x0) - sine * x0) / (sine**2 + cosine**2)
+        along, across = self._undeformed_bore
+        sine = float(np.vdot(across, nodes))
+        cosine = float(np.vdot(along, nodes))
+        size = sine**2 + cosine**2
+        gradient = (cosine / size) * across - (sine / size) * along
         return float(np.arctan2(sine, cosine)), gradient
 
     def predict_field(

@@ -69,6 +69,11 @@ class Superelement:
     functions of the arc length [m] of its centre."""
 
     @cached_property
+    def mean_stiffness(self) -> float:
+        """Mean of the diagonal of K hat [N/m]."""
+        return float(np.mean(np.diag(self.stiffness)))
+
+    @cached_property
     def slope_products(self) -> Array:
         """Matrix Q of the second-order elongation (2 n_a, 2 n_a) [1/m]."""
         return np.asarray(self.rim_slopes.T @ self.rim_slopes)
