@@ -156,20 +156,26 @@ def run_motion(
 
 
 def figures_of(runs: dict[str, Run]) -> dict[str, float]:
-    """Figures in the units of :data:`UNITS`, from the runs by motion."""
-    move, slow, even = (runs[motion] for motion in MOTIONS)
-    moving = move.time >= MOVE["trajectory"]["hold_s"]
-    off = (move.position - move.reference)[moving, 0] / arcmin
-    turned = (slow.position - slow.reference)[slow.steady, 0] / arcmin
-    ripple = even.metrics()["joints"]["joint"]["ripple_rms_percent"]
-    return {
-        "tracking_rms": float(np.sqrt(np.mean(off**2))),
-        "tracking_peak": float(np.abs(off).max()),
-        "positioning_pp": float(np.ptp(turned)),
-        "ripple_rms": float(ripple),
-        "two_per_turn": two_per_turn(even),
-        "effort_rms": float(np.sqrt(np.mean(move.motor_torque[moving] ** 2))),
-    }
+    """Figures of the given motions in the units of :data:`UNITS`.
+
+    Args:
+        runs: Runs by motion, a key of :data:`MOTIONS`.
+    """
+    figures = {}
+    if move := runs.get("move"):
+        moving = move.time >= MOVE["trajectory"]["hold_s"]
+        off = (move.position - move.reference)[moving, 0] / arcmin
+        figures["tracking_rms"] = float(np.sqrt(np.mean(off**2)))
+        figures["tracking_peak"] = float(np.abs(off).max())
+        figures["effort_rms"] = float(np.sqrt(np.mean(move.motor_torque[moving] ** 2)))
+    if slow := runs.get("slow"):
+        turned = (slow.position - slow.reference)[slow.steady, 0] / arcmin
+        figures["positioning_pp"] = float(np.ptp(turned))
+    if even := runs.get("even"):
+        ripple = even.metrics()["joints"]["joint"]["ripple_rms_percent"]
+        figures["ripple_rms"] = float(ripple)
+        figures["two_per_turn"] = two_per_turn(even)
+    return {key: figures[key] for key in UNITS if key in figures}
 
 
 def two_per_turn(run: Run) -> float:
