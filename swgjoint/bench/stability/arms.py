@@ -13,7 +13,11 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from swgjoint.bench.stability.joint import Course, with_kinematic_error
+from swgjoint.bench.stability.joint import (
+    Course,
+    torsion_energy,
+    with_kinematic_error,
+)
 from swgjoint.bench.stability.rows import DEFAULT, StabilityRow, outcome_of
 from swgjoint.errors import ComputationError
 from swgjoint.joint.attach import attach
@@ -185,31 +189,27 @@ def _let_go(
         error = a.drive.error_at(a.drive.phases(theta, angle))[0]
         data.qpos[r], data.qpos[j] = theta, angle + float(error)
     full = np.zeros((model.nv, model.nv))
-    stored, energy, states = [], [], []
+    position, velocity = np.empty((2, SAMPLES + 1, model.nv))
+    kinetic, height = np.empty((2, SAMPLES + 1))
     for k in range(SAMPLES + 1):
         if k:
             mujoco.mj_step(model, data, steps // SAMPLES * parts)
         # the midpoint rule refers to positions half a step earlier
-        weighed.qpos[:] = data.qpos - 0.5 * h * data.qvel
-        weighed.qvel[:] = data.qvel
+        weighed.qpos[:] = position[k] = data.qpos - 0.5 * h * data.qvel
+        weighed.qvel[:] = velocity[k] = data.qvel
         mujoco.mj_fwdPosition(model, weighed)
         mujoco.mj_fullM(model, weighed, full)
-        kinetic = 0.5 * float(weighed.qvel @ full @ weighed.qvel)
-        height = float(model.body_mass @ weighed.xipos[:, 2])
-        torsion = 0.0
-        for a, r, j in zip(attached, rotor, link, strict=True):
-            theta, psi = float(weighed.qpos[r]), float(weighed.qpos[j])
-            torsion += float(a.drive.energy(a.drive.torsion(theta, psi), theta, psi))
-        stored.append(kinetic + torsion)
-        energy.append(stored[-1] - float(model.opt.gravity[2]) * height)
-        states.append((weighed.qpos.copy(), weighed.qvel.copy()))
+        kinetic[k] = 0.5 * float(weighed.qvel @ full @ weighed.qvel)
+        height[k] = float(model.body_mass @ weighed.xipos[:, 2])
+    stored = kinetic + torsion_energy(attached, position[:, rotor], position[:, link])
+    energy = stored - float(model.opt.gravity[2]) * height
     bad = any(w.number for w in data.warning) or not np.isfinite(energy).all()
     return Course(
         time=np.asarray(np.arange(SAMPLES + 1) * (steps // SAMPLES * parts * h), float),
-        position=np.array([q for q, _ in states]),
-        velocity=np.array([v for _, v in states]),
-        energy=np.array(energy),
-        scale=max(stored),  # the arm starts at rest, so its initial energy is small
+        position=position,
+        velocity=velocity,
+        energy=energy,
+        scale=float(stored.max()),  # at rest the arm has little energy
         diverged=bool(bad),
         sub_steps=parts,
     )

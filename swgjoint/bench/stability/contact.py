@@ -17,7 +17,11 @@ import mujoco
 import numpy as np
 
 from swgjoint.bench.stability.catalogue import CatalogueDrive, catalogue_drives
-from swgjoint.bench.stability.joint import GAIN, with_kinematic_error
+from swgjoint.bench.stability.joint import (
+    GAIN,
+    torsion_energy,
+    with_kinematic_error,
+)
 from swgjoint.bench.stability.rows import DEFAULT, StabilityRow
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
@@ -211,25 +215,22 @@ def lie_down(
         data.qpos[r], data.qpos[j] = theta, angle + error
     every = max(1, round(DURATION / step / SAMPLES))
     momentum = np.zeros(model.nv)
-    stored, energy = [], []
-    for _ in range(round(DURATION / step / every)):
+    count = round(DURATION / step / every)
+    position, kinetic, height = np.empty((count, model.nq)), *np.empty((2, count))
+    for k in range(count):
         mujoco.mj_step(model, data, every)
         # the midpoint rule refers to positions half a step earlier
-        weighed.qpos[:] = data.qpos - 0.5 * step * data.qvel
+        weighed.qpos[:] = position[k] = data.qpos - 0.5 * step * data.qvel
         weighed.qvel[:] = data.qvel
         mujoco.mj_fwdPosition(model, weighed)
         mujoco.mj_mulM(model, weighed, momentum, weighed.qvel)
-        own = 0.5 * float(weighed.qvel @ momentum)
-        for d, r, j in zip(drives, rotor, link, strict=True):
-            theta, psi = float(weighed.qpos[r]), float(weighed.qpos[j])
-            own += float(d.drive.energy(d.drive.torsion(theta, psi), theta, psi))
-        stored.append(own)
-        height = float(model.body_mass @ weighed.xipos[:, 2])
-        energy.append(own - float(model.opt.gravity[2]) * height)
+        kinetic[k] = 0.5 * float(weighed.qvel @ momentum)
+        height[k] = float(model.body_mass @ weighed.xipos[:, 2])
     if any(warning.number for warning in data.warning):
         return np.full(PARTS, np.inf)
-    total = np.array(energy)
-    fallen = max(stored[: len(stored) // PARTS])
+    stored = kinetic + torsion_energy(drives, position[:, rotor], position[:, link])
+    total = stored - float(model.opt.gravity[2]) * height
+    fallen = float(stored[: count // PARTS].max())
     means = [float(part.mean()) for part in np.array_split(total - total[0], PARTS)]
     return np.array(means) / fallen
 

@@ -14,6 +14,7 @@ is evaluated at these earlier positions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -320,6 +321,20 @@ class Joint:
             diverged=bad,
             sub_steps=sub_steps,
         )
+
+
+def torsion_energy(drives: Sequence[JointDrive], theta: Array, psi: Array) -> Array:
+    """Energy that the drives of a chain store [J], shape (n,).
+
+    Args:
+        drives: Drives of the chain.
+        theta: Rotor angles [rad], shape (n, n_drives).
+        psi: Link angles [rad], shape (n, n_drives).
+    """
+    total = np.zeros(len(theta))
+    for one, rotor, link in zip(drives, theta.T, psi.T, strict=True):
+        total += one.drive.energy(one.drive.torsion(rotor, link), rotor, link)
+    return total
 
 
 def make_joint(
