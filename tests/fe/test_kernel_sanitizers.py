@@ -11,9 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from sanitized import CXX, SANITIZERS, compiled, run_compiler
 
-CXX = os.environ.get("CXX", "g++")
 KERNELS = Path(__file__).parents[2] / "swgjoint/kernels"
+TESTS = Path(__file__).parents[1]
 SHARED = ("lanes", "local_sums")
 """Sources that the loops have in common with the plugin."""
 HEADERS = Path(sysconfig.get_path("include"))
@@ -40,12 +41,10 @@ pytestmark = [
 ]
 
 
-def library(name: str) -> str:
-    """Path of a library of the compiler."""
-    found = subprocess.run(
-        [CXX, f"-print-file-name={name}"], check=True, capture_output=True, text=True
-    )
-    return found.stdout.strip()
+SLOW_TO_COMPILE = ("module.cc", "combined.cpp", "local_sums.cc")
+"""Sources whose templates take longer to optimise than their loops to run."""
+OPTIONS = "-std=c++17 -g1 -fPIC -fvisibility=hidden".split()
+OPTIONS += [*SANITIZERS, "-fno-sanitize=vptr"]
 
 
 def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
@@ -64,37 +63,35 @@ def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
     spec = find_spec("nanobind")
     assert spec is not None and spec.submodule_search_locations
     nanobind = Path(spec.submodule_search_locations[0])
-    out = folder / "compiled.so"
-    options = "-std=c++17 -O1 -g1 -fPIC -shared -fvisibility=hidden".split()
-    options += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    options += ["-fno-sanitize=vptr", "-D_GLIBCXX_ASSERTIONS"]
+    library = folder / "nb_combined.cpp"
+    shutil.copy(nanobind / "src" / library.name, library)
     include = [nanobind / "include", nanobind / "ext/robin_map/include", HEADERS]
-    sources = [nanobind / "src/nb_combined.cpp", *sorted(folder.glob("*/*.cc"))]
-    subprocess.run(
-        [CXX, *options, *(f"-I{path}" for path in include), *sources, "-o", out],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
+    include += [nanobind / "src"]
+    headers = "".join(path.read_text() for path in sorted(folder.glob("*/*.h")))
+    objects = []
+    for source in [library, *sorted(folder.glob("*/*.cc"))]:
+        options = [*OPTIONS, *(f"-I{path}" for path in include)]
+        options += ["-O0" if source.name.endswith(SLOW_TO_COMPILE) else "-O1"]
+        objects.append(compiled(source, options, headers))
+    out = folder / "compiled.so"
+    run_compiler(*OPTIONS, "-shared", *objects, "-o", out)
     return out
 
 
-def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
-    """The tests against numpy with a module, the sanitizer loaded first."""
+def run_twins(module: Path, *files: Path) -> subprocess.CompletedProcess[str]:
+    """Tests against numpy with a module, the sanitizer loaded first."""
+    first = [
+        run_compiler(f"-print-file-name={name}")
+        for name in ("libasan.so", "libstdc++.so.6")
+    ]
     environment = os.environ | {
-        "LD_PRELOAD": f"{library('libasan.so')} {library('libstdc++.so.6')}",
+        "LD_PRELOAD": " ".join(first),
         "ASAN_OPTIONS": "detect_leaks=0",
     }
-    tests = Path(__file__).parents[1]
-    files = [*sorted(Path(__file__).parent.glob("test_compiled_*.py"))]
-    files += sorted((tests / "gear").glob("test_compiled_*.py"))
-    files += sorted((tests / "envs").glob("test_compiled_*.py"))
-    files += sorted((tests / "maps").glob("test_compiled_*.py"))
-    assert len(files) == 11
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, str(module), *map(str, files)],
         env=environment,
-        cwd=tests.parent,
+        cwd=TESTS.parent,
         capture_output=True,
         text=True,
     )
@@ -102,7 +99,10 @@ def run_twins(module: Path) -> subprocess.CompletedProcess[str]:
 
 def test_the_loops_are_clean(tmp_path):
     """No access beyond an array and nothing undefined in the tests against numpy."""
-    ended = run_twins(build(tmp_path))
+    folders = ("fe", "gear", "envs", "maps")
+    files = [f for name in folders for f in (TESTS / name).glob("test_compiled_*.py")]
+    assert len(files) == 11
+    ended = run_twins(build(tmp_path), *sorted(files))
     assert ended.returncode == 0, ended.stdout[-2000:] + ended.stderr[-2000:]
     assert "passed" in ended.stdout and "skipped" not in ended.stdout
 
@@ -110,6 +110,7 @@ def test_the_loops_are_clean(tmp_path):
 def test_an_access_beyond_an_array_is_found(tmp_path):
     """One point too many in a loop of the module ends the tests."""
     wrong = ("outline.cc", "i < n; ++i) seen", "i <= n; ++i) seen")
-    ended = run_twins(build(tmp_path, wrong))
+    tests = TESTS / "gear/test_compiled_outlines.py"
+    ended = run_twins(build(tmp_path, wrong), tests)
     assert ended.returncode != 0
     assert "AddressSanitizer" in ended.stderr

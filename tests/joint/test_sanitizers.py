@@ -16,14 +16,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from solved import kept
+from sanitized import CXX, SANITIZERS, compiled, run_compiler
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ("drive.cc", "drive.h", "drive_map.cc", "drive_map.h", "friction.cc")
 SOURCES += ("drive_map_parse.cc", "friction.h", "hysteresis.cc", "hysteresis.h")
 SOURCES += ("lanes.cc", "lanes.h", "law.h", "local_sums.cc", "local_sums.h")
 SOURCES += ("register.cc",)
-CXX = os.environ.get("CXX", "g++")
 RUN = """
 import sys
 from pathlib import Path
@@ -52,15 +51,11 @@ pytestmark = [
 
 # without optimisation, names in place of line numbers: half the time of a compiler
 OPTIONS = "-std=c++17 -O0 -g1 -fPIC -fvisibility=hidden -ffp-contract=off".split()
-OPTIONS += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-OPTIONS += ["-fsanitize=float-cast-overflow", "-D_GLIBCXX_ASSERTIONS"]
+OPTIONS += [*SANITIZERS, "-fsanitize=float-cast-overflow"]
 
 
 def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
-    """The plugin with both sanitizers; ``change`` is a file, a text and another one.
-
-    What the change leaves as it is is compiled once in a run.
-    """
+    """The plugin with both sanitizers; ``change`` is a file, a text and another one."""
     texts = {n: (ROOT / "swgjoint/plugin" / n).read_text() for n in SOURCES}
     if change:
         name, old, new = change
@@ -72,28 +67,16 @@ def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
     assert spec is not None and spec.submodule_search_locations
     mujoco = Path(spec.submodule_search_locations[0])
     (library,) = mujoco.glob("libmujoco.so.*")
-    headers = [text for name, text in texts.items() if name.endswith(".h")]
-    objects = []
-    for name, text in texts.items():
-        if name.endswith(".cc"):
-            objects.append(folder / f"{name}.o")
-            include, source = f"-I{mujoco / 'include'}", str(folder / name)
-            command = [CXX, *OPTIONS, include, "-c", source, "-o", str(objects[-1])]
-
-            def compiled(command=command, out=objects[-1]) -> bytes:
-                subprocess.run(command, check=True, capture_output=True, text=True)
-                return out.read_bytes()
-
-            key = f"sanitized {CXX} {OPTIONS} {name} {text} {headers}"
-            objects[-1].write_bytes(kept(key, compiled))
+    headers = "".join(text for name, text in texts.items() if name.endswith(".h"))
+    options = [*OPTIONS, f"-I{mujoco / 'include'}"]
+    objects = [
+        compiled(folder / name, options, headers)
+        for name in texts
+        if name.endswith(".cc")
+    ]
     out = folder / "libswgjoint_plugin.so"
-    link = [CXX, *OPTIONS, "-shared", *map(str, objects), str(library)]
-    subprocess.run(
-        [*link, f"-Wl,-rpath,{mujoco}", "-o", str(out)],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
+    link = [*OPTIONS, "-shared", *objects, library, f"-Wl,-rpath,{mujoco}"]
+    run_compiler(*link, "-o", out)
     return out
 
 
@@ -104,11 +87,8 @@ def run_tests(
 
     Or another program, with other arguments.
     """
-    asan = subprocess.run(
-        [CXX, "-print-file-name=libasan.so"], check=True, capture_output=True, text=True
-    ).stdout.strip()
     environment = os.environ | {
-        "LD_PRELOAD": asan,
+        "LD_PRELOAD": run_compiler("-print-file-name=libasan.so"),
         "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0",
         "UBSAN_OPTIONS": "print_stacktrace=1",
     }
