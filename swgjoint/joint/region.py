@@ -84,7 +84,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import sticking_stiffness
-from swgjoint.maps.phase_bounds import MANY, largest_sums, largest_total
+from swgjoint.maps.phase_bounds import MANY, largest_sums, largest_total, max_stiffness
 from swgjoint.typing import Array
 
 MAX_SUB_STEPS = 64
@@ -92,6 +92,8 @@ MAX_SUB_STEPS = 64
 arm at a step of 1 ms still runs in real time; for more, choose a smaller step."""
 MAX_PHASE_STEP = 0.5
 """Largest phase step of the highest order, h n |theta rate| [rad]."""
+HARDEST = 30.0
+"""Largest ratio of the largest to the mean stiffness [-]."""
 MARGIN = 1.4
 """Smallest ratio of the longest step inside the region to a sub-step [-]; without a
 margin, sub-steps could be at the edge of the region."""
@@ -99,7 +101,7 @@ margin, sub-steps could be at the edge of the region."""
 
 @dataclass(frozen=True, kw_only=True)
 class RegionBound:
-    """One bound of the region: value <= limit, in the unit that ``what`` states."""
+    """Bound value <= limit, in the unit of ``what``; a met value may be too large."""
 
     what: str
     """Description of the bounded quantity."""
@@ -252,8 +254,9 @@ def _discrete_bounds(
     sticking = sticking_stiffness(m.hysteresis)
     n = input_orders(m)[1:]
     if m not in _known_bounds:
-        _known_bounds[m] = _error_bounds(m, n)
-    slope, curvature = _known_bounds[m]
+        _known_bounds[m] = _map_bounds(m, n)
+    slope, curvature, bound = _known_bounds[m]
+    met = bound + sticking <= HARDEST * drive.stiffness
     order = float(n.max(initial=0.0))
     inertia = rotor + drive.link_inertia / i**2
     held = drive.stiffness / i**2
@@ -286,19 +289,19 @@ def _discrete_bounds(
         ),
         RegionBound(
             what="largest over mean stiffness",
-            value=(m.max_stiffness + sticking) / drive.stiffness,
-            limit=30.0,
+            value=((bound if met else m.max_stiffness) + sticking) / drive.stiffness,
+            limit=HARDEST,
             timestep=None,
         ),
     )
 
 
 # the joints of an arm, and runs of them, share their maps
-_known_bounds: WeakKeyDictionary[DriveMap, tuple[float, float]] = WeakKeyDictionary()
+_known_bounds: WeakKeyDictionary[DriveMap, tuple[float, ...]] = WeakKeyDictionary()
 
 
-def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:
-    """Bounds of the slope of e0 by theta [-] and of the curvature C [N·m/rad].
+def _map_bounds(drive: DriveMap, n: Array) -> tuple[float, ...]:
+    """Bounds of the slope of e0 by theta [-], of C and of the stiffness [N·m/rad].
 
     Args:
         drive: Map as simulated.
@@ -306,17 +309,18 @@ def _error_bounds(drive: DriveMap, n: Array) -> tuple[float, float]:
     """
     peak, error = drive.ratings.repeated_peak, drive.kinematic_error[1:]
     energy = drive.coefficients(drive.torsion_knots)[:, 1:]
+    stiffness = max_stiffness(drive, enough=HARDEST * drive.mean_stiffness)
     if n.size <= MANY:
         e, v = (np.hypot(*np.moveaxis(pairs, -1, 0)) for pairs in (error, energy))
         curvature = peak * np.sum(n**2 * e) + np.sum(n**2 * v.max(axis=0))
-        return float(np.sum(n * e)), float(curvature)
+        return float(np.sum(n * e)), float(curvature), stiffness
     orders = drive.orders[1:]
     # the derivative of a cos + b sin is b cos - a sin, times the order with its sign
     n = (drive.angle_orders[1:] @ [1.0, 1.0 / drive.ratio])[:, None]
     by_theta = n * error[:, ::-1] * [1.0, -1.0]
     slope, of_error = largest_sums(orders, np.stack([by_theta, n**2 * error]))
     of_energy = largest_total(orders, n**2 * energy, np.zeros(len(energy)))
-    return float(slope), float(peak * of_error + of_energy)
+    return float(slope), float(peak * of_error + of_energy), stiffness
 
 
 def _acceleration_bound(drive: JointDrive, torque: float) -> RegionBound:

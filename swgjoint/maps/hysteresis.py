@@ -231,19 +231,36 @@ def check_elements(elements: Sequence[object], name: str) -> None:
         )
 
 
+def _yield_slopes(elements: Sequence[Jenkin]) -> Array:
+    """Magnitudes of the slopes of all yield curves [-]. Shape (n_elements, m - 1)."""
+    at, yields = yield_table(elements)
+    return np.asarray(np.abs(np.diff(yields, axis=1) / np.diff(at)))
+
+
+def accepted_stiffness(elements: Sequence[Jenkin]) -> float:
+    """Largest stiffness of a drive with these yield curves, less round-off [N·m/rad].
+
+    Args:
+        elements: Jenkin elements whose yield torques depend on the load.
+    """
+    slopes = _yield_slopes(elements).max(axis=1)
+    stiffness = np.array([element.stiffness for element in elements])
+    return (1.0 - 1e-12) * float(np.min(stiffness / np.maximum(slopes, 1e-60)))
+
+
 def check_loads(elements: Sequence[Jenkin], name: str, largest: float) -> None:
     """Reject yield torques that change too fast with the load, see above.
 
     Args:
         elements: Jenkin elements of a drive.
         name: Name of the drive, for messages.
-        largest: Largest elastic stiffness K of the drive [N·m/rad].
+        largest: Largest elastic stiffness K of the drive, or an upper bound that is at
+            most :func:`accepted_stiffness` [N·m/rad].
 
     Raises:
         InputError: If one of the two conditions is not met.
     """
-    at, yields = yield_table(elements)
-    slopes = np.abs(np.diff(yields, axis=1) / np.diff(at))
+    slopes = _yield_slopes(elements)
     total = float(slopes.sum(axis=0).max())
     if not total < 1.0:
         raise InputError(

@@ -34,8 +34,14 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps import sums
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import Jenkin, check_elements, check_loads, vary_with_load
-from swgjoint.maps.phase_bounds import MANY, largest_total
+from swgjoint.maps.hysteresis import (
+    Jenkin,
+    accepted_stiffness,
+    check_elements,
+    check_loads,
+    vary_with_load,
+)
+from swgjoint.maps.phase_bounds import max_stiffness
 from swgjoint.typing import Array, Index
 
 
@@ -128,7 +134,8 @@ class Potential:
         check_elements(elements, self.name)
         object.__setattr__(self, "hysteresis", elements)
         if vary_with_load(elements):
-            check_loads(elements, self.name, self.max_stiffness)
+            largest = max_stiffness(self, enough=accepted_stiffness(elements))
+            check_loads(elements, self.name, largest)
         if not isinstance(self.friction, Friction | None):
             raise InputError(
                 f"friction of {self.name!r}: {self.friction!s:.40}; accepted: Friction"
@@ -313,13 +320,7 @@ class Potential:
         The bound is evaluated at nine torsions per knot interval (of many harmonics,
         three) and in the linear continuation beyond the knots.
         """
-        points = 3 if len(self.orders) - 1 > MANY else 9
-        knots = self.torsion_knots
-        x = np.linspace(knots[:-1], knots[1:], points)
-        inside = self.coefficients(np.unique(x), 2)
-        ends = np.moveaxis(self.end_stiffness, 2, 0)
-        values = np.concatenate([inside, ends])
-        return largest_total(self.orders[1:], values[:, 1:], values[:, 0, 0])
+        return max_stiffness(self)
 
     @property
     def torque_range(self) -> tuple[float, float]:

@@ -9,7 +9,12 @@ import pytest
 
 from swgjoint.maps import phase_bounds
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.phase_bounds import largest_sums, largest_total, stiffness_range
+from swgjoint.maps.phase_bounds import (
+    largest_sums,
+    largest_total,
+    max_stiffness,
+    stiffness_range,
+)
 
 
 def random_orders(rng, count):
@@ -92,6 +97,22 @@ def test_the_largest_total_is_that_of_all_bounds(count, spread, monkeypatch):
     assert sum(evaluated) < sums or count == phase_bounds.MANY
 
 
+def test_a_total_up_to_enough_may_be_too_large():
+    """Above it, the result is the same bit for bit; few bounds are evaluated below."""
+    rng = np.random.default_rng(5)
+    orders, amplitudes = random_orders(rng, 900), rng.normal(size=(40, 900, 2))
+    amplitudes *= np.linspace(0.1, 1.0, 40)[:, None, None]
+    constants = rng.normal(size=40)
+    wanted = largest_total(orders, amplitudes, constants)
+    by_amplitudes = np.hypot(*np.moveaxis(amplitudes, -1, 0)).sum(axis=-1).max() + 9.0
+    for enough in (0.0, 0.5 * wanted, 0.999 * wanted):
+        found = largest_total(orders, amplitudes, constants, enough=enough)
+        assert found == wanted
+    for enough in (wanted, 2.0 * wanted, by_amplitudes):
+        found = largest_total(orders, amplitudes, constants, enough=enough)
+        assert wanted <= found <= enough
+
+
 def test_stiffness_of_many_harmonics_is_bounded():
     """At random torsions and phases, with harmonics that change the stiffness."""
     rng, count = np.random.default_rng(3), 300
@@ -117,3 +138,7 @@ def test_stiffness_of_many_harmonics_is_bounded():
     assert high - low < 3.0 * np.ptp(found)
     assert drive.stiffness(np.tile(knots, 800), theta, psi).max() <= drive.max_stiffness
     assert drive.max_stiffness <= high
+    for enough in (0.9, 1.0, 1.5, 9.0):
+        enough *= drive.max_stiffness
+        bound = max_stiffness(drive, enough=enough)
+        assert drive.max_stiffness <= bound <= max(enough, drive.max_stiffness)
