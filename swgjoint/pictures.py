@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import unicodedata
+from collections.abc import Iterator
 from typing import IO, Any
 
 LONGEST_WORD = 80
@@ -25,11 +26,10 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
     """
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.text import Text
     from matplotlib.ticker import FixedFormatter, FuncFormatter
     from PIL import Image
 
-    for text in figure.findobj(Text):
+    for text in _texts(figure):
         text.set_text(plain_text(text.get_text()))
     # matplotlib sets tick labels when it draws them; those of a logarithmic axis are
     # mathematical text and must still be parsed
@@ -48,6 +48,21 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
     # figures have an opaque background, so all pixels are opaque
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.save(out, format="png", dpi=(dpi, dpi), compress_level=_EFFORT)
+
+
+def _texts(artist: Any) -> Iterator[Any]:
+    """All texts in an artist but the tick labels, which matplotlib sets as it draws."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+
+    if isinstance(artist, Axis):
+        yield from (artist.label, artist.offsetText)
+        return
+    for child in artist.get_children():
+        if isinstance(child, Text):
+            yield child
+        else:
+            yield from _texts(child)
 
 
 def png(figure: Any, *, dpi: float) -> bytes:
