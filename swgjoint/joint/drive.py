@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import mujoco
@@ -137,10 +138,10 @@ class JointDrive:
         """Friction law at ``full``; None at ``native``, which uses rotor friction."""
         return self.drive.friction if self.level == "full" else None
 
-    @property
+    @cached_property
     def kept_orders(self) -> tuple[float, ...]:
         """Orders per input turn in the map as simulated, increasing [-]."""
-        return tuple(sorted({float(n) for n in input_orders(self.drive)[1:]}))
+        return tuple(np.unique(input_orders(self.drive)[1:]).tolist())
 
     @property
     def natural_frequency(self) -> float:
