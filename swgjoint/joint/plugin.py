@@ -114,7 +114,7 @@ def config(
 ) -> dict[str, str]:
     """Attributes of a plugin instance as text; they contain the whole map.
 
-    The potential of more than 128 harmonics is written in base64.
+    The amplitudes of more than 128 harmonics are written in base64.
 
     Args:
         drive: Map to evaluate.
@@ -127,15 +127,15 @@ def config(
     Returns:
         Attribute texts by key.
     """
-    many = len(drive.orders) - 1 > MANY
+    numbers = _bytes if len(drive.orders) - 1 > MANY else _text
     return (
         {
             "ratio": repr(drive.ratio),
             "orders": " ".join(str(int(n)) for n in np.ravel(drive.angle_orders)),
             "knots": _text(drive.torsion_knots),
-            "potential": (_bytes if many else _text)(drive.potential),
-            "end_stiffness": _text(drive.end_stiffness),
-            "kinematic_error": _text(drive.kinematic_error),
+            "potential": numbers(drive.potential),
+            "end_stiffness": numbers(drive.end_stiffness),
+            "kinematic_error": numbers(drive.kinematic_error),
             "damping": repr(float(damping)),
             "contact_damping": repr(float(contact_damping)),
             "numerical_damping": repr(float(numerical_damping)),

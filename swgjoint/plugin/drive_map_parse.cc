@@ -1,5 +1,6 @@
 // Reading of the attributes of a map.
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -114,14 +115,22 @@ struct DriveMap::Origin {
 
 // The joints of an arm often have the same map, and an engine makes its data several
 // times. A map with long texts, which takes long to read and has a large table, is
-// therefore copied from one in use that has the same texts, and shares its table.
+// therefore copied from one that has the same texts, and shares its table: from one in
+// use, or from one of the last that were read.
 bool DriveMap::Parse(const DriveText& text, std::string* error) {
   static std::mutex mutex;
   static std::vector<std::weak_ptr<const Origin>> known;
+  static std::array<std::shared_ptr<const Origin>, kRecent> recent;
+  static size_t next = 0;
   const char* const parts[] = {text.ratio,     text.orders,        text.knots,
                                text.potential, text.end_stiffness, text.kinematic_error};
+  std::vector<std::string_view> owns;  // with the zeros at their ends
   size_t size = 0;
-  for (const char* part : parts) size += part ? std::strlen(part) + 1 : 0;
+  for (const char* part : parts) {
+    if (!part) continue;
+    owns.emplace_back(part, std::strlen(part) + 1);
+    size += owns.back().size();
+  }
   if (size > kLongTexts) {
     std::vector<std::shared_ptr<const Origin>> used;
     {
@@ -135,9 +144,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
       if (!one || one->texts.size() != size) continue;
       std::string_view rest = one->texts;
       bool equal = true;
-      for (const char* part : parts) {
-        if (!part) continue;
-        const std::string_view own(part, std::strlen(part) + 1);
+      for (const std::string_view own : owns) {
         equal = equal && rest.substr(0, own.size()) == own;
         rest.remove_prefix(std::min(own.size(), rest.size()));
       }
@@ -151,11 +158,12 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   if (size <= kLongTexts) return true;
   auto origin = std::make_shared<Origin>();
   origin->texts.reserve(size);
-  for (const char* part : parts) origin->texts.append(part, std::strlen(part) + 1);
+  for (const std::string_view own : owns) origin->texts.append(own);
   origin->map = *this;
   origin_ = origin;
   const std::lock_guard<std::mutex> lock(mutex);
   known.push_back(origin);
+  recent[next++ % kRecent] = origin;
   return true;
 }
 
