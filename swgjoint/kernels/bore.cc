@@ -76,10 +76,11 @@ void bore_gaps(const Stations& stations, const Support& support, const double* n
   }
 }
 
-void bore_forces(const Stations& stations, const double* spring, const double* gap,
-                 const double* normal, const double* curvature, const std::int64_t* into,
-                 const double* sign, std::size_t count, std::size_t n, double* gradient,
-                 double* tangent) {
+SWGJOINT_WIDE void bore_forces(const Stations& stations, const double* spring,
+                               const double* gap, const double* normal,
+                               const double* curvature, const std::int64_t* into,
+                               const double* sign, std::size_t count, std::size_t n,
+                               double* gradient, double* tangent) {
   const std::size_t p = stations.p, width = stations.width, q = stations.count();
   const std::size_t size = 2 * stations.nodes();
   std::vector<double> force(size), matrix(size * size), along(width), across(width);
@@ -104,8 +105,9 @@ void bore_forces(const Stations& stations, const double* spring, const double* g
           force[first + j] += push * along[j];
           if (!tangent) continue;
           const double a = spring[i] * along[j], b = bend * across[j];
-          double* row = matrix.data() + (first + j) * size + first;
-          for (std::size_t l = 0; l < width; ++l) row[l] += a * along[l] + b * across[l];
+          double* __restrict row = matrix.data() + (first + j) * size + first;
+          const double *one = along.data(), *other = across.data();
+          for (std::size_t l = 0; l < width; ++l) row[l] += a * one[l] + b * other[l];
         }
       }
       for (std::size_t i = 0; sign && i < size; ++i) signs[i] = sign[into[i]];

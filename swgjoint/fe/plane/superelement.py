@@ -143,7 +143,7 @@ class Superelement:
         moved[:, 0] = (x - x.mean()) / abs(x[size - 1] - x[-1])
         return moved.ravel()
 
-    @property
+    @cached_property
     def flank_range(self) -> tuple[float, float]:
         """Arc lengths [m] between which a flank can touch: from land to land."""
         low, high = self.profile.contact_range
