@@ -407,7 +407,8 @@ def test_the_joint_of_the_largest_ripple_is_named():
 
 def test_figures_below_the_noise_are_dashes(capsys, tmp_path):
     """Rounding errors of rigid drives get no digits, bars or axes, but stay in JSON."""
-    arguments = ["compare", "CSG-25-100", "rigid", *SHORT]
+    short = [*SHORT, "--set", "defaults.drive=CSG-25-100"]
+    arguments = ["compare", "CSG-25-100", "rigid", *short]
     assert main([*arguments, "--out", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     row = next(line for line in text.splitlines() if line.startswith("rigid")).split()
@@ -418,7 +419,7 @@ def test_figures_below_the_noise_are_dashes(capsys, tmp_path):
     assert "below 1e-6 arcmin or mm" in text
     rigid = json.loads((tmp_path / "compare.json").read_text())["rows"][1]
     assert rigid["tool_path_rms_mm"] < 1e-6 and rigid["torsion_arcmin"] == 0.0
-    assert main(["run", "bench", "--set", "defaults.level=rigid", *SHORT]) == 0
+    assert main(["run", "bench", "--set", "defaults.level=rigid", *short]) == 0
     text = capsys.readouterr().out
     assert "deviation from the commanded path - rms" in text
     assert "below 1e-6 arcmin or mm" in text
