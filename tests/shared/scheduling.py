@@ -1,7 +1,9 @@
 """How a run of the tests is set up, shared out over processes, and timed.
 
-A pytest plugin. ``tests/durations.json`` holds the CPU seconds of the tests as they
-were last measured; ``pytest -m "" -n 2 --record-durations`` measures them again.
+A pytest plugin. ``tests/durations.json`` holds the duration of each test as it was last
+measured; ``pytest -m "" -n 2 --record-durations`` measures them again. A duration is
+the CPU time, which depends less on what else the machine does, or half the time that
+passed if that is more: of tests that wait for browsers and other processes.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,9 +23,12 @@ import pytest
 DURATIONS = Path(__file__).parents[1] / "durations.json"
 LEAST = 0.2
 """Shorter tests are not listed [s]."""
-WHOLE_FILE = 10.0
-"""A file of tests up to this long goes to one process as a whole [s]."""
-STARTED = pytest.StashKey[float]()
+LONG = 60.0
+"""A longer test is a share of work by itself [s]."""
+WHOLE_FILE = 60.0
+"""The other tests of a file, up to this long, go to one process [s]: they then compute
+the fixtures of the file once."""
+STARTED = pytest.StashKey[tuple[float, float]]()
 FOLDER = pytest.StashKey[str]()
 
 
@@ -63,17 +69,18 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 def measured() -> dict[str, float]:
-    """CPU seconds of the listed tests by node id; empty if never measured."""
+    """Durations of the listed tests by node id [s]; empty if never measured."""
     return json.loads(DURATIONS.read_text()) if DURATIONS.exists() else {}
 
 
 def units(nodeids: list[str], seconds: dict[str, float]) -> dict[str, str]:
     """Share of work of each test: its file if that is short, else itself."""
     of_file: dict[str, float] = defaultdict(float)
-    for nodeid in nodeids:
-        of_file[nodeid.partition("::")[0]] += seconds.get(nodeid, 0.0)
-    files = {nodeid: nodeid.partition("::")[0] for nodeid in nodeids}
-    return {n: f if of_file[f] <= WHOLE_FILE else n for n, f in files.items()}
+    files = {n: n.partition("::")[0] for n in nodeids if seconds.get(n, 0.0) <= LONG}
+    for nodeid, file in files.items():
+        of_file[file] += seconds.get(nodeid, 0.0)
+    short = {n: file for n, file in files.items() if of_file[file] <= WHOLE_FILE}
+    return {nodeid: short.get(nodeid, nodeid) for nodeid in nodeids}
 
 
 @pytest.hookimpl(trylast=True)
@@ -114,25 +121,28 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 # -- durations -------------------------------------------------------------------------
 
 
-def _cpu_seconds() -> float:
-    """Of this process and of those that it has waited for."""
+def _clocks() -> tuple[float, float]:
+    """CPU time of this process and of those that it has waited for, and time [s]."""
     times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    cpu = times.user + times.system + times.children_user + times.children_system
+    return cpu, time.monotonic()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Note when a test starts, fixtures included."""
-    item.stash[STARTED] = _cpu_seconds()
+    item.stash[STARTED] = _clocks()
     return (yield)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[Any]:
-    """Hand the CPU seconds so far to the process that collects them."""
+    """Hand CPU time and duration so far to the process that collects them."""
     report = yield
-    seconds = _cpu_seconds() - item.stash[STARTED]
-    report.user_properties.append(("cpu_s", seconds))
+    cpu, passed = (
+        now - then for now, then in zip(_clocks(), item.stash[STARTED], strict=True)
+    )
+    report.user_properties += [("cpu_s", cpu), ("duration_s", max(cpu, 0.5 * passed))]
     return report
 
 
@@ -142,18 +152,20 @@ class Durations:
     def __init__(self, write: bool) -> None:
         self.write = write
         self.taken: dict[str, float] = {}
+        self.cpu = 0.0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """The last report of a test has all of it."""
         if report.when == "teardown":
-            self.taken[report.nodeid] = dict(report.user_properties)["cpu_s"]
+            found = dict(report.user_properties)
+            self.taken[report.nodeid] = found["duration_s"]
+            self.cpu += found["cpu_s"]
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Print the sum; write the list if asked."""
         if self.taken:
-            total = sum(self.taken.values())
             terminalreporter.write_line(
-                f"{total:.0f} CPU seconds in {len(self.taken)} tests"
+                f"{self.cpu:.0f} CPU seconds in {len(self.taken)} tests"
             )
         if self.write:
             known = {**measured(), **self.taken}
