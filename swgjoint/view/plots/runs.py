@@ -200,6 +200,6 @@ def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None
 
 
 def _label(axis: Any, title: str, y: str) -> None:
-    axis.set_title(title, fontsize=10)
+    axis.set_title(title, fontsize=10, y=1.0)  # not placed by measuring
     axis.set_ylabel(y)
     axis.grid(alpha=0.3)

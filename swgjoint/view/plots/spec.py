@@ -62,6 +62,8 @@ def spec_picture(
     if efficiency is not None:
         _efficiency_by_load(axes[-2], efficiency)
         _efficiency_by_speed(axes[-1], efficiency)
+    for ax in figure.axes:
+        ax.set_title(ax.get_title(), y=1.0)  # not placed by measuring, five times
     figure.suptitle(f"{name}: spec sheet")
     return png(figure, dpi=130)
 
