@@ -150,8 +150,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
         self, columns: list[AngleColumn[AnyState]], torque: float
     ) -> tuple[Array, Array]:
         """Output error [rad] and energy [J] of columns on their curves, each (n,)."""
-        if torque == 0.0:
-            error, energy, _, _ = self._row(columns, 0.0)
+        if torque == 0.0 or all(torque in one.states for one in columns):
+            error, energy, _, _ = self._row(columns, torque)
             return error, energy
         sign = math.copysign(1.0, torque)
         table = [self.path(one, sign)[0].evaluate_at([abs(torque)]) for one in columns]
