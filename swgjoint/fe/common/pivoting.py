@@ -240,20 +240,20 @@ def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
     Raises:
         numpy.linalg.LinAlgError: If the block of A at these numbers is singular.
     """
-    k = len(system)
-    outside = np.setdiff1d(np.arange(k), inside)
-    inverse = np.linalg.inv(system[np.ix_(inside, inside)])
-    reach = system[np.ix_(outside, inside)] @ inverse
+    stays, m = np.ones(len(system), dtype=bool), len(inside)
+    stays[inside] = False
+    # in blocks: the exchanged unknowns first
+    order = np.concatenate([inside, np.flatnonzero(stays)])
+    at = np.ix_(order, order)
+    blocks = system[at]
+    inverse, beside = np.linalg.inv(blocks[:m, :m]), blocks[:m, m:]
+    reach = blocks[m:, :m] @ inverse
     pivoted, forward = np.empty_like(system), np.zeros_like(system)
-    pivoted[np.ix_(inside, inside)] = inverse
-    pivoted[np.ix_(outside, inside)] = reach
-    pivoted[np.ix_(inside, outside)] = -inverse @ system[np.ix_(inside, outside)]
-    pivoted[np.ix_(outside, outside)] = (
-        system[np.ix_(outside, outside)] - reach @ system[np.ix_(inside, outside)]
+    pivoted[at] = np.block(
+        [[inverse, -inverse @ beside], [reach, blocks[m:, m:] - reach @ beside]]
     )
-    forward[np.ix_(inside, inside)] = -inverse
-    forward[np.ix_(outside, inside)] = -reach
-    forward[outside, outside] = 1.0
+    forward[order, order] = 1.0
+    forward[np.ix_(order, inside)] = -np.concatenate([inverse, reach])
     return pivoted, forward
 
 
