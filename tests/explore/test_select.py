@@ -30,6 +30,7 @@ from swgjoint.explore.select.select import select_drives
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.sim.figures.resonance import lowest_resonance
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm, rpm
 from swgjoint.view.run import run_scene
@@ -225,11 +226,8 @@ def test_deviations_are_predicted_with_their_sign():
 
 
 @cache
-def simulate_all(
-    payload: float, spec: tuple[tuple[str, float], ...]
-) -> list[SimulatedSet]:
+def runs_of_all(payload: float) -> list[tuple[SimulatedSet, Run]]:
     """All nine sets of two joints, by exhaustive simulation."""
-    limits = {**RATINGS, **dict(spec)}
     found = []
     arm = rigid_tasks(scene(payload))[0].arm
     for pair in itertools.product(small(), repeat=2):
@@ -239,9 +237,14 @@ def simulate_all(
             cost=float(sum(o.cost for o in pair)),
             predicted={},
         )
-        run = run_scene(scene_of_set(task, arm.joints, pair))
-        found.append(evaluate_set(one, run, limits))
+        found.append((one, run_scene(scene_of_set(task, arm.joints, pair))))
     return found
+
+
+def simulate_all(payload: float, spec: dict[str, float]) -> list[SimulatedSet]:
+    """These sets with the figures and missed limits of a spec."""
+    limits = {**RATINGS, **spec}
+    return [evaluate_set(one, run, limits) for one, run in runs_of_all(payload)]
 
 
 SPECS = [
@@ -296,7 +299,7 @@ def test_the_resonance_of_two_links_is_the_closed_form():
 @pytest.mark.parametrize(("spec", "sizes"), SPECS, ids=str)
 def test_exhaustive_search_finds_the_same_set(spec, sizes):
     """The cheapest of all nine simulated sets is the selected one."""
-    everything = simulate_all(1.0, tuple(spec.items()))
+    everything = simulate_all(1.0, spec)
     found = select_drives(scene(1.0), small(), spec=spec)
     good = [one for one in everything if one.met]
     best = min(good, key=lambda one: one.cost).drives if good else None
