@@ -144,7 +144,17 @@ def find_frames(
     *,
     fixed: Array | None = None,
 ) -> Frames:
-    """Frames of the sectors, see :func:`swgjoint.fe.plane.corotation.sector_frames`."""
+    """Frames of the sectors.
+
+    Its twin :func:`swgjoint.fe.plane.corotation.sector_frames` explains the method.
+
+    Args:
+        element: The condensed sector.
+        positions: Skeleton nodes in the global frame (N, n_a, 2) [m].
+        place: Angle of each sector in the undeformed ring (N,) [rad].
+        fixed: Frame rotations of a linear model (N,) [rad]; None to fit them to the
+            faces.
+    """
     if fixed is not None or kernels() is None:
         return sector_frames(element, positions, place, fixed=fixed)
     force = np.zeros((len(place), len(element.flank_compliance)))

@@ -147,10 +147,10 @@ class Linearised:
         change = np.where(touching[sector, station], -1.0, 1.0)
         spring = np.zeros(stations.shape)
         spring[sector, station] = change * self.stations.stiffness[station]
-        bore = CompiledBore.for_stations(self.stations)
-        if self.race_rows is None and bore is not None:
-            at = spring, self.gap, self.normal, into
-            bore.add_forces(*at, self.gradient, self.hessian, sign=self.sign)
+        compiled = CompiledBore.for_stations(self.stations)
+        if self.race_rows is None and compiled is not None:
+            at = spring, self.gap, self.normal, into, self.gradient, self.hessian
+            compiled.add_forces(*at, sign=self.sign)
             return sectors
         k, normal = spring[sectors], self.normal[sectors]
         push = k * self.gap[sectors]
@@ -217,7 +217,6 @@ def linearise(
             whose tangent is kept; None computes the tangent of the state.
     """
     sign, dofs, x = model.signs, model.dofs, model.skeleton(state)
-    n_a = x.shape[1]
     gradient = np.zeros(sign.shape)
     hessian = np.zeros((*sign.shape, sign.shape[1])) if kept is None else None
     frames, flank = _add_sectors(model, state, x, gradient, hessian)
@@ -226,10 +225,9 @@ def linearise(
     fixed[:, model.contact_dofs] = bore.fixed
 
     rotation, slope = model.best_fit_rotation(x[:, model.bore_nodes])
-    by_node = np.zeros((model.sectors, n_a, 2))
-    by_node[:, model.bore_nodes] = slope
     rotation_gradient = np.zeros(sign.shape)
-    rotation_gradient[:, dofs] = by_node.reshape(model.sectors, -1)
+    into = dofs.reshape(-1, 2)[model.bore_nodes].ravel()
+    rotation_gradient[:, into] = slope.reshape(model.sectors, -1)
     if torque is not None:
         gradient += torque / model.copies * rotation_gradient
 
@@ -244,7 +242,7 @@ def linearise(
         hessian[-1] *= np.outer(sign[-1], sign[-1])
         hessian[0] += stiffness * np.outer(anchor[0], anchor[0])
         _hold(hessian, np.arange(len(hessian)), fixed, stiffness)
-    centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
+    centre = frames.position.reshape(model.sectors, -1, 2).mean(axis=1)
     angle = frames.angle - state.circular_spline_rotation
     circular_spline_elastic = model.circular_spline_displacement(state)
     return Linearised(
@@ -283,10 +281,8 @@ def linearise(
 def _hold(hessian: Array, sectors: Index, fixed: Mask, stiffness: float) -> None:
     """Uncouple the fixed degrees of freedom (k, n) of k sectors, in place."""
     k, dof = np.nonzero(fixed)
-    sector = sectors[k]
-    hessian[sector, dof] = 0.0
-    hessian[sector, :, dof] = 0.0
-    hessian[sector, dof, dof] = stiffness
+    hessian[sectors[k], dof] = hessian[sectors[k], :, dof] = 0.0
+    hessian[sectors[k], dof, dof] = stiffness
 
 
 def _add_sectors(
@@ -345,8 +341,8 @@ def _add_bore(
     gap, normal, curvature = _gaps(model, state)
     if (bore := CompiledBore.for_stations(stations)) is not None:
         spring = np.where(touching, stations.stiffness, 0.0)
-        at = spring, gap, normal, into
-        bore.add_forces(*at, gradient, hessian, curvature=curvature)
+        at = spring, gap, normal, into, gradient, hessian
+        bore.add_forces(*at, curvature=curvature)
         return _Bore(gap=gap, normal=normal)
     # only sectors in contact exert a force
     on = np.flatnonzero(touching.any(axis=1))
