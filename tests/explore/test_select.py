@@ -394,22 +394,27 @@ def test_the_winner_meets_the_spec_on_its_own(tmp_path, capsys):
     assert main([*argv, "--quiet"]) == 0
 
 
+FEW = ("--table", "{dir}/few.csv", "--without-catalogue")
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
         (["--payload", "900"], ("no drive carries", "cubed_mean_torque_of_rating")),
         (["--limit", "K1_Nm_rad=1e9"], ("K1_Nm_rad", "CSG-32", "limit 1e+09")),
         (
-            ["--limit", "tool_path_rms_mm=0.01"],
+            ["--limit", "tool_path_rms_mm=0.01", *FEW],
             ("tool_path_rms_mm", "limit 0.01", "contributes", "%"),
         ),
         (["--limit", "resonance_Hz=99"], ("resonance_Hz", "limit 99", "energy")),
-        (["--limit", "torsion_arcmin=0.001"], ("torsion_arcmin", "limit 0.001")),
+        (["--limit", "torsion_arcmin=0.001", *FEW], ("torsion_arcmin", "limit 0.001")),
     ],
 )
 def test_an_impossible_spec_names_joint_and_limit(argv, message, tmp_path, capsys):
     """Status 1, nothing written."""
     out = tmp_path / "out"
+    (tmp_path / "few.csv").write_text("drive\nCSG-20-100\nCSG-32-100\n")
+    argv = [text.format(dir=tmp_path) for text in argv]
     argv = ["select", *TWO_LINKS, *argv, "--out", str(out), "--quiet"]
     assert main(argv) == 1
     last = capsys.readouterr().out.strip().splitlines()[-1]
