@@ -231,8 +231,8 @@ def test_no_cycle_of_torsion_and_load_gains_work():
         x, load = np.tile(x, 3), np.tile(load, 3)  # a cycle, run three times
         k = np.array([e.stiffness for e in elements])
         rest, here, work, stored = np.zeros(count), 0.0, [], []
-        for to, torque in zip(x, load, strict=True):
-            reach = np.array([float(e.reach(torque)) for e in elements])
+        reaches = np.column_stack([e.reach(load) for e in elements])
+        for to, reach in zip(x, reaches, strict=True):
             begin = np.clip(here - rest, -reach, reach)
             before = 0.5 * k @ begin**2
             assert not stored or before <= stored[-1] * (1 + 1e-12)
