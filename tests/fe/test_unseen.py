@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from map_accuracy import DESIGNS, OTHERS, Compared, differences, scaled
-from solved import coarse
+from solved import few_teeth
 
 from swgjoint.gear.design.design import Design
 
@@ -50,9 +50,9 @@ def check(design: Design) -> None:
 
 @pytest.mark.fe
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
-def test_coarse_maps_meet_unseen_solves(name):
-    """Two maps meet the goal at torques and angles between their samples."""
-    check(coarse(name))
+def test_small_maps_meet_unseen_solves(name):
+    """Two maps of few teeth meet the goal between their samples."""
+    check(few_teeth(name))
 
 
 @pytest.mark.fe
