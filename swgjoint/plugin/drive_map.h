@@ -132,8 +132,8 @@ class DriveMap {
   static constexpr int kMany = 128;
   // Length of the texts above which maps are looked for that have the same ones.
   static constexpr size_t kLongTexts = 100000;
-  // Number of maps with long texts that are kept after use.
-  static constexpr size_t kRecent = 4;
+  // Largest total length of the texts of maps that are kept after use.
+  static constexpr size_t kKeptTexts = 40000000;
 
   struct Origin;
 

@@ -1,11 +1,11 @@
 // Reading of the attributes of a map.
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <limits>
 #include <map>
 #include <memory>
@@ -120,8 +120,8 @@ struct DriveMap::Origin {
 bool DriveMap::Parse(const DriveText& text, std::string* error) {
   static std::mutex mutex;
   static std::vector<std::weak_ptr<const Origin>> known;
-  static std::array<std::shared_ptr<const Origin>, kRecent> recent;
-  static size_t next = 0;
+  static std::deque<std::shared_ptr<const Origin>> recent;
+  static size_t kept = 0;  // length of their texts
   const char* const parts[] = {text.ratio,     text.orders,        text.knots,
                                text.potential, text.end_stiffness, text.kinematic_error};
   std::vector<std::string_view> owns;  // with the zeros at their ends
@@ -163,7 +163,10 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
   origin_ = origin;
   const std::lock_guard<std::mutex> lock(mutex);
   known.push_back(origin);
-  recent[next++ % kRecent] = origin;
+  recent.push_back(origin);
+  for (kept += size; kept > kKeptTexts; recent.pop_front()) {
+    kept -= recent.front()->texts.size();
+  }
   return true;
 }
 
