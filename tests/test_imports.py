@@ -194,17 +194,6 @@ def test_help_loads_no_package():
     assert loaded_by("import swgjoint.cli.main") <= {"swgjoint"}
 
 
-def test_a_run_does_not_load_scipy():
-    """Loading it takes as long as the simulation of a second."""
-    loaded = loaded_by(
-        "from swgjoint import run_scene\n"
-        "from swgjoint.sim.scene.scene import Scene\n"
-        "scene = Scene.load_file('bench').with_drive('CSG-25-100')\n"
-        "assert any(j['orders'] for j in run_scene(scene).metrics()['joints'].values())"
-    )
-    assert "mujoco" in loaded and "scipy" not in loaded
-
-
 @pytest.mark.parametrize("name", swgjoint._PUBLIC)
 def test_public_names_resolve(name):
     """Every public name is there and says what it is."""

@@ -42,7 +42,6 @@ from swgjoint.maps.hysteresis import (
     vary_with_load,
 )
 from swgjoint.maps.phase_bounds import max_stiffness
-from swgjoint.roots import find_root
 from swgjoint.typing import Array, Index
 
 
@@ -345,6 +344,8 @@ class Potential:
         >>> DriveMap.linear(1e4, rated_torque=50.0).mean_torsion(20.0)
         0.002
         """
+        from scipy.optimize import brentq
+
         # for the single points of a root search, plain floats are five times faster
         knots, pieces = self.torsion_knots.tolist(), self.potential[0, 0].tolist()
         before, after = self.end_stiffness[0, 0].tolist()
@@ -361,7 +362,7 @@ class Potential:
         low, high = knots[0], knots[-1]
         for _ in range(60):
             if residual(low) <= 0.0 <= residual(high):
-                return find_root(residual, low, high, xtol=1e-18, rtol=1e-14)
+                return float(brentq(residual, low, high, xtol=1e-18, rtol=1e-14))
             low, high, span = low - span, high + span, 2.0 * span
         raise ValueError(f"this map does not reach a torque of {torque} N·m")
 

@@ -23,6 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from swgjoint.drives.references import check_joint_names
 from swgjoint.errors import ComputationError, InputError
@@ -247,8 +248,6 @@ def _natural_frequencies(assembly: Assembly, data: mujoco.MjData) -> Array:
             torsion[assembly.link_velocity[j]] = -1.0
             stiffness += transmission.drive.mean_stiffness * np.outer(torsion, torsion)
     stiffness[model.jnt_dofadr, model.jnt_dofadr] += model.jnt_stiffness
-    from scipy.linalg import eigh  # SciPy is slow to import, and a run does not need it
-
     squares = eigh(stiffness, mass, eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swgjoint.sim.figures.cubic_spline import interpolate_cubic
 from swgjoint.typing import Array
 
 TREND_DEGREE = 3
@@ -62,6 +61,8 @@ def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
         than 16 samples, or if the angle covers less than half a turn or decreases too
         often.
     """
+    from scipy.interpolate import CubicSpline
+
     travel = (angle - angle[0]) * np.sign(angle[-1] - angle[0])
     if travel.size < 16 or travel[-1] < np.pi:
         return None
@@ -71,7 +72,7 @@ def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
     if keep.mean() < 0.5:
         return None
     grid = np.linspace(0.0, travel[-1], travel.size)
-    return grid, interpolate_cubic(travel[keep], signal[keep], grid)
+    return grid, np.asarray(CubicSpline(travel[keep], signal[keep])(grid))
 
 
 def order_spectrum(angle: Array, signal: Array) -> OrderSpectrum | None:

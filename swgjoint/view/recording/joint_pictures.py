@@ -44,6 +44,8 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
         at constant speed, if its input turns less than half a turn or has fewer than 16
         samples, or if the step resolves no order.
     """
+    from scipy.fft import next_fast_len
+
     highest = highest_resolved_order(run, j)
     if highest is None:
         return None
@@ -57,7 +59,7 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     # a recording takes
     grid = np.linspace(0.0, travel[-1], travel.size)
     ripple = np.interp(grid, travel, torque_ripple(run, j)) * np.hanning(grid.size)
-    size = _fast_size(2 * grid.size)
+    size = next_fast_len(2 * grid.size, real=True)
     amplitude = np.abs(np.fft.rfft(ripple, size)) * (400.0 / rated / (grid.size - 1))
     order = 2.0 * np.pi * np.fft.rfftfreq(size, grid[1])
     inside = slice(1, int(np.searchsorted(order, highest, side="right")))
@@ -68,12 +70,6 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     starts = np.arange(0, order.size, per)
     middle = np.add.reduceat(order, starts) / np.diff(np.append(starts, order.size))
     return middle, np.maximum.reduceat(amplitude, starts)
-
-
-def _fast_size(count: int) -> int:
-    """Smallest product of twos, threes and fives that is at least a number."""
-    odd = (int(3**a * 5**b) for a in range(20) for b in range(14))
-    return min(p << (-(-count // p) - 1).bit_length() for p in odd)
 
 
 def log_ripple(stream: Any, path: str, bars: tuple[Array, Array], color: int) -> None:
