@@ -186,12 +186,7 @@ def _command(name: str, arguments: list[str]) -> int:
     keep_freed_memory()
     incomplete: list[str] = []
     try:
-        with (
-            warnings.catch_warnings(),
-            _ended(progress),
-            _rare_collections(),
-            _no_opengl(),
-        ):
+        with warnings.catch_warnings(), _ended(progress), _rare_collections():
             warnings.showwarning = partial(_show_warning, set(), incomplete)
             result = _result(module, args)
     except SwgError as exc:
@@ -285,21 +280,6 @@ def _rare_collections() -> Iterator[None]:
         yield
     finally:
         gc.set_threshold(*before)
-
-
-@contextmanager
-def _no_opengl() -> Iterator[None]:
-    """Keep MuJoCo from looking for OpenGL, which no command uses.
-
-    It would import GLFW, which starts another Python to find its library.
-    """
-    chosen = os.environ.get("MUJOCO_GL")
-    os.environ.setdefault("MUJOCO_GL", "disable")
-    try:
-        yield
-    finally:
-        if chosen is None:
-            os.environ.pop("MUJOCO_GL", None)
 
 
 @contextmanager

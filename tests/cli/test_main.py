@@ -258,24 +258,6 @@ def test_collections_are_rare_while_a_command_runs(command):
     assert seen == [50_000, 50_000]
 
 
-@pytest.mark.parametrize("chosen", [None, "egl"])
-def test_commands_do_not_look_for_opengl(command, monkeypatch, chosen):
-    """Unless the user has chosen an implementation; the caller's choice remains."""
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    if chosen:
-        monkeypatch.setenv("MUJOCO_GL", chosen)
-    seen = []
-
-    def work(args):
-        seen.append(os.environ["MUJOCO_GL"])
-        return {}
-
-    command(work)
-    assert main(["doctor"]) == 0
-    assert seen == [chosen or "disable"]
-    assert os.environ.get("MUJOCO_GL") == chosen
-
-
 def test_json_is_alone_on_stdout(command, capfd):
     """With --json what the work prints, from Python or C, goes to stderr."""
 
