@@ -30,26 +30,6 @@ def test_the_ur5e_reaches_as_far_as_its_links():
     np.testing.assert_allclose(tool, expected, atol=1e-6)  # rounded quaternions
 
 
-def test_torques_of_a_motion_are_those_of_its_parts():
-    """Again, in place of torques that were changed, for other motions and models."""
-    rng = np.random.default_rng(0)
-    motions = [tuple(rng.normal(size=(3, 2000, 6))) for _ in range(2)]
-    other = RigidArm("ur5e")
-    other.model.body_mass[3] += 1.0
-    for arm, motion in (
-        [(UR5E, motions[0])] * 2
-        + [(other, motions[0])] * 2
-        + [
-            (UR5E, motions[1]),
-            (UR5E, motions[0]),
-        ]
-    ):
-        parts = [arm.torques(*(x[k::4] for x in motion)) for k in range(4)]
-        found = arm.torques(*motion)
-        np.testing.assert_array_equal(found, np.stack(parts, axis=1).reshape(-1, 6))
-        found[:] = 0.0
-
-
 def test_weight_of_the_stretched_arm_by_hand():
     """Shoulder and elbow carry the link masses times their horizontal distances."""
     torque = UR5E.gravity(np.zeros((1, 6)))[0]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from copy import copy
 from functools import cached_property
-from hashlib import sha256
 from pathlib import Path
 
 import mujoco
@@ -19,33 +17,6 @@ from swgjoint.sim.arm.file import read_arm
 from swgjoint.sim.arm.number_checks import check_numbers
 from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.typing import Array
-
-_LONG = 1000
-"""Number of samples from which the torques of a motion are kept."""
-_last: list[tuple[bytes, tuple[Array, str]]] = []
-
-
-def _of_last(
-    model: mujoco.MjModel,
-    motion: tuple[Array, ...],
-    compute: Callable[[], tuple[Array, str]],
-) -> tuple[Array, str]:
-    """Result for a motion, computed unless the last one was that of equal arguments.
-
-    The runs of a comparison have the same arm and motion, with different drives.
-    """
-    if len(motion[0]) < _LONG:
-        return compute()
-    image = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, image)
-    key = sha256(image.tobytes())
-    for part in motion:
-        key.update(part.tobytes())
-    for known, result in _last:
-        if known == key.digest():
-            return result
-    _last[:] = [(key.digest(), result := compute())]
-    return result
 
 
 class RigidArm:
@@ -140,21 +111,6 @@ class RigidArm:
         Returns:
             Joint torques. Shape (n, n_joints).
         """
-        motion = position, velocity, acceleration
-        out, touching = _of_last(self.model, motion, lambda: self._inverse(*motion))
-        if touching:
-            warnings.warn(
-                f"{self.path}: bodies {touching} touch on the commanded motion and push"
-                " each other; if this is not intended, add an <exclude> of the pair or"
-                " set contype and conaffinity of their geoms to 0",
-                stacklevel=1,  # one warning for all callers
-            )
-        return out.copy()
-
-    def _inverse(
-        self, position: Array, velocity: Array, acceleration: Array
-    ) -> tuple[Array, str]:
-        """Joint torques of a motion, and the first two bodies that touch, if any."""
         model, data, out, touching = self.model, self._data, np.empty_like(position), ""
         # look up the arrays once, because an attribute lookup takes as long as a copy
         qpos, qvel, qacc, needed = data.qpos, data.qvel, data.qacc, data.qfrc_inverse
@@ -167,7 +123,14 @@ class RigidArm:
                 bodies = model.geom_bodyid[data.contact.geom[0]]
                 names = sorted(model.body(b).name for b in bodies)
                 touching = " and ".join(map(repr, names))
-        return out, touching
+        if touching:
+            warnings.warn(
+                f"{self.path}: bodies {touching} touch on the commanded motion and push"
+                " each other; if this is not intended, add an <exclude> of the pair or"
+                " set contype and conaffinity of their geoms to 0",
+                stacklevel=1,  # one warning for all callers
+            )
+        return out
 
     def gravity(self, position: Array) -> Array:
         """Joint torques that carry the weight at rest [N·m]. Shape (n, n_joints).
