@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,6 +71,15 @@ def test_steps_are_those_of_numpy(loaded, monkeypatch, name, pressing):
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-10 * size)
     for field in ("torque", "holding_torque", "compliance", "circular_spline_turn"):
         assert getattr(ours, field) == pytest.approx(getattr(theirs, field), rel=1e-9)
+
+
+@pytest.mark.fe
+def test_the_largest_increment_of_a_step_has_any_sign(loaded):
+    """That of a node, not of its sign."""
+    step = solved(loaded, LOADS["torque"], None)
+    size = np.abs(step.increment)
+    for increment in (size, -size):
+        assert replace(step, increment=increment).largest == size.max()
 
 
 def problem_of(rng, rows):
