@@ -63,21 +63,21 @@ struct Samples {
   }
 };
 
-void FlankShapes::fit(std::size_t flank) const {
+void FlankShapes::fit(std::size_t flank, std::size_t interval) const {
   const double* from = nodes_ + 2 * spline_.nodes * flank;
-  double* to = coefficients_.data() + 8 * spline_.intervals * flank;
-  for (std::size_t j = 0; j < spline_.intervals; ++j) {
-    for (std::size_t power = 0; power < 4; ++power, to += 2) {
-      const double* c =
-          spline_.coefficients + spline_.nodes * (spline_.intervals * (3 - power) + j);
-      to[0] = to[1] = 0.0;
-      for (std::size_t k = 0; k < spline_.nodes; ++k) {
-        to[0] += c[k] * from[2 * k];
-        to[1] += c[k] * from[2 * k + 1];
-      }
+  double* to = coefficients_.get() + 8 * (spline_.intervals * flank + interval);
+  for (std::size_t power = 0; power < 4; ++power, to += 2) {
+    const double* c =
+        spline_.coefficients +
+        spline_.nodes * (spline_.intervals * (3 - power) + interval);
+    double x = 0.0, y = 0.0;
+    for (std::size_t k = 0; k < spline_.nodes; ++k) {
+      x += c[k] * from[2 * k];
+      y += c[k] * from[2 * k + 1];
     }
+    to[0] = x;
+    to[1] = y;
   }
-  fitted_[flank] = 1;
 }
 
 double FlankShapes::largest(std::size_t flank) const {
@@ -91,9 +91,13 @@ double FlankShapes::largest(std::size_t flank) const {
 }
 
 void FlankShapes::evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const {
-  if (!fitted_[flank]) fit(flank);
   const std::size_t j = interval_of(spline_.breaks, spline_.intervals + 1, s);
-  const double* c = coefficients_.data() + 8 * (spline_.intervals * flank + j);
+  const std::size_t number = spline_.intervals * flank + j;
+  if (!fitted_[number]) {
+    fit(flank, j);
+    fitted_[number] = 1;
+  }
+  const double* c = coefficients_.get() + 8 * number;
   const double d = s - spline_.breaks[j];
   value->x = c[0] + d * (c[2] + d * (c[4] + d * c[6]));
   value->y = c[1] + d * (c[3] + d * (c[5] + d * c[7]));

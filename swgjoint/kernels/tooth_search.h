@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -24,12 +25,13 @@ struct NodeSpline {
 };
 
 // Displacements of flanks (flanks, nodes, 2) in mirrored frames, as piecewise cubic
-// curves. They are fitted when a point first faces a flank; most flanks face none.
+// curves. An interval is fitted when a point first faces it; most intervals face none.
 class FlankShapes {
  public:
   FlankShapes(NodeSpline spline, const double* nodes, std::size_t flanks)
-      : spline_(spline), nodes_(nodes), flanks_(flanks), fitted_(flanks, 0),
-        coefficients_(8 * spline.intervals * flanks) {}
+      : spline_(spline), nodes_(nodes), flanks_(flanks),
+        fitted_(spline.intervals * flanks, 0),
+        coefficients_(new double[8 * spline.intervals * flanks]) {}
 
   bool rigid() const { return flanks_ == 0; }
   const NodeSpline& spline() const { return spline_; }
@@ -43,14 +45,14 @@ class FlankShapes {
   void evaluate(std::size_t flank, double s, Vec* value, Vec* slope) const;
 
  private:
-  void fit(std::size_t flank) const;
+  void fit(std::size_t flank, std::size_t interval) const;
 
   NodeSpline spline_;
   const double* nodes_;
   std::size_t flanks_;
-  mutable std::vector<char> fitted_;
+  mutable std::vector<char> fitted_;  // (flanks, intervals)
   // (flanks, intervals, 4, 2) of ascending powers of the distance from a break
-  mutable std::vector<double> coefficients_;
+  std::unique_ptr<double[]> coefficients_;
 };
 
 // Foot of one point on a flank of the circular spline.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -15,7 +16,10 @@ from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
 if TYPE_CHECKING:
-    from swgjoint.kernels.compiled import Search
+    from swgjoint.kernels.compiled import Flank, Search
+
+_flanks: WeakKeyDictionary[Flanks | CircularSpline, Flank] = WeakKeyDictionary()
+"""Compiled profiles of members, which every search between these members uses."""
 
 
 class Flanks(Protocol):
@@ -102,8 +106,7 @@ class CompiledSearch:
         native = kernels()
         if native is None:
             return None
-        profile, facing = element.profile, circular_spline.profile
-        spline = element.spline
+        facing, spline = circular_spline.profile, element.spline
         # rigid flanks need no arc lengths by radius: any two points will do
         stations, radii = np.arange(2.0), np.arange(2.0)
         breaks, weights, nodes = np.zeros(2), np.zeros((4, 1, 0)), np.zeros((0, 0, 2))
@@ -112,11 +115,11 @@ class CompiledSearch:
             facing_spline, nodes = circular_spline.spline, displaced
             breaks, weights = facing_spline.x, facing_spline.c
         search: Search = native.Search(
-            native.Flank(profile.pieces, profile.edges, *profile.curves, profile.side),
+            _flank_of(element),
             np.ascontiguousarray(spline.x),
             np.ascontiguousarray(spline.c),
             *element.flank_range,
-            native.Flank(facing.pieces, facing.edges, *facing.curves, facing.side),
+            _flank_of(circular_spline),
             np.ascontiguousarray(radii),
             np.ascontiguousarray(stations),
             np.ascontiguousarray(breaks),
@@ -289,3 +292,14 @@ class CompiledSearch:
             spacing,
         )
         return refined
+
+
+def _flank_of(member: Flanks | CircularSpline) -> Flank:
+    """Compiled profile of a member."""
+    if (flank := _flanks.get(member)) is None:
+        native, profile = kernels(), member.profile
+        assert native is not None
+        flank = _flanks[member] = native.Flank(
+            profile.pieces, profile.edges, *profile.curves, profile.side
+        )
+    return flank

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -29,7 +30,10 @@ class CompiledBore:
         """Compiled loops for the stations of a sector; None without compiled loops."""
         if (native := kernels()) is None:
             return None
-        return cls(bore=native.Bore(stations.weights, len(stations.stiffness)))
+        if (bore := _bores.get(stations)) is None:
+            made = native.Bore(stations.weights, len(stations.stiffness))
+            bore = _bores[stations] = cls(bore=made)
+        return bore
 
     def gaps(
         self,
@@ -121,6 +125,9 @@ class CompiledBore:
             result,
         )
         return result
+
+
+_bores: WeakKeyDictionary[BoreStations, CompiledBore] = WeakKeyDictionary()
 
 
 def add_blocks(blocks: Array, into: Index, matrices: Array) -> None:

@@ -27,7 +27,7 @@ from swgjoint.fe.plane.newton_step import (
 from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
-from swgjoint.typing import Array, Mask
+from swgjoint.typing import Array, Index, Mask
 
 CIRCULAR_SPLINE_RANGE = 0.2
 """Largest displacement of the circular spline for which its linear model is accepted,
@@ -109,8 +109,10 @@ class NewtonSolver:
                     kept=None if kept is None else kept.linear,
                 )
                 thorough = bool(history) and history[-1] < self.thorough_below
-                # after three iterations or a small step only close candidates matter
+                # after three iterations or a small step, and at first under the torque
+                # of the start, only close candidates matter
                 close = thorough or iteration > 2
+                close |= not history and start.torque == load.torque
                 reach = (0.02 if close else 0.1) * model.lobe_height
                 if thorough:
                     reach = min(reach, FOLLOWED * history[-1])
@@ -232,10 +234,7 @@ def _advance(
         wrong = np.where(state.touching, after, -after)
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
-    flank_force = np.zeros_like(state.flank_force)
-    np.add.at(flank_force, lines.sector, force * lines.weight)
-    circular_spline_force = np.zeros_like(state.circular_spline_force)
-    np.add.at(circular_spline_force, lines.tooth, force * lines.circular_spline_weight)
+    on_flanks = force * lines.weight, force * lines.circular_spline_weight
     friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
     # a sector stores its first face and its bore nodes; its last face is stored as the
     # first face of the next one
@@ -253,8 +252,10 @@ def _advance(
         race=race,
         pressure=np.where(state.touching, push, 0.0),
         touching=state.touching ^ bad,
-        flank_force=flank_force,
-        circular_spline_force=circular_spline_force,
+        flank_force=_sum_by(lines.sector, on_flanks[0], model.sectors),
+        circular_spline_force=_sum_by(
+            lines.tooth, on_flanks[1], model.circular_spline_teeth
+        ),
         contacts=step.contacts.chosen(step.active),
         tooth_force=step.line_force[step.active],
         friction_force=friction[step.active],
@@ -269,6 +270,13 @@ def _advance(
         holding_torque=step.holding_torque,
     )
     return new, not bool(bad.any())
+
+
+def _sum_by(number: Index, rows: Array, count: int) -> Array:
+    """Sums (count, k) of the rows (n, k) that belong to each number (n,)."""
+    # a product with a matrix of ones is faster than np.add.at
+    ones = (number == np.arange(count)[:, None]).astype(float)
+    return np.asarray(ones @ rows)
 
 
 def _wrong_stations(state: State, gap: Array) -> Mask:
