@@ -10,6 +10,7 @@ from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.friction import Sliding
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.plane.contact_points import Contacts
+from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
@@ -35,8 +36,12 @@ class ForceLines:
     """Indentation strips of the candidates; None without indentation."""
     rows: Array
     """Derivatives of the gaps of the lines (n, n_dofs)."""
-    constraints: Array
-    """Directions of the anchor and gradient of the rotation (N, n_dofs, 2)."""
+    arm: Array
+    """Lever arms of the lines, by which turning the circular spline closes them (n,)
+    [m]."""
+    loads: Array
+    """Room for minus the gradient, then directions of the anchor and gradient of the
+    rotation (N, n_dofs, 3)."""
     compliance: Array
     """Compliance of flexspline teeth, circular spline and indentation (n, n) [m/N]."""
     gap: Array
@@ -59,8 +64,8 @@ class ForceLines:
         lines = contacts if sliding is None else sliding.lines
         strips = _strips(model, state, contacts)
         rows = linear.gap_gradient(lines)
-        constraints = np.stack([linear.anchor, linear.rotation_gradient], axis=-1)
-        constraints[linear.fixed] = 0.0
+        loads = np.empty((*linear.anchor.shape, 3))
+        loads[..., 1], loads[..., 2] = linear.anchor, linear.rotation_gradient
         local = lines.weight @ model.element.flank_compliance
         same = lines.sector[:, None] == lines.sector[None, :]
         compliance = np.where(same, local @ lines.weight.T, 0.0)
@@ -88,7 +93,8 @@ class ForceLines:
             sliding=sliding,
             strips=strips,
             rows=rows,
-            constraints=constraints,
+            arm=np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal),
+            loads=loads,
             compliance=compliance,
             gap=gap,
         )

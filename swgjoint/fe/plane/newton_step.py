@@ -9,7 +9,6 @@ import numpy as np
 
 from swgjoint.fe.common.ring_factor import RingFactor
 from swgjoint.fe.plane.contact_points import Contacts
-from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.force_lines import ForceLines, Solution, solve_condensed
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.sector_model import SectorModel
@@ -188,7 +187,8 @@ class NewtonProblem:
             ActiveSetError: If no set of active contacts is found.
         """
         linear, lines = self.linear, self.lines
-        loads = np.concatenate([-linear.gradient[:, :, None], lines.constraints], 2)
+        loads = lines.loads
+        loads[:, :, 0] = -linear.gradient
         loads[linear.fixed] = 0.0
         compiled = self._solve_compiled(loads, pressing)
         if compiled is not None:
@@ -231,7 +231,7 @@ class NewtonProblem:
             loads,
             lines.force.sector,
             lines.rows,
-            (lines.gap, self._arm, lines.compliance, np.array(numbers)),
+            (lines.gap, lines.arm, lines.compliance, np.array(numbers)),
             turns=self._turns,
             held=self._held,
             active=active,
@@ -262,16 +262,6 @@ class NewtonProblem:
         return self.load.rotation is not None
 
     @property
-    def _arm(self) -> Array:
-        """Lever arms of the lines, by which turning the circular spline closes them.
-
-        Shape (n,) [m].
-        """
-        lines = self.lines.force
-        turned = rotate_right_angle(lines.point)
-        return np.asarray(np.einsum("ki,ki->k", turned, lines.normal))
-
-    @property
     def _moment_and_rotation(self) -> tuple[float, float]:
         """Moment on the circular spline [N·m] and rotation of the flexspline.
 
@@ -298,7 +288,7 @@ class NewtonProblem:
         matrix[np.ix_(constrained, constrained)] = products[1:3, 1:3]
         matrix[n, n] -= 1.0 / self.linear.anchor_stiffness
         # turning the circular spline towards the teeth closes the gap by the lever arm
-        matrix[:n, n + 1] = matrix[n + 1, :n] = -self._arm
+        matrix[:n, n + 1] = matrix[n + 1, :n] = -self.lines.arm
         return matrix
 
     def _offset(self, products: Array) -> Array:
