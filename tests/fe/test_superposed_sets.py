@@ -150,18 +150,52 @@ def test_the_solution_before_makes_better_guesses():
     assert wrong[1] < 0.7 * wrong[0] < 0.7 * plain
 
 
+def test_features_are_margins_in_steps_up_to_the_cut():
+    """A margin at the cut is 127 steps, a larger one as many, a missing one none."""
+    margin = influence().respond(errors(50), 2.0).margin
+    guess = StateGuess.fit(errors(50), [], margin)
+    cut = guess.most
+    row = np.array([[0.5 * cut, -cut, 9.0 * cut, np.nan]])
+    seen = replace(guess, varied=np.ones(4, dtype=bool)).features(row)
+    assert seen.tolist() == [[64, -127, 127, 0]]
+
+
+def test_lines_of_the_strips_touch_the_law_at_usual_forces(monkeypatch):
+    """The mean forces of the loaded strips of solved sets, and no set solved for them.
+
+    The results are those with lines from a few sets of the same problems.
+    """
+    monkeypatch.setattr(strip_problems, "PART", 64)
+    at, change = influence(), errors(200)
+    whole = at.respond(change, 3.0)
+    changing, force = whole.active.any(axis=0), whole.force.copy()
+    force[3] = np.nan  # an unsolved set
+    near = NearContacts.choose(at, changing, force).near
+    loaded = np.nan_to_num(force)
+    wanted = loaded.sum(axis=0) / np.maximum((loaded > 0.0).sum(axis=0), 1)
+    assert near.strips.usual == pytest.approx(wanted, rel=1e-12)
+    start = whole.active[:, NearContacts.choose(at, changing).contacts]
+    plain = NearContacts.choose(at, changing).near.respond(
+        change[:, near.sector], 3.0, start
+    )
+    monkeypatch.setattr(strip_problems, "SAMPLES", None)
+    found = near.respond(change[:, near.sector], 3.0, start)
+    apart = np.abs(found.output_angle - plain.output_angle).max()
+    assert apart < 1e-7 * np.ptp(plain.output_angle)
+
+
 def test_positions_nearby_are_those_before_and_of_the_next_pitch():
     """Features of the latest position and, one pitch on, of the first one."""
     rng = np.random.default_rng(3)
-    stored = [rng.uniform(-1.0, 1.0, size=(7, 4)) for _ in range(3)]
+    stored = [rng.integers(-100, 100, size=(7, 4), dtype=np.int8) for _ in range(3)]
     nearby = NearbyPositions()
     assert nearby.features(5.0) == []
     for features in stored:
         nearby.store(5.0, features)
     before, next_pitch = nearby.features(5.0)
-    assert np.abs(before - stored[2]).max() < 1e-2
-    assert np.abs(next_pitch[:-1] - stored[0][1:]).max() < 1e-2
-    assert np.abs(next_pitch[-1] - stored[0][0]).max() < 1e-2
+    assert np.array_equal(before, stored[2])
+    assert np.array_equal(next_pitch[:-1], stored[0][1:])
+    assert np.array_equal(next_pitch[-1], stored[0][0])
     assert nearby.features(8.0) == []
 
 

@@ -214,6 +214,9 @@ class Strips:
     """Number of the strip to which each contact belongs (n,)."""
     force: Array
     """Force of each strip at which the law is linearised (n_strips,) [N]."""
+    usual: Array | None = None
+    """Mean force of each strip, while it carries any, in the problems to superpose
+    (n_strips,) [N]; None if it is not known yet."""
 
     @classmethod
     def from_contacts(

@@ -57,6 +57,8 @@ class Response:
     :class:`swgjoint.fe.common.strip_problems.StripSolution` (n_sets, m)."""
     approach: Array | None = None
     """Approach of the strips beyond their linear law (n_sets, n_strips) [m]."""
+    force: Array | None = None
+    """Forces of the strips (n_sets, n_strips) [N]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,6 +199,7 @@ class Influence:
             active=solution.active,
             margin=solution.margin,
             approach=solution.approach,
+            force=np.where(ok[:, None], solution.force, np.nan),
         )
 
     @cached_property

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swgjoint.kernels import kernels
 from swgjoint.typing import Array, Index, Mask
 
+FloatArray = NDArray[np.float32] | NDArray[np.float64]
 DIRECTIONS = 16
 """Number of random directions in which the similarity of problems is judged."""
 
@@ -172,12 +174,13 @@ def similar_sets(active: Mask, size: int) -> list[Index]:
     varied = (share > 0.0) & (share < 1.0)
     if not varied.any():
         return _halved(np.zeros((len(active), 1)), size)
-    from_mean = active[:, varied] - share[varied]
+    # single precision is enough to judge similarity
+    from_mean = active[:, varied] - share[varied].astype(np.float32)
     widest = np.linalg.eigh(from_mean.T @ from_mean)[1][:, -DIRECTIONS:]
     return _halved(from_mean @ widest, size)
 
 
-def _halved(seen: Array, size: int) -> list[Index]:
+def _halved(seen: FloatArray, size: int) -> list[Index]:
     """Parts of at most the given size, halved where they are widest.
 
     Args:
@@ -185,16 +188,16 @@ def _halved(seen: Array, size: int) -> list[Index]:
         size: Largest number of problems of a part.
     """
 
-    def halved(rows: Index) -> list[Index]:
+    def halved(rows: Index, seen: FloatArray) -> list[Index]:
         if rows.size <= size:
             return [rows]
-        from_mean = seen[rows] - seen[rows].mean(axis=0)
+        from_mean = seen - seen.mean(axis=0)
         widest = np.linalg.eigh(from_mean.T @ from_mean)[1][:, -1]
-        order = rows[np.argsort(from_mean @ widest, kind="stable")]
-        half = rows.size // 2
-        return [*halved(order[:half]), *halved(order[half:])]
+        order = np.argsort(from_mean @ widest, kind="stable")
+        halves = np.array_split(order, [rows.size // 2])
+        return [part for half in halves for part in halved(rows[half], seen[half])]
 
-    return halved(np.arange(len(seen)))
+    return halved(np.arange(len(seen)), seen)
 
 
 def next_to(offset: Array) -> tuple[Index, Index]:

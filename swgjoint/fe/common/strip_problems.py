@@ -223,9 +223,8 @@ class StripProblems:
         n = len(self.sums)
         # unknowns of open contacts, slacks of closed ones
         carries = active[:, :n] != self.closed[:n]
-        return np.asarray(
-            np.where(carries, result[:, :n], 0.0) @ self._by_contact[:, :n].T
-        )
+        forces = np.where(carries, result[:, :n], 0.0)
+        return np.asarray(forces @ self._by_contact[:, :n].T)
 
     def _with_lines_at(self, force: Array) -> Base:
         """The problems with lines that touch the law at mean forces.
@@ -245,6 +244,12 @@ class StripProblems:
             self._by_contact * self.closed,
             self._by_contact * ~self.closed,
         )
+
+    @cached_property
+    def _lined(self) -> Base | None:
+        """The problems with lines that touch the law at usual forces, if known."""
+        usual = None if self.strips is None else self.strips.usual
+        return None if usual is None else self._with_lines_at(usual[None])
 
     @cached_property
     def _law(self) -> tuple[Array, Array, Array]:
@@ -280,8 +285,7 @@ class StripProblems:
 
     def _solve_compiled(self, offset: Array, start: Mask | None) -> StripSolution:
         """Block principal pivoting with Newton's method for the strips."""
-        scale, (count, m) = self._scale, offset.shape
-        n_strips = self.sums.shape[1]
+        scale, (count, m), n_strips = self._scale, offset.shape, self.sums.shape[1]
         q = offset / scale
         tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
         active = np.zeros((count, m), bool) if start is None else start.copy()
@@ -294,19 +298,8 @@ class StripProblems:
             ends[:, inside] ^= True
             values, moved = np.empty(own.shape), np.empty((len(part), n_strips))
             slopes, done = np.empty(len(part)), np.empty(len(part), dtype=bool)
-            problems.solve(
-                own,
-                tolerance[part],
-                EXACT,
-                TRIES,
-                SINGLES,
-                before,
-                ends,
-                values,
-                moved,
-                slopes,
-                done,
-            )
+            limits = tolerance[part], EXACT, TRIES, SINGLES
+            problems.solve(own, *limits, before, ends, values, moved, slopes, done)
             ends[:, inside] ^= True
             moved += base.line * self._forces(ends, values)
             result[part], active[part], approach[part] = values, ends, moved
@@ -370,12 +363,14 @@ class StripProblems:
         elif count < PART:
             groups, solve_parts = [similar_sets(start, PART)], solve_guessed
         else:
-            numbers = np.arange(count)
-            parts = np.array_split(numbers, -(-count // TOGETHER))
-            groups, solve_parts = [[part] for part in parts], solve_together
-            samples = numbers[:: -(-count // SAMPLES)]
-            solve(samples, self._origin, self._native_origin, np.full(samples.size, -1))
-            lined = self._with_lines_at(self._forces(active[samples], result[samples]))
+            numbers, solve_parts = np.arange(count), solve_together
+            groups = [[p] for p in np.array_split(numbers, -(-count // TOGETHER))]
+            if self._lined is not None:
+                lined = self._lined
+            else:
+                first = numbers[:: -(-count // SAMPLES)]
+                solve(first, self._origin, self._native_origin, np.full(first.size, -1))
+                lined = self._with_lines_at(self._forces(active[first], result[first]))
         if len(groups) == 1:
             solve_parts(groups[0])
         else:

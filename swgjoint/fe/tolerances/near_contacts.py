@@ -35,12 +35,16 @@ class NearContacts:
     scaled unknowns and the approaches of the strips (k_teeth + k + n_strips, m - k)."""
 
     @classmethod
-    def choose(cls, at: Influence, changing: Mask) -> NearContacts:
+    def choose(
+        cls, at: Influence, changing: Mask, force: Array | None = None
+    ) -> NearContacts:
         """Drive with the contacts that change, and with all closed ones at teeth.
 
         Args:
             at: The linearised drive.
             changing: Contacts that change their state under some errors (m,).
+            force: Forces of the strips under some errors (n_sets, n_strips) [N], NaN
+                if unsolved; None if they are not known.
         """
         n = len(at.sector)
         chosen = changing.copy()
@@ -53,7 +57,12 @@ class NearContacts:
         strips, pushed = at.strips, np.zeros((n, 0))
         if strips is not None:
             pushed = np.eye(strips.force.size)[strips.strip]
-            strips = replace(strips, strip=strips.strip[teeth])
+            usual = None
+            if force is not None:
+                loaded = force > 0.0
+                usual = np.where(loaded, force, 0.0).sum(axis=0)
+                usual /= np.maximum(loaded.sum(axis=0), 1)
+            strips = replace(strips, strip=strips.strip[teeth], usual=usual)
         near = replace(
             at,
             sector=at.sector[teeth],

@@ -24,7 +24,7 @@ from swgjoint.fe.tolerances.cycle import gap_changes, pitch_of, pitches_of
 from swgjoint.fe.tolerances.full_solves import full_solves
 from swgjoint.fe.tolerances.perfect import PerfectSolid, midway
 from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
-from swgjoint.fe.tolerances.state_guess import NearbyPositions
+from swgjoint.fe.tolerances.state_guess import Features, NearbyPositions
 from swgjoint.fe.tolerances.superposition import superpose_many, superpose_plainly
 from swgjoint.fe.tolerances.unseen import (
     spread_positions,
@@ -255,7 +255,7 @@ def respond_over_torque(
     """
     latest: dict[int, Array] = {}
     nearby = NearbyPositions() if nearby is None else nearby
-    features: dict[bool, Array] = {}  # under the torque before of either sign
+    features: dict[bool, Features] = {}  # under the torque before of either sign
 
     def changes(at: Influence) -> Array:
         """Gap changes, kept for the latest linearisation only: they fill 50 MB."""

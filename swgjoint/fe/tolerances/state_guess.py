@@ -21,8 +21,13 @@ contact that is far from a change of its state tells little about others."""
 RIDGE = 3e-3
 """Regularisation of the regression, relative to the mean square of its inputs [-]."""
 STEPS = 127
-"""Number of steps between no margin and one that is cut off, with which features are
-stored: those of a position with 20,200 pitches fill 30 instead of 230 MB."""
+"""Number of steps between no margin and one that is cut off, in which features are
+counted: those of a position with 20,200 pitches fill 30 instead of 230 MB."""
+BLOCK = 1024
+"""Number of problems that are guessed at once, so that their inputs stay in the cache.
+A guess is no result: single precision suffices for it."""
+Features = NDArray[np.int8]
+"""Margins of some problems, whole numbers from -STEPS to STEPS."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,7 +56,7 @@ class StateGuess:
 
     @classmethod
     def fit(
-        cls, gap_change: Array, known: Sequence[Array], margin: Array
+        cls, gap_change: Array, known: Sequence[Features], margin: Array
     ) -> StateGuess:
         """Regression through the solutions of some problems.
 
@@ -78,37 +83,53 @@ class StateGuess:
             most=float(np.quantile(close, CUT)) if close.size else 1.0,
             coefficients=np.zeros((0, 0)),
         )
-        inputs = guess._inputs(gap_change, known)
+        inputs = guess._inputs(gap_change, known).astype(float)
         square = inputs.T @ inputs
         square += RIDGE * square.trace() / len(square) * np.eye(len(square))
         right = inputs.T @ guess.features(margin)
         coefficients = np.asarray(np.linalg.solve(square, right))
         return replace(guess, coefficients=coefficients)
 
-    def features(self, margin: Array) -> Array:
-        """Margins that vary, from -1 to 1, where they are cut off.
+    def features(self, margin: Array) -> Features:
+        """Margins that vary (n_problems, n_varied), in steps up to where they are cut.
 
         Args:
-            margin: Margins (n_problems, k); NaN if unsolved.
+            margin: Margins (n_problems, k); NaN if unsolved, which counts as zero.
         """
-        return np.nan_to_num(np.clip(margin[:, self.varied] / self.most, -1.0, 1.0))
+        steps = margin[:, self.varied]
+        steps *= STEPS / self.most
+        np.rint(np.clip(steps, -STEPS, STEPS, out=steps), out=steps)
+        steps[np.isnan(steps)] = 0.0
+        return steps.astype(np.int8)
 
-    def active(self, gap_change: Array, known: Sequence[Array]) -> Mask:
+    def active(self, gap_change: Array, known: Sequence[Features]) -> Mask:
         """Contacts that are likely to be active (n_problems, k).
 
         Args:
             gap_change: Gap changes (n_problems, n) [m].
             known: Features of solutions nearby, each (n_problems, n_features).
         """
-        margins = self._inputs(gap_change, known) @ self.coefficients
+        coefficients = self.coefficients.astype(np.float32)
         active = np.tile(self.always, (len(gap_change), 1))
-        active[:, self.varied] = margins > 0.0
+        for k in range(0, len(gap_change), BLOCK):
+            part = slice(k, k + BLOCK)
+            inputs = self._inputs(gap_change[part], [one[part] for one in known])
+            active[part, self.varied] = inputs @ coefficients > 0.0
         return active
 
-    def _inputs(self, gap_change: Array, known: Sequence[Array]) -> Array:
+    def _inputs(
+        self, gap_change: Array, known: Sequence[Features]
+    ) -> NDArray[np.float32]:
         """One, the coordinates of the gap changes, and the features nearby."""
         moved = (gap_change - self.mean) @ self.directions
-        return np.concatenate([np.ones((len(moved), 1)), moved, *known], axis=1)
+        widths = np.cumsum([1, moved.shape[1], *(one.shape[1] for one in known)])
+        inputs = np.empty((len(moved), widths[-1]), dtype=np.float32)
+        inputs[:, 0] = 1.0
+        inputs[:, 1 : widths[1]] = moved
+        for one, start in zip(known, widths[1:], strict=False):
+            inputs[:, start : start + one.shape[1]] = one
+        inputs[:, widths[1] :] /= np.float32(STEPS)
+        return inputs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,24 +140,23 @@ class NearbyPositions:
     the one before it and the first position of the next pitch.
     """
 
-    first: dict[float, NDArray[np.int8]] = field(default_factory=dict)
-    """Features at the first position, in units of 1 / :data:`STEPS` (n_sets, n)."""
-    latest: dict[float, NDArray[np.int8]] = field(default_factory=dict)
+    first: dict[float, Features] = field(default_factory=dict)
+    """Features at the first position (n_sets, n)."""
+    latest: dict[float, Features] = field(default_factory=dict)
     """The same at the latest position."""
 
-    def features(self, torque: float) -> list[Array]:
+    def features(self, torque: float) -> list[Features]:
         """Features at both positions, each (n_sets, n); none if they are not known."""
         if torque not in self.latest:
             return []
-        next_pitch = np.roll(self.first[torque], -1, axis=0)
-        return [self.latest[torque] / STEPS, next_pitch / STEPS]
+        return [self.latest[torque], np.roll(self.first[torque], -1, axis=0)]
 
-    def store(self, torque: float, features: Array) -> None:
+    def store(self, torque: float, features: Features) -> None:
         """Keep the features of one position under a torque.
 
         Args:
             torque: Torque T [N·m].
-            features: Features from -1 to 1 (n_sets, n).
+            features: Features (n_sets, n).
         """
-        self.latest[torque] = np.round(STEPS * features).astype(np.int8)
-        self.first.setdefault(torque, self.latest[torque])
+        self.latest[torque] = features
+        self.first.setdefault(torque, features)

@@ -11,7 +11,7 @@ from swgjoint.fe.common.influence import Influence, Response
 from swgjoint.fe.common.pivot_base import similar_sets
 from swgjoint.fe.common.strip_problems import TOGETHER
 from swgjoint.fe.tolerances.near_contacts import NearContacts
-from swgjoint.fe.tolerances.state_guess import StateGuess
+from swgjoint.fe.tolerances.state_guess import Features, StateGuess
 from swgjoint.typing import Array, Index, Mask
 
 FIRST = 1024
@@ -36,7 +36,7 @@ class Superposed:
     """Compliances (n_sets,) [rad/(N·m)]."""
     active: Mask
     """Contacts whose state differs from that in the perfect drive (n_sets, m)."""
-    features: Array | None = None
+    features: Features | None = None
     """What is known for guesses under other torques (n_sets, n_features), see
     :class:`swgjoint.fe.tolerances.state_guess.StateGuess`; None if nothing was learned.
     """
@@ -66,7 +66,8 @@ def superpose_plainly(
         part = slice(k, k + chunk)
         begin = None if start is None else start[part]
         found = at.respond(gap_change[part], torque, begin)
-        parts.append(replace(found, margin=None, approach=None))  # which are large
+        # without what is large
+        parts.append(replace(found, margin=None, approach=None, force=None))
         tick()
     return Superposed(
         output_angle=np.concatenate([part.output_angle for part in parts]),
@@ -80,7 +81,7 @@ def superpose_many(
     at: Influence,
     gap_change: Array,
     torque: float,
-    known: Sequence[Array],
+    known: Sequence[Features],
     *,
     chunk: int,
     tick: Callable[[], None],
@@ -116,11 +117,11 @@ def superpose_many(
         assert found.margin is not None
         return found.margin
 
-    def solve(rows: Index, start: Mask | None) -> Array:
-        """Solve some sets with all contacts; returns the margins."""
+    def solve(rows: Index, start: Mask | None) -> tuple[Array, Array | None]:
+        """Solve some sets with all contacts; returns the margins and strip forces."""
         found = at.respond(gap_change[rows], torque, start)
         result.active[rows] = found.active
-        return take(rows, found)
+        return take(rows, found), found.force
 
     def solve_near(near: NearContacts, rows: Index, start: Mask | None) -> Array:
         """Solve some sets with few contacts, and with all if these are too few.
@@ -132,27 +133,29 @@ def superpose_many(
         result.active[np.ix_(rows, near.contacts)] = found.active
         margin = take(rows, found)
         if not right.all():
-            again = solve(rows[~right], result.active[rows[~right]])
+            again, _ = solve(rows[~right], result.active[rows[~right]])
             margin[~right] = again[:, near.contacts]
         return margin
 
     # what the first sets show; contacts that are left out count as far apart
     seeds = np.arange(first.size) % SEEDS == 0
-    seen = solve(first[seeds], None)
-    near = NearContacts.choose(at, np.asarray(seen.max(axis=0) > -seen.std(axis=0)))
+    seen, force = solve(first[seeds], None)
+    changing = np.asarray(seen.max(axis=0) > -seen.std(axis=0))
+    near = NearContacts.choose(at, changing, force)
     usual = (seen[:, near.contacts] > 0.0).mean(axis=0) > 0.5
     margin = np.full((first.size, len(at.closed)), -np.inf)
     margin[seeds] = seen
     margin[np.ix_(~seeds, near.contacts)] = solve_near(
         near, first[~seeds], np.tile(usual, (int((~seeds).sum()), 1))
     )
-    near = NearContacts.choose(at, np.asarray(result.active[first].any(axis=0)))
+    changing = np.asarray(result.active[first].any(axis=0))
+    near = NearContacts.choose(at, changing, force)
     margin = margin[:, near.contacts]
     change = gap_change[:, near.teeth]
     sound = ~np.isnan(margin).any(axis=1)
     learn = first[sound]
     guess = StateGuess.fit(change[learn], [one[learn] for one in known], margin[sound])
-    features = np.empty((count, int(guess.varied.sum())))
+    features = np.empty((count, int(guess.varied.sum())), dtype=np.int8)
     features[first] = guess.features(margin)
 
     # all others
