@@ -64,11 +64,15 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
         regular = np.arange(solved.torque.size) < regular.size
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     offset = float(samples.output_error[zero].mean())
+    psi = output_angle(drive, solved.input_angle, solved.torque)
+    predicted = psi - solved.input_angle / drive.ratio
+    heights = None
     if toleranced is not None:
-        deviation = solved.output_error - _predicted(drive, solved)
+        deviation = solved.output_error - predicted
         offset = float(deviation[solved.torque == 0.0].mean())
-    wrong = solved.output_error - offset - _predicted(drive, solved)
-    missed = _input_torque(drive, solved) - solved.input_torque
+        _, heights = relative_amplitudes(toleranced, pitches_per_turn(samples))
+    wrong = solved.output_error - offset - predicted
+    missed = _input_torque(drive, solved, psi) - solved.input_torque
     rows, angles = [], []
     # the input torque within a clearance depends on where the output stands in it
     mean_clearance = toleranced is not None and toleranced.onsets
@@ -79,10 +83,11 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
             continue
         at = solved.torque == torque
         error, moment = solved.output_error[at], solved.input_torque[at]
-        if toleranced is None:
+        if toleranced is None or heights is None:
             others = _over_angle(samples, float(torque))
         else:
-            others = [np.array([0.0, here]) for here in _over_cycle(samples, torque)]
+            known = _at_torque(toleranced.torque, heights, torque)
+            others = [np.array([0.0, here]) for here in known]
             # only the differences count
             error, moment = error - error.min(), moment - moment.min()
         error, moment = (
@@ -140,15 +145,8 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     return record
 
 
-def _predicted(drive: Potential, solved: FullSolves) -> Array:
-    """Output error of the map at the torques and angles of the equilibria [rad]."""
-    psi = output_angle(drive, solved.input_angle, solved.torque)
-    return psi - solved.input_angle / drive.ratio
-
-
-def _input_torque(drive: Potential, solved: FullSolves) -> Array:
-    """Input torque of the map at its own equilibria [N·m]."""
-    psi = output_angle(drive, solved.input_angle, solved.torque)
+def _input_torque(drive: Potential, solved: FullSolves, psi: Array) -> Array:
+    """Input torque of the map at its own equilibria, at output angles psi [N·m]."""
     on_input, on_output = drive.forces(solved.input_angle, psi)
     return np.asarray(-on_input - (on_output + 0.0) / drive.ratio) + (
         solved.torque / drive.ratio
@@ -166,18 +164,21 @@ def _over_angle(samples: MapSamples, torque: float) -> list[Array]:
     return [error, input_torque_at(samples, torque, potential, theta)]
 
 
-def _over_cycle(samples: MapSamples, torque: float) -> list[float]:
+def _at_torque(torques: Array, heights: Array, torque: float) -> list[float]:
     """Peak to peak of output error [rad] and input torque [N·m] over the tooth cycle.
 
     Between the torques of the superposition it is interpolated.
+
+    Args:
+        torques: These torques [N·m].
+        heights: Peak to peak of input torque and output error at them, see
+            :func:`swgjoint.maps.fit.tolerance_modes.relative_amplitudes`.
+        torque: Torque [N·m].
     """
-    tolerances = samples.tolerances
-    assert tolerances is not None
-    _, height = relative_amplitudes(tolerances, pitches_per_turn(samples))
-    known = np.isfinite(height)
+    known = np.isfinite(heights)
     return [
-        float(np.interp(torque, tolerances.torque[at], row[at]))
-        for row, at in zip(height[::-1], known[::-1], strict=True)
+        float(np.interp(torque, torques[at], row[at]))
+        for row, at in zip(heights[::-1], known[::-1], strict=True)
     ]
 
 
