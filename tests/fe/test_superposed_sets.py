@@ -13,7 +13,7 @@ from swgjoint.fe.common import strip_problems
 from swgjoint.fe.common.indentation import Indentation, Strips
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.common.pivot_base import similar_sets
-from swgjoint.fe.common.pivoting import exchange
+from swgjoint.fe.common.pivoting import TOLERANCE, exchange
 from swgjoint.fe.tolerances import sampling, superposition
 from swgjoint.fe.tolerances.near_contacts import NearContacts
 from swgjoint.fe.tolerances.rest import Rest
@@ -125,6 +125,26 @@ def test_a_contact_that_is_missing_is_noticed():
     apart = np.abs(found.output_angle - whole.output_angle)
     good = apart < 1e-7 * np.ptp(whole.output_angle)
     assert good[right].all() and not good[~right].all()
+
+
+@pytest.mark.parametrize(("part", "accepted"), [(0.5, True), (2.0, False)])
+def test_a_left_out_contact_may_overlap_by_the_tolerance(part, accepted):
+    """Single precision, which is too coarse to tell, decides about no set.
+
+    In every set the gap of one open tooth is moved to an overlap of half or twice the
+    tolerance.
+    """
+    at, change = influence(), errors()
+    whole = at.respond(change, 3.0)
+    near = NearContacts.choose(at, whole.active.any(axis=0))
+    k = near.others[0]
+    assert k < TEETH
+    scale = np.sqrt(np.diag(at.matrix))
+    begin = (at.slack + 3.0 * at.by_torque) / scale
+    overlap = part * TOLERANCE * np.abs(begin).max()
+    change[:, k] += scale[k] * (whole.margin[:, k] - overlap)
+    _, right = near.respond(change, 3.0, None)
+    assert np.array_equal(right, np.full(SETS, accepted))
 
 
 def test_the_solution_before_makes_better_guesses():

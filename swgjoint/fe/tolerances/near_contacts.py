@@ -10,6 +10,10 @@ from swgjoint.fe.common.influence import Influence, Response
 from swgjoint.fe.common.pivoting import TOLERANCE
 from swgjoint.typing import Array, Index, Mask
 
+BLOCK = 256
+"""Number of problems that are checked at once, so that their slacks stay in the cache.
+"""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NearContacts:
@@ -105,7 +109,7 @@ class NearContacts:
             start: Guess of the active sets of the near contacts (n_sets, k); None for
                 none.
         """
-        at, change = self.at, gap_change[:, self.teeth]
+        at, change = self.at, np.take(gap_change, self.teeth, axis=1)
         found = self.near.respond(change, torque, start)
         assert found.margin is not None and found.approach is not None
         inputs = np.concatenate(
@@ -117,12 +121,33 @@ class NearContacts:
         begin = begin[self.others]
         # most contacts keep their state whatever the inputs within their ranges are
         low, high = inputs.min(axis=0), inputs.max(axis=0)
-        least = begin + 0.5 * (low + high) @ self.by_inputs
-        least -= 0.5 * (high - low) @ np.abs(self.by_inputs)
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        central, reach = begin + middle @ self.by_inputs, half @ np.abs(self.by_inputs)
         apart = self.others[self.others < len(at.sector)]
-        least[: apart.size] += gap_change[:, apart].min(axis=0) / scale[apart]
+        least, narrowest = central - reach, gap_change.min(axis=0)
+        least[: apart.size] += narrowest[apart] / scale[apart]
         doubtful = np.flatnonzero(~(least >= -tolerance))
-        slack = begin[doubtful] + inputs @ self.by_inputs[:, doubtful]
         teeth = apart[doubtful[doubtful < apart.size]]
-        slack[:, : teeth.size] += gap_change[:, teeth] / scale[teeth]
-        return found, np.asarray(slack.min(axis=1, initial=0.0) >= -tolerance)
+
+        # of the others, single precision shows most that keep their state
+        by_unit = (half[:, None] * self.by_inputs[:, doubtful]).astype(np.float32)
+        inverse = np.divide(1.0, half, out=np.zeros_like(half), where=half != 0.0)
+        size = reach[doubtful] + np.abs(central[doubtful])
+        widest = np.maximum(gap_change.max(axis=0), -narrowest)
+        size[: teeth.size] += widest[teeth] / scale[teeth]
+        rounding = (len(half) + 8) * np.finfo(np.float32).eps * size
+        limit = (rounding - tolerance - central[doubtful]).astype(np.float32)
+        right = np.ones(len(inputs), dtype=bool)
+        for k in range(0, len(inputs), BLOCK):
+            part = slice(k, k + BLOCK)
+            units = ((inputs[part] - middle) * inverse).astype(np.float32)
+            slack = units @ by_unit
+            slack[:, : teeth.size] += (
+                np.take(gap_change[part], teeth, axis=1) / scale[teeth]
+            )
+            right[part] = (slack >= limit).all(axis=1)
+        rows = np.flatnonzero(~right)
+        exact = begin[doubtful] + inputs[rows] @ self.by_inputs[:, doubtful]
+        exact[:, : teeth.size] += gap_change[np.ix_(rows, teeth)] / scale[teeth]
+        right[rows] = exact.min(axis=1, initial=0.0) >= -tolerance
+        return found, right
