@@ -122,6 +122,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
         loopback_port(args.live)
     folder = output_folder(args.out) if args.out else None
+    from swgjoint.sim.rigid_drives import rigid_drives
     from swgjoint.view.run import run_scene
 
     scene, choice, assumed_rotors = scene_of(args, args.overrides)
@@ -131,7 +132,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         own = [text for text in args.overrides if _MODEL_OF_A_JOINT.match(text)]
         scene = scene.with_model(args.model).with_changes(own)
     recording = folder / "run.rrd" if folder is not None else None
-    result = run_scene(scene, recording=recording, progress=args.progress)
+    # a report has the spec sheets of all drives
+    drives = None if args.report else rigid_drives(scene)
+    result = run_scene(
+        scene, drives=drives, recording=recording, progress=args.progress
+    )
     files: list[str] = []
     if folder is not None:
         from swgjoint.view.run_picture import run_png

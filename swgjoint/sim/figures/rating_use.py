@@ -38,7 +38,6 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
     moving = run.assembly.trajectory.top_speed[j] > AT_REST and speed.any()
     cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
     peak = float(torque.max())
-    low, high = transmission.drive.torque_range
     skips = ratings.ratcheting_torque
     return {
         "rated_Nm": ratings.rated_torque,
@@ -56,11 +55,22 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
         ),
         "ratcheting_margin": None if skips is None else skips / max(peak, 1e-300),
         "ratcheting": first_ratcheting(run.time, run.output_torque[:, j], skips),
+        **_use_of_map(run, j),
+    }
+
+
+def _use_of_map(run: Run, j: int) -> dict[str, Any]:
+    """Torque range of the map of one joint, and whether the run stays within it."""
+    transmission = run.assembly.transmissions[j]
+    if transmission.level == "rigid":
+        why = "level rigid uses no map"
+        none = dict.fromkeys(("map_range_Nm", "within_map"))
+        return {**none, "missing": dict.fromkeys(none, why)}
+    low, high = transmission.drive.torque_range
+    torque = run.output_torque[:, j]
+    return {
         "map_range_Nm": [low, high],
-        "within_map": bool(
-            low <= run.output_torque[:, j].min()
-            and run.output_torque[:, j].max() <= high
-        ),
+        "within_map": bool(low <= torque.min() and torque.max() <= high),
     }
 
 

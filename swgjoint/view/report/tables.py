@@ -196,7 +196,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
     rows = []
     for j, joint in enumerate(run.joints):
         figures, transmission = metrics["joints"][joint], run.assembly.transmissions[j]
-        low, high = figures["ratings"]["map_range_Nm"]
+        ends = figures["ratings"]["map_range_Nm"] or ()
         left = [f"{item['order']:.4g}" for item in figures["unresolved"]]
         orders = f"{' '.join(left[:3])}{' ...' if left[3:] else ''}" or "none"
         change = changes.get(joint, {})
@@ -205,7 +205,7 @@ def label_table(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, 
                 Cell(short(joint), "text"),
                 Cell(figures["level"]),
                 Cell(f"{transmission.drive.name} ({figures['source']})"),
-                Cell(f"{low:.3g}\u00a0to\u00a0{high:.3g}"),
+                Cell("\u00a0to\u00a0".join(f"{t:.3g}" for t in ends) or "-"),
                 *_cells(figures["highest_resolved_order"]),
                 Cell(orders),
                 *_cells(left_out_share(run, j)),
