@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -57,7 +59,8 @@ class LocalPool:
 
     The kernel may kill a process when memory runs out, and so may a user. The tasks
     that were running at that time are repeated one at a time, which identifies the task
-    that caused the failure.
+    that caused the failure. Ctrl-C interrupts this process alone, which then ends the
+    others.
     """
 
     workers: int
@@ -85,17 +88,12 @@ class LocalPool:
         while True:
             try:
                 # starts the first tasks, of which one may end its process at once
-                results = _parallel(self.workers, function, drawn())
-                for number, found in results:
-                    yield waiting.pop(number), found
+                with _parallel(self.workers, function, drawn()) as results:
+                    for number, found in results:
+                        yield waiting.pop(number), found
                 return
             except BrokenProcessPool:
                 pass
-            except GeneratorExit:  # the caller stops; silence joblib's warning about it
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")
-                    results.close()
-                raise
             # tasks start in the order in which they were drawn, so that the first ones
             # without a result were running
             suspects = list(waiting.items())[: self.workers]
@@ -103,7 +101,8 @@ class LocalPool:
             waiting.clear()
             for number, task in suspects:
                 try:
-                    ((_, found),) = _parallel(2, function, [(number, task)])
+                    with _parallel(2, function, [(number, task)]) as results:
+                        ((_, found),) = results
                 except BrokenProcessPool:
                     yield (
                         task,
@@ -116,11 +115,13 @@ class LocalPool:
                     yield task, found
 
 
+@contextmanager
 def _parallel(
     jobs: int,
     function: Callable[[Task], Found],
     tasks: Iterable[tuple[int, Task]],
-) -> Generator[tuple[int, Found], None, None]:
+) -> Iterator[Iterator[tuple[int, Found]]]:
+    """Results in the order of completion; leaving the block ends unfinished tasks."""
     from joblib import Parallel, delayed, parallel_config
 
     # several threads that compete for CPUs do not speed up small dense products
@@ -137,10 +138,77 @@ def _parallel(
             max_nbytes=None,  # tasks are small: no arrays in files
         )
     call, cache = delayed(_numbered), os.environ.get(CACHE)
-    found: Generator[tuple[int, Found], None, None] = parallel(
-        call(function, number, task, cache) for number, task in tasks
-    )
-    return found
+    found: Generator[tuple[int, Found], None, None] | None = None
+    try:
+        with _without_interrupts():
+            found = parallel(
+                call(function, number, task, cache) for number, task in tasks
+            )
+        yield found
+    finally:
+        if found is not None:
+            with _quiet_end():
+                found.close()
+
+
+@contextmanager
+def _quiet_end() -> Iterator[None]:
+    """End unfinished tasks without the messages of joblib and loky.
+
+    joblib warns about these tasks. The thread of loky that hands tasks to processes
+    raises a ``KeyError`` if it is about to hand over a task that has just been
+    cancelled, after it has ended the processes.
+    """
+    shown = threading.excepthook
+
+    def hook(failure: Any) -> None:
+        manager = getattr(failure.thread, "name", "") == "ExecutorManagerThread"
+        if not (manager and issubclass(failure.exc_type, KeyError)):
+            shown(failure)
+
+    threading.excepthook = hook
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        threading.excepthook = shown
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Start processes that do not receive the SIGINT of Ctrl-C.
+
+    A terminal sends it to all processes of a command, and a process that is still
+    importing modules would print a traceback. New processes inherit the blocked signal,
+    and so do the threads that start further ones. Other threads of this process may
+    receive it: it takes effect at the end of the block, because a half-started process
+    would print a traceback, too.
+    """
+    if os.name != "posix":  # only POSIX systems can block a signal
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    from joblib.externals.loky.backend import resource_tracker as loky_tracker
+
+    # starting these processes of the standard library and of loky unblocks the signal
+    resource_tracker.ensure_running()
+    loky_tracker.ensure_running()
+    in_main = threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGINT) if in_main else None
+    received = []
+    if handler is not None:
+        signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
+        if received:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _numbered(
