@@ -379,6 +379,32 @@ def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):
     assert again["tool"] == result["tool"]
 
 
+def test_one_of_two_hands_is_named_as_the_tool(tmp_path, capsys):
+    """The fingers of one hand are one end of an arm, two hands are two."""
+    arm = """<body name="{0}" pos="0 {1} 1"><joint name="{0}" axis="0 1 0"/>
+      <geom size="0.05" mass="1"/><body name="{0}_hand" pos="0.3 0 0">
+      <geom size="0.03" mass="0.2"/>{2}</body></body>"""
+    fingers = "".join(
+        f'<body name="{{0}}_{k}" pos="0.1 {k} 0"><geom size="0.01" mass="0.01"/></body>'
+        for k in (0, 1)
+    )
+    sides = [
+        arm.format(name, y, fingers.format(name)) for name, y in (("l", 1), ("r", -1))
+    ]
+    file, told = tmp_path / "hands.xml", []
+    own = ["--set", "tool_site=r_0"]
+    for count, options in ((1, []), (2, []), (2, own)):
+        text = "".join(sides[:count])
+        file.write_text(f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+        with warnings.catch_warnings(record=True) as got:
+            warnings.simplefilter("always")
+            assert main(["run", str(file), "--set", STEADY, *QUICK, *options]) == 0
+        told.append(len([w for w in got if names(str(w.message), "l_0", "ends: r_0")]))
+        tool = options[-1].removeprefix("tool_site=") if options else "l_0"
+        assert f"\ntool {tool}: deviation" in capsys.readouterr().out
+    assert told == [0, 1, 0]
+
+
 def test_only_assumed_values_are_called_assumed(tmp_path, capsys):
     """A stated rotor inertia and the stated size of an error are not."""
     file = urdf(tmp_path)

@@ -165,7 +165,7 @@ def test_the_fidelity_of_designs_is_an_option(capsys, monkeypatch, synthetic_map
 
 def test_repeatability_of_a_scene_without_chance_is_a_dash():
     """What never differs has no spread to tell; accuracy stays."""
-    tool = {"path_rms_mm": None, "rp_mm": 1e-12, "ap_mm": 0.58}
+    tool = {"site": "tool", "path_rms_mm": None, "rp_mm": 1e-12, "ap_mm": 0.58}
     assert names(tool_line(tool, random=False), "AP 0.5800 mm", "RP -", "random")
     assert names(tool_line(tool | {"rp_mm": 0.01}, random=True), "RP 0.0100 mm")
 

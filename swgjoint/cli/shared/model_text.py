@@ -101,7 +101,8 @@ def tool_line(tool: dict[str, Any], *, random: bool) -> str:
     for key, name in (("at_mm", "AT"), ("rt_mm", "RT")):
         if tool.get(key) is not None:
             parts.append(f"{name} {_mm(tool[key])}")
-    return f"tool: {', '.join(parts)}" if parts else ""
+    name = "tool" if tool["site"] == "tool" else f"tool {tool['site']}"
+    return f"{name}: {', '.join(parts)}" if parts else ""
 
 
 def _mm(value: float) -> str:

@@ -79,6 +79,18 @@ class RigidArm:
         """A fresh editable copy of the arm."""
         return self._spec.copy()
 
+    @property
+    def ends(self) -> list[str]:
+        """Last bodies of the longest chains, one of those with the same parent."""
+        model = self.model
+        depth = np.zeros(model.nbody, dtype=int)
+        for body in range(1, model.nbody):
+            depth[body] = depth[model.body_parentid[body]] + 1
+        last = np.flatnonzero(depth == depth.max())
+        _, first = np.unique(model.body_parentid[last], return_index=True)
+        kind = mujoco.mjtObj.mjOBJ_BODY
+        return [mujoco.mj_id2name(model, kind, int(b)) for b in last[np.sort(first)]]
+
     def without_tool(self) -> RigidArm:
         """This arm, whose tool positions are not computed."""
         bare = copy(self)

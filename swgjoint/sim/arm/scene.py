@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
-import numpy as np
-
 from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import InputError
 from swgjoint.models_path import bundled_names, is_file
@@ -161,7 +158,7 @@ def arm_scene(
         "name": _name(arm.path),
         "description": f"{kind.capitalize()} of {arm.path.name}",
         "arm": reference,
-        "tool_site": _tool(arm),
+        "tool_site": _tool(arm, changes),
         "defaults": {"level": "full"},
         # the integral term prevents a lag due to drive friction
         "controller": {"kind": "pid", "feedforward": "gravity_inertia"},
@@ -388,13 +385,13 @@ def _add_rotors(
     return assumed
 
 
-def _tool(arm: RigidArm) -> str:
-    """Name of the tool site: ``tool``, or else the last body of the longest chain."""
-    if arm.tool >= 0:
-        return "tool"
-    model = arm.model
-    depth = np.zeros(model.nbody, dtype=int)
-    for body in range(1, model.nbody):
-        depth[body] = depth[model.body_parentid[body]] + 1
-    last = int(np.flatnonzero(depth == depth.max())[0])
-    return str(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, last))
+def _tool(arm: RigidArm, changes: Mapping[str, Any]) -> str:
+    """Name of the tool site: ``tool``, or else the end of the longest chain."""
+    tool, *others = ["tool"] if arm.tool >= 0 else arm.ends
+    if others and "tool_site" not in changes:
+        warnings.warn(
+            f"{arm.path}: tool errors are those of {tool}; other ends:"
+            f" {', '.join(others)}; accepted: --set tool_site=NAME",
+            stacklevel=3,
+        )
+    return tool

@@ -207,7 +207,7 @@ def tool_metrics(run: Run) -> dict[str, Any]:
     figures: dict[str, Any] = dict.fromkeys(keys)
     for part in parts:
         figures |= part
-    return {**figures, "missing": missing}
+    return {"site": run.assembly.scene.tool_site, **figures, "missing": missing}
 
 
 def _poses(run: Run) -> dict[str, Any]:
