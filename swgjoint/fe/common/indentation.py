@@ -141,14 +141,18 @@ class Indentation:
         """
         at = start / self._growth
         x = np.asarray(force / at)
-        area = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
         # for small x the terms cancel: use the series
         small = x < 0.05
-        few = x[small]
+        few = x if small.all() else x[small]
         series = np.zeros_like(few)
         for n in range(13, 2, -1):
-            series = (series - (-1.0) ** n / (n * (n - 2.0))) * few
-        area[small] = series * few**2
+            series -= (-1.0) ** n / (n * (n - 2.0))
+            series *= few
+        series *= few**2
+        area = series
+        if few is not x:
+            area = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
+            area[small] = series
         return np.asarray(at**2 * area + 0.5 * force**2 * log(start))
 
 
@@ -311,10 +315,13 @@ class Strips:
                 zero.
         """
         some, law = np.maximum(force, 0.0), self.law
-        loaded = some > 0.0
-        beyond = -0.5 * self.line * (some**2 - self.force**2) - law.energy(self.force)
-        beyond[loaded] += law.energy(some[loaded])
-        return np.asarray(beyond.sum(axis=-1))
+        first = 0.5 * self.line @ self.force**2 - law.energy(self.force).sum()
+        beyond = first - some**2 @ (0.5 * self.line)
+        # strips without force have no energy
+        at = np.flatnonzero(some)
+        energy = law.energy(some.ravel()[at])
+        sums = np.bincount(at // force.shape[-1], energy, minlength=beyond.size)
+        return np.asarray(beyond + sums.reshape(beyond.shape))
 
     @property
     def offset(self) -> Array:
