@@ -291,19 +291,25 @@ class StripProblems:
         active = np.zeros((count, m), bool) if start is None else start.copy()
         result, approach = np.empty((count, m)), np.empty((count, n_strips))
         slope, solved = np.empty(count), np.empty(count, dtype=bool)
+        force = np.empty(approach.shape)
 
-        def solve(part: Index, base: Base, problems: Any, before: Index) -> None:
-            inside = base.inside
-            own, ends = base.offset_of(q[part]), active[part]
-            ends[:, inside] ^= True
-            values, moved = np.empty(own.shape), np.empty((len(part), n_strips))
-            slopes, done = np.empty(len(part)), np.empty(len(part), dtype=bool)
+        def solve(
+            part: Index | slice, base: Base, problems: Any, before: Index
+        ) -> None:
+            # consecutive problems are solved in place
+            own, ends, done = base.offset_of(q[part]), active[part], solved[part]
+            values, moved, slopes = result[part], approach[part], slope[part]
+            ends[:, base.inside] ^= True
             limits = tolerance[part], EXACT, TRIES, SINGLES
             problems.solve(own, *limits, before, ends, values, moved, slopes, done)
-            ends[:, inside] ^= True
-            moved += base.line * self._forces(ends, values)
-            result[part], active[part], approach[part] = values, ends, moved
-            slope[part], solved[part] = slopes + base.slope, done
+            ends[:, base.inside] ^= True
+            forces = self._forces(ends, values)
+            moved += base.line * forces
+            slopes += base.slope
+            force[part] = forces
+            if not isinstance(part, slice):
+                result[part], active[part], approach[part] = values, ends, moved
+                slope[part], solved[part] = slopes, done
 
         def chosen(sets: Mask, size: int) -> tuple[Base, Any]:
             """Base for problems whose active sets are like these (k, m)."""
@@ -320,7 +326,8 @@ class StripProblems:
                 solve(part, base, problems, np.full(part.size, -1))
 
         def solve_together(parts: list[Index]) -> None:
-            for part in parts:
+            for rows in parts:
+                part = slice(rows[0], rows[-1] + 1)
                 base = lined.exchange(active[part].mean(axis=0) > 0.5)
                 solve(part, base, self._native(base), np.zeros(0, dtype=np.int64))
 
@@ -370,14 +377,13 @@ class StripProblems:
             else:
                 first = numbers[:: -(-count // SAMPLES)]
                 solve(first, self._origin, self._native_origin, np.full(first.size, -1))
-                lined = self._with_lines_at(self._forces(active[first], result[first]))
+                lined = self._with_lines_at(force[first])
         if len(groups) == 1:
             solve_parts(groups[0])
         else:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
                 list(pool.map(solve_parts, groups))
         solved &= np.isfinite(result).all(axis=1) & np.isfinite(slope)
-        force = self._forces(active, result)
         margin = np.where(active, result, -result)
         result = np.maximum(margin, 0.0) / scale
         return StripSolution(
