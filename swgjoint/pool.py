@@ -185,7 +185,7 @@ def _without_interrupts() -> Iterator[None]:
     receive it: it takes effect at the end of the block, because a half-started process
     would print a traceback, too.
     """
-    if os.name != "posix":  # only POSIX systems can block a signal
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
     from multiprocessing import resource_tracker
