@@ -215,7 +215,10 @@ class Follower(ABC, Generic[AnyState]):
                 load = start.torque + part * (torque - start.torque)
                 return self.load(s, load, angle)
 
-            return follow(start, step)
+            # without a change, smaller increments would repeat the failed solve
+            return follow(
+                start, step, halvings=HALVINGS if torque != start.torque else 0
+            )
 
         if torque == 0.0 or self.loads_free_output or not is_free(state):
             direct = loaded(state)

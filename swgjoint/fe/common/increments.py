@@ -15,13 +15,19 @@ HALVINGS = 5
 AnyState = TypeVar("AnyState", bound=StateFigures)
 
 
-def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyState:
+def follow(
+    state: AnyState,
+    step: Callable[[AnyState, float], AnyState],
+    *,
+    halvings: int = HALVINGS,
+) -> AnyState:
     """State after a gradual change, whose increment is halved whenever a solve fails.
 
     Args:
         state: State at the start.
         step: Function that takes a nearby state and a fraction of the change, from 0 to
             1, and returns the state at that fraction.
+        halvings: Largest number of halvings.
 
     Returns:
         State after the whole change or, if the smallest increment fails, the last
@@ -33,7 +39,7 @@ def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyS
         reached = step(current, target)
         if reached.outcome.ok:
             current, done = reached, target
-        elif increment <= 0.5**HALVINGS:
+        elif increment <= 0.5**halvings:
             return replace(current, outcome=reached.outcome, history=reached.history)
         else:
             increment *= 0.5

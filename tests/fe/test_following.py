@@ -1,0 +1,45 @@
+"""Continuation of equilibria, seen by its solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.common.increments import HALVINGS
+from swgjoint.fe.plane.continuation import Continuation
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a continuation reads of a state."""
+
+    torque: float
+    outcome: Outcome = Outcome.CONVERGED
+    history: tuple[float, ...] = ()
+    wave_generator_angle: float = 0.0
+    tooth_force: tuple[float, ...] = (1.0,)
+
+
+@pytest.mark.parametrize(
+    ("torque", "solved"),
+    [(0.0, [0.0]), (1.0, [0.5**k for k in range(HALVINGS + 1)])],
+)
+def test_a_failed_solve_is_not_repeated(torque, solved, monkeypatch):
+    """Smaller changes of the torque are tried, if there is a change."""
+    loads = []
+
+    def fail(self, start, torque, angle):
+        loads.append(torque)
+        return replace(start, outcome=Outcome.ACTIVE_SET_CYCLES)
+
+    monkeypatch.setattr(Continuation, "load", fail)
+    monkeypatch.setattr(Continuation, "_taken_up", lambda self, state, torque: failed)
+    failed = Figures(torque=0.0, outcome=Outcome.SINGULAR)
+    reached = Continuation(model=None, ratio=100.0).to_torque(Figures(0.0), torque)
+    assert np.allclose(loads, solved)
+    assert reached.outcome is (
+        Outcome.SINGULAR if torque else Outcome.ACTIVE_SET_CYCLES
+    )
