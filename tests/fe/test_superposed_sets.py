@@ -180,6 +180,16 @@ def test_features_are_margins_in_steps_up_to_the_cut():
     assert seen.tolist() == [[64, -127, 127, 0]]
 
 
+def test_contacts_close_to_a_change_are_guessed():
+    """Margins of a thousandth of the cut, which features round to zero."""
+    change = np.random.default_rng(6).normal(size=(400, 2))
+    margin = change * [1e-3, 1.0]
+    guess = StateGuess.fit(change, [], margin)
+    assert not guess.features(margin)[:, 0].any()
+    wrong = guess.active(change, []) != (margin > 0.0)
+    assert (wrong.mean(axis=0) < 0.05).all()
+
+
 def test_lines_of_the_strips_touch_the_law_at_usual_forces(monkeypatch):
     """The mean forces of the loaded strips of solved sets, and no set solved for them.
 

@@ -86,7 +86,8 @@ class StateGuess:
         inputs = guess._inputs(gap_change, known).astype(float)
         square = inputs.T @ inputs
         square += RIDGE * square.trace() / len(square) * np.eye(len(square))
-        right = inputs.T @ guess.features(margin)
+        # rounded features have no sign where contacts are close to a change
+        right = inputs.T @ guess._steps(margin)
         coefficients = np.asarray(np.linalg.solve(square, right))
         return replace(guess, coefficients=coefficients)
 
@@ -96,11 +97,7 @@ class StateGuess:
         Args:
             margin: Margins (n_problems, k); NaN if unsolved, which counts as zero.
         """
-        steps = margin[:, self.varied]
-        steps *= STEPS / self.most
-        np.rint(np.clip(steps, -STEPS, STEPS, out=steps), out=steps)
-        steps[np.isnan(steps)] = 0.0
-        return steps.astype(np.int8)
+        return np.rint(self._steps(margin)).astype(np.int8)
 
     def active(self, gap_change: Array, known: Sequence[Features]) -> Mask:
         """Contacts that are likely to be active (n_problems, k).
@@ -116,6 +113,14 @@ class StateGuess:
             inputs = self._inputs(gap_change[part], [one[part] for one in known])
             active[part, self.varied] = inputs @ coefficients > 0.0
         return active
+
+    def _steps(self, margin: Array) -> Array:
+        """The same, not rounded."""
+        steps = margin[:, self.varied]
+        steps *= STEPS / self.most
+        np.clip(steps, -STEPS, STEPS, out=steps)
+        steps[np.isnan(steps)] = 0.0
+        return steps
 
     def _inputs(
         self, gap_change: Array, known: Sequence[Features]
