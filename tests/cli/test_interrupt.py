@@ -20,8 +20,8 @@ import joblib  # takes longer than starting the processes
 from swgjoint.cli.main import INTERRUPTED
 from swgjoint.pool import run_all
 
-print(file=sys.stderr, flush=True)
 try:
+    print(file=sys.stderr, flush=True)
     run_all(time.sleep, [0.1] * 400, jobs=2)
 except KeyboardInterrupt:
     sys.exit(INTERRUPTED)
