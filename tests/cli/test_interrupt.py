@@ -14,6 +14,8 @@ from solved import few_teeth
 
 from swgjoint.cli.main import INTERRUPTED
 
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs process groups")
+
 POOL = """
 import sys, time
 import joblib  # takes longer than starting the processes

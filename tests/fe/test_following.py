@@ -10,6 +10,8 @@ import pytest
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.increments import HALVINGS
 from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import sector_model
+from swgjoint.gear.design.design import Design
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,13 @@ def test_a_failed_solve_is_not_repeated(torque, solved, monkeypatch):
     assert reached.outcome is (
         Outcome.SINGULAR if torque else Outcome.ACTIVE_SET_CYCLES
     )
+
+
+@pytest.mark.fe
+def test_a_reversed_torque_finds_the_flanks_of_the_other_side():
+    """They are farther away than the flanks that a start at its own torque needs."""
+    design = Design.load("size-14-50").with_changes({"mesh.refinement": 0.5})
+    model = sector_model(design, half="auto")
+    follow = Continuation(model=model, ratio=design.ratio)
+    loaded = follow.to_torque(follow.engage(follow.deflect()), 60.0)
+    assert follow.load(loaded, -20.0, 0.0).outcome.ok

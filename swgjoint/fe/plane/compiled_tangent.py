@@ -128,6 +128,7 @@ class CompiledBore:
 
 
 _bores: WeakKeyDictionary[BoreStations, CompiledBore] = WeakKeyDictionary()
+"""Loops of the stations of a model, which all its equilibria use."""
 
 
 def add_blocks(blocks: Array, into: Index, matrices: Array) -> None:

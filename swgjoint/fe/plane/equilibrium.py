@@ -234,7 +234,6 @@ def _advance(
         wrong = np.where(state.touching, after, -after)
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
-    on_flanks = force * lines.weight, force * lines.circular_spline_weight
     friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
     # a sector stores its first face and its bore nodes; its last face is stored as the
     # first face of the next one
@@ -252,9 +251,11 @@ def _advance(
         race=race,
         pressure=np.where(state.touching, push, 0.0),
         touching=state.touching ^ bad,
-        flank_force=_sum_by(lines.sector, on_flanks[0], model.sectors),
+        flank_force=_sum_by(lines.sector, force * lines.weight, model.sectors),
         circular_spline_force=_sum_by(
-            lines.tooth, on_flanks[1], model.circular_spline_teeth
+            lines.tooth,
+            force * lines.circular_spline_weight,
+            model.circular_spline_teeth,
         ),
         contacts=step.contacts.chosen(step.active),
         tooth_force=step.line_force[step.active],
