@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +121,9 @@ def _file(tab: str, name: str) -> FileResponse:
 
 
 def _end(*_: Any) -> None:
+    # asyncio.wait_for of Python 3.11 loses a cancellation that comes when its wait
+    # ends; NiceGUI then reports a task that goes on, and cancels it again
+    logging.getLogger("nicegui").setLevel(logging.CRITICAL)
     for session in SESSIONS.values():
         session.close()
     end_viewer()
