@@ -27,33 +27,9 @@ SWGJOINT_INLINE double product(const double* x, const double* y, std::size_t n) 
 }
 
 constexpr std::size_t kPanel = 8;  // columns that are eliminated at once
-constexpr std::size_t kRows = 6;   // rows of a tile that stays in registers
+constexpr std::size_t kTile = 6;   // rows of a tile that stays in registers
 constexpr std::size_t kSmall = 4000;  // numbers of a matrix that is not divided in panels
 
-// Eight numbers, which compilers with vector types keep in one or more registers.
-#if defined(__GNUC__)
-typedef double Lanes __attribute__((vector_size(64), aligned(8), may_alias));
-SWGJOINT_INLINE void invert(Lanes* x) { *x = 1.0 / *x; }
-#else
-struct Lanes {
-  double v[8];
-  Lanes& operator-=(const Lanes& other) {
-    for (int k = 0; k < 8; ++k) v[k] -= other.v[k];
-    return *this;
-  }
-};
-inline Lanes operator*(double a, Lanes x) {
-  for (int k = 0; k < 8; ++k) x.v[k] *= a;
-  return x;
-}
-inline Lanes operator*(const Lanes& a, Lanes x) {
-  for (int k = 0; k < 8; ++k) x.v[k] *= a.v[k];
-  return x;
-}
-inline void invert(Lanes* x) {
-  for (int k = 0; k < 8; ++k) x->v[k] = 1.0 / x->v[k];
-}
-#endif
 // Rows from end on, less the multiples of the kPanel rows from first = end - kPanel on.
 SWGJOINT_WIDE void subtract_panel(double* matrix, std::size_t rows, std::size_t width,
                                   std::size_t stride, std::size_t end) {
@@ -64,18 +40,18 @@ SWGJOINT_WIDE void subtract_panel(double* matrix, std::size_t rows, std::size_t 
       upper[c] = *reinterpret_cast<const Lanes*>(matrix + (first + c) * stride + k);
     }
     std::size_t i = end;
-    for (; i + kRows <= rows; i += kRows) {
+    for (; i + kTile <= rows; i += kTile) {
       double* row = matrix + i * stride;
-      Lanes tile[kRows];
-      for (std::size_t r = 0; r < kRows; ++r) {
+      Lanes tile[kTile];
+      for (std::size_t r = 0; r < kTile; ++r) {
         tile[r] = *reinterpret_cast<const Lanes*>(row + r * stride + k);
       }
       for (std::size_t c = 0; c < kPanel; ++c) {
-        for (std::size_t r = 0; r < kRows; ++r) {
+        for (std::size_t r = 0; r < kTile; ++r) {
           tile[r] -= row[r * stride + first + c] * upper[c];
         }
       }
-      for (std::size_t r = 0; r < kRows; ++r) {
+      for (std::size_t r = 0; r < kTile; ++r) {
         *reinterpret_cast<Lanes*>(row + r * stride + k) = tile[r];
       }
     }
@@ -228,17 +204,17 @@ SWGJOINT_WIDE void subtract_product(double* c, const double* a, const double* b,
                                     std::size_t width, std::size_t stride) {
   for (std::size_t k = 0; k < width; k += kLanes) {
     std::size_t r = 0;
-    for (; r + kRows <= count; r += kRows) {
+    for (; r + kTile <= count; r += kTile) {
       const double* left = a + r * inner;
-      Lanes tile[kRows];
-      for (std::size_t t = 0; t < kRows; ++t) {
+      Lanes tile[kTile];
+      for (std::size_t t = 0; t < kTile; ++t) {
         tile[t] = *reinterpret_cast<const Lanes*>(c + (r + t) * stride + k);
       }
       for (std::size_t i = 0; i < inner; ++i) {
         const Lanes row = *reinterpret_cast<const Lanes*>(b + i * stride + k);
-        for (std::size_t t = 0; t < kRows; ++t) tile[t] -= left[t * inner + i] * row;
+        for (std::size_t t = 0; t < kTile; ++t) tile[t] -= left[t * inner + i] * row;
       }
-      for (std::size_t t = 0; t < kRows; ++t) {
+      for (std::size_t t = 0; t < kTile; ++t) {
         *reinterpret_cast<Lanes*>(c + (r + t) * stride + k) = tile[t];
       }
     }

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "eight_lanes.h"
+
 namespace swgjoint {
 
 // y += a[0] x[0] + a[1] x[1] + ..., one product after another; the arrays have n numbers.
@@ -20,9 +22,6 @@ void add_products(double* y, double sign, const double* rows, std::size_t count,
 
 // c -= a b for matrices c (count, width), a (count, inner) and b (inner, width). Rows of
 // c and b begin stride numbers after the one before; width is a multiple of kLanes.
-constexpr std::size_t kLanes = 8;
-// n rounded up to a multiple of kLanes
-inline std::size_t padded(std::size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
 void subtract_product(double* c, const double* a, const double* b, std::size_t count,
                       std::size_t inner, std::size_t width, std::size_t stride);
 

@@ -179,7 +179,7 @@ class RingFactor {
     ring_.solve(loads.data(), loads.shape(2));
   }
 
-  void condense(In<3> loads, Index sector, In<2> rows, Out<2> result) const {
+  void condense(In<3> loads, Index sector, In<2> rows, Out<2> result) {
     const std::size_t d = loads.shape(2), k = rows.shape(0);
     require(loads.shape(0) == ring_.sectors() && loads.shape(1) == ring_.size(),
             "loads: (sectors, n, d)");
@@ -188,7 +188,8 @@ class RingFactor {
             "result: (d + k, d + k)");
     check(sector);
     const nb::gil_scoped_release release;
-    ring_.condense(loads.data(), d, sector.data(), rows.data(), k, result.data());
+    ring_.reduce(loads.data(), d, sector.data(), rows.data(), k, &reduced_);
+    ring_.products(reduced_, result.data());
   }
 
   // Contact forces and increment of one Newton step: the condensed system of the loads
@@ -197,7 +198,7 @@ class RingFactor {
   // set is found.
   double solve_contacts(In<3> loads, Index sector, In<2> rows, In<1> gap, In<1> arm,
                         In<2> compliance, In<1> numbers, bool turns, bool held,
-                        MaskOut active, Out<1> result, Out<3> increment) const {
+                        MaskOut active, Out<1> result, Out<3> increment) {
     const std::size_t k = rows.shape(0), n = ring_.size();
     require(loads.shape(0) == ring_.sectors() && loads.shape(1) == n &&
                 loads.shape(2) == 3,
@@ -217,23 +218,17 @@ class RingFactor {
                                      held};
     const nb::gil_scoped_release release;
     std::vector<double> products((k + 3) * (k + 3));
-    ring_.condense(loads.data(), 3, sector.data(), rows.data(), k, products.data());
+    ring_.reduce(loads.data(), 3, sector.data(), rows.data(), k, &reduced_);
+    ring_.products(reduced_, products.data());
     double output = 0.0;
     double* z = result.data();
     if (!swgjoint::solve_contact_step(step, products.data(), active.data(), z, &output)) {
       return std::numeric_limits<double>::quiet_NaN();
     }
-    // the loads of the solution together
-    double* load = increment.data();
-    const double* each = loads.data();
-    for (std::size_t i = 0; i < ring_.sectors() * n; ++i, each += 3) {
-      load[i] = each[0] + z[k] * each[1] + z[k + 2] * each[2];
-    }
-    for (std::size_t i = 0; i < k; ++i) {
-      double* own = load + n * static_cast<std::size_t>(sector.data()[i]);
-      for (std::size_t j = 0; j < n; ++j) own[j] += z[i] * rows.data()[n * i + j];
-    }
-    ring_.solve(load, 1);
+    // the loads on all sectors, then those of the teeth
+    std::vector<double> factors = {1.0, z[k], z[k + 2]};
+    factors.insert(factors.end(), z, z + k);
+    ring_.solve(reduced_, factors.data(), increment.data());
     return output;
   }
 
@@ -252,6 +247,7 @@ class RingFactor {
   }
 
   swgjoint::RingFactor ring_;
+  swgjoint::ReducedLoads reduced_;  // of the call before
 };
 
 }  // namespace

@@ -1,216 +1,141 @@
 #include "ring_factor.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
+#include "eight_lanes.h"
 #include "wide.h"
 
 namespace swgjoint {
 
 namespace {
 
-// Subtracts from rows begin to end - 1 of an upper triangle the products of `panel`
-// eliminated rows.
-template <int panel>
-SWGJOINT_INLINE void subtract(double* matrix, std::size_t size, std::size_t pivot, std::size_t begin) {
-  const double* source[panel];
-  for (int k = 0; k < panel; ++k) source[k] = matrix + (pivot + k) * size;
-  for (std::size_t i = begin; i < size; ++i) {
-    double* row = matrix + i * size;
-    double factor[panel];
-    for (int k = 0; k < panel; ++k) factor[k] = source[k][i];
-    for (std::size_t j = i; j < size; ++j) {
-      double value = row[j];
-      for (int k = 0; k < panel; ++k) value -= factor[k] * source[k][j];
-      row[j] = value;
-    }
-  }
-}
-
-// Scales the pivot row; false if the pivot is not positive.
-SWGJOINT_INLINE bool scale(double* matrix, std::size_t size, std::size_t pivot) {
-  double* row = matrix + pivot * size;
-  if (!(row[pivot] > 0.0)) return false;
-  const double inverse = 1.0 / std::sqrt(row[pivot]);
-  row[pivot] = inverse;
-  for (std::size_t j = pivot + 1; j < size; ++j) row[j] *= inverse;
-  return true;
-}
-
-// Partial Cholesky factorisation of the upper triangle of a matrix, in place.
-SWGJOINT_WIDE bool factorise(double* matrix, std::size_t size, std::size_t pivots) {
-  constexpr int panel = 4;
-  std::size_t pivot = 0;
-  for (; pivot + panel <= pivots; pivot += panel) {
-    for (std::size_t k = pivot; k < pivot + panel; ++k) {
-      if (!scale(matrix, size, k)) return false;
-      // only the rest of the panel; the other rows follow at once
-      for (std::size_t i = k + 1; i < pivot + panel; ++i) {
-        const double factor = matrix[k * size + i];
-        const double* source = matrix + k * size;
-        double* row = matrix + i * size;
-        for (std::size_t j = i; j < size; ++j) row[j] -= factor * source[j];
-      }
-    }
-    subtract<panel>(matrix, size, pivot, pivot + panel);
-  }
-  for (; pivot < pivots; ++pivot) {
-    if (!scale(matrix, size, pivot)) return false;
-    subtract<1>(matrix, size, pivot, pivot + 1);
-  }
-  return true;
-}
-
-// Elimination of loads, in place: `width` columns of `size` unknowns.
-SWGJOINT_WIDE void forward(const double* matrix, std::size_t size, std::size_t pivots,
-                           double* columns, std::size_t width) {
-  constexpr std::size_t panel = 4;
-  for (std::size_t c = 0; c < width; ++c, columns += size) {
-    double* __restrict x = columns;
-    std::size_t pivot = 0;
-    for (; pivot + panel <= pivots; pivot += panel) {
-      const double *one = matrix + pivot * size, *two = one + size, *three = two + size,
-                   *four = three + size;
-      const double *rows[panel] = {one, two, three, four};
-      for (std::size_t k = 0; k < panel; ++k) {
-        const double own = x[pivot + k] *= rows[k][pivot + k];
-        for (std::size_t j = k + 1; j < panel; ++j) {
-          x[pivot + j] -= rows[k][pivot + j] * own;
-        }
-      }
-      const double a = x[pivot], b = x[pivot + 1], d = x[pivot + 2], e = x[pivot + 3];
-      for (std::size_t j = pivot + panel; j < size; ++j) {
-        x[j] = (((x[j] - one[j] * a) - two[j] * b) - three[j] * d) - four[j] * e;
-      }
-    }
-    for (; pivot < pivots; ++pivot) {
-      const double* row = matrix + pivot * size;
-      const double own = x[pivot] *= row[pivot];
-      for (std::size_t j = pivot + 1; j < size; ++j) x[j] -= row[j] * own;
-    }
-  }
-}
-
-// Substitution of eliminated unknowns (size,), in place.
-SWGJOINT_WIDE void backward(const double* matrix, std::size_t size, std::size_t pivots,
-                            double* values) {
-  for (std::size_t k = pivots; k-- > 0;) {
-    const double* row = matrix + k * size;
-    const double sum = sum_of_products(row + k + 1, values + k + 1, size - k - 1);
-    values[k] = (values[k] - sum) * row[k];
-  }
-}
-
-// Adds the products of all pairs of `width` columns, over their first `count` entries, to
-// the upper triangle of a matrix (total, total): the first d columns are those of the
-// matrix, the others follow after `start` more.
-SWGJOINT_WIDE void add_products(const double* columns, std::size_t size,
-                                std::size_t count, std::size_t d, std::size_t width,
-                                std::size_t start, std::size_t total, double* sum) {
-  const auto place = [&](std::size_t a) { return a < d ? a : a + start; };
-  for (std::size_t a = 0; a < width; ++a) {
-    for (std::size_t b = a; b < width; ++b) {
-      sum[place(a) * total + place(b)] +=
-          sum_of_products(columns + a * size, columns + b * size, count);
-    }
-  }
-}
-
 void add_to(double* sum, const double* values, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) sum[i] += values[i];
 }
 
+// Short rows: a call of memcpy takes longer than the copy.
+SWGJOINT_INLINE double* copy_row(const double* from, std::size_t count, double* to) {
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    lanes_at(to + i) = lanes_at(from + i);
+  }
+  for (; i + 2 <= count; i += 2) std::memcpy(to + i, from + i, 2 * sizeof(double));
+  if (i < count) to[i] = from[i];
+  return to + count;
+}
+
+// Zeros in the columns from begin to end.
+void clear(double* rows, std::size_t count, std::size_t stride, std::size_t begin,
+           std::size_t end) {
+  for (std::size_t i = 0; i < count; ++i) {
+    std::fill(rows + i * stride + begin, rows + i * stride + end, 0.0);
+  }
+}
+
 }  // namespace
+
+bool ReducedLoads::holds(const std::int64_t* others, const double* their_rows,
+                         std::size_t count, std::size_t n, std::size_t all) const {
+  return values != nullptr && count == k && all * n == loads.size() &&
+         std::equal(sector.begin(), sector.end(), others) &&
+         std::equal(rows.begin(), rows.end(), their_rows);
+}
 
 RingFactor::RingFactor(std::size_t sectors, std::size_t size, std::size_t face)
     : sectors_(sectors), size_(size), face_(face), inner_(size - 2 * face) {
-  parts_.reserve(2 * sectors);
-  for (std::size_t s = 0; s < sectors; ++s) {
-    parts_.push_back({s, s + 1, inner_, size, -1, -1, nullptr});
+  parts_.resize(sectors);
+  const std::int64_t top = add(0, sectors, false);
+  const PartialCholesky ring = {face, 0, padded(face), 0, nullptr, nullptr};
+  parts_.push_back({0, sectors, top, -1, false, ring});
+  order_.push_back(parts_.size() - 1);
+  changed_.assign(parts_.size(), 1);
+  std::size_t total = kLanes;
+  for (const Part& part : parts_) {
+    total += part.matrix.pivots * part.matrix.stride;
+    total += part.matrix.rest * part.matrix.rest_stride;
   }
-  const std::int64_t top = add(0, sectors);
-  parts_.push_back({0, sectors, face, face, top, -1, nullptr});
-  std::size_t total = 0;
-  for (const Part& part : parts_) total += part.size * part.size;
-  // not cleared: only the upper triangles are used, and they are always filled
-  memory_.reset(new double[total]);
-  double* matrix = memory_.get();
-  for (Part& part : parts_) {
-    part.matrix = matrix;
-    matrix += part.size * part.size;
+  memory_.reset(new double[total + kLanes]);
+  double* next = memory_.get();
+  while (reinterpret_cast<std::uintptr_t>(next) % (kLanes * sizeof(double))) ++next;
+  for (const std::size_t i : order_) {
+    PartialCholesky& matrix = parts_[i].matrix;
+    matrix.factor = next;
+    matrix.schur = next += matrix.pivots * matrix.stride;
+    next += matrix.rest * matrix.rest_stride;
+    // what means nothing is computed with the rest: no slow denormal numbers there
+    const std::size_t size = matrix.pivots + matrix.rest;
+    clear(matrix.factor, matrix.pivots, matrix.stride, size, matrix.stride);
+    clear(matrix.schur, matrix.rest, matrix.rest_stride, matrix.rest, matrix.rest_stride);
+    clear(matrix.schur + matrix.rest / 2 * matrix.rest_stride, matrix.rest / 2,
+          matrix.rest_stride, face / kLanes * kLanes, face);
   }
 }
 
 // Adds the merges of a range of sectors; number of the part that covers it.
-std::int64_t RingFactor::add(std::size_t first, std::size_t last) {
-  if (last - first == 1) return static_cast<std::int64_t>(first);
+std::int64_t RingFactor::add(std::size_t first, std::size_t last, bool turned) {
+  const std::size_t rest = 2 * face_;
+  PartialCholesky matrix = {inner_, rest, padded(size_), padded(rest), nullptr, nullptr};
+  if (last - first == 1) {
+    parts_[first] = {first, last, -1, -1, turned, matrix};
+    order_.push_back(first);
+    return static_cast<std::int64_t>(first);
+  }
+  matrix.pivots = face_;
+  matrix.stride = padded(face_ + rest);
   const std::size_t middle = first + (last - first) / 2;
-  const std::int64_t left = add(first, middle), right = add(middle, last);
-  parts_.push_back({first, last, face_, 3 * face_, left, right, nullptr});
+  const std::int64_t left = add(first, middle, true), right = add(middle, last, false);
+  parts_.push_back({first, last, left, right, turned, matrix});
+  order_.push_back(parts_.size() - 1);
   return static_cast<std::int64_t>(parts_.size()) - 1;
 }
 
-bool RingFactor::eliminate(Part& part) const {
-  return factorise(part.matrix, part.size, part.pivots);
-}
-
-// Upper triangle of a sector's block, interior unknowns first.
-void RingFactor::gather(Part& part, const double* block) const {
+// Matrix of a sector from its block.
+SWGJOINT_WIDE void RingFactor::gather(const Part& part, const double* block) const {
+  const PartialCholesky& matrix = part.matrix;
   const std::size_t n = size_, f = face_, m = inner_;
-  double* to = part.matrix;
-  for (std::size_t i = 0; i < m; ++i, to += n) {
+  const std::size_t near = part.turned ? f + m : 0, far = part.turned ? 0 : f + m;
+  for (std::size_t i = 0; i < m; ++i) {
     const double* row = block + (f + i) * n;
-    std::copy(row + f + i, row + f + m, to + i);
-    std::copy(row, row + f, to + m);
-    std::copy(row + f + m, row + n, to + m + f);
+    double* to = matrix.factor + i * matrix.stride;
+    copy_row(row + far, f, copy_row(row + near, f, copy_row(row + f, m, to)));
   }
-  for (std::size_t i = 0; i < f; ++i, to += n) {
-    const double* row = block + i * n;
-    std::copy(row + i, row + f, to + m + i);
-    std::copy(row + f + m, row + n, to + m + f);
-  }
-  for (std::size_t i = 0; i < f; ++i, to += n) {
-    const double* row = block + (f + m + i) * n;
-    std::copy(row + f + m + i, row + n, to + m + f + i);
+  for (std::size_t i = 0; i < f; ++i) {
+    const double* row = block + (near + i) * n;
+    double* to = matrix.schur + i * matrix.rest_stride;
+    copy_row(row + far, f, copy_row(row + near, f, to));
+    copy_row(block + (far + i) * n + far, f, to + f * (matrix.rest_stride + 1));
   }
 }
 
-// Matrix of two neighbouring parts, the face between them first.
-void RingFactor::merge(Part& part) const {
-  const Part &left = parts_[part.left], &right = parts_[part.right];
-  const std::size_t f = face_, size = part.size;
-  const std::size_t nl = left.size, nr = right.size, pl = left.pivots, pr = right.pivots;
-  const double *l = left.matrix, *r = right.matrix;
-  double* to = part.matrix;
+// Matrix of two neighbouring parts, which eliminates the face between them.
+SWGJOINT_WIDE void RingFactor::merge(const Part& part) const {
+  const PartialCholesky &matrix = part.matrix, &left = parts_[part.left].matrix,
+                        &right = parts_[part.right].matrix;
+  const PartialCholesky &near = part.turned ? right : left,
+                        &far = part.turned ? left : right;
+  const std::size_t f = face_;
   for (std::size_t i = 0; i < f; ++i) {
-    double* middle = to + i * size;
-    double* first = to + (f + i) * size;
-    double* last = to + (2 * f + i) * size;
-    for (std::size_t j = i; j < f; ++j) {
-      middle[j] = l[(pl + f + i) * nl + pl + f + j] + r[(pr + i) * nr + pr + j];
-      first[f + j] = l[(pl + i) * nl + pl + j];
-      last[2 * f + j] = r[(pr + f + i) * nr + pr + f + j];
-    }
-    for (std::size_t j = 0; j < f; ++j) {
-      middle[f + j] = l[(pl + j) * nl + pl + f + i];
-      middle[2 * f + j] = r[(pr + i) * nr + pr + f + j];
-      first[2 * f + j] = 0.0;
-    }
+    const std::size_t at = i * near.rest_stride, below = at + f * (near.rest_stride + 1);
+    double* to = matrix.factor + i * matrix.stride;
+    for (std::size_t j = 0; j < f; ++j) to[j] = near.schur[at + j] + far.schur[at + j];
+    copy_row(far.schur + at + f, f, copy_row(near.schur + at + f, f, to + f));
+    double* rest = matrix.schur + i * matrix.rest_stride;
+    copy_row(near.schur + below, f, rest);
+    for (std::size_t j = 0; j < f; ++j) rest[f + j] = 0.0;
+    copy_row(far.schur + below, f, rest + f * (matrix.rest_stride + 1));
   }
 }
 
 // Matrix of the only face that is left when the ring is closed.
-void RingFactor::close() {
-  Part& ring = parts_.back();
-  const Part& top = parts_[ring.left];
-  const std::size_t f = face_, n = top.size, p = top.pivots;
-  const double* from = top.matrix;
+void RingFactor::close(const Part& ring) const {
+  const PartialCholesky& top = parts_[ring.left].matrix;
+  const std::size_t f = face_, n = top.rest_stride;
   for (std::size_t i = 0; i < f; ++i) {
     for (std::size_t j = i; j < f; ++j) {
-      ring.matrix[i * f + j] =
-          from[(p + i) * n + p + j] + from[(p + f + i) * n + p + f + j] +
-          from[(p + i) * n + p + f + j] + from[(p + j) * n + p + f + i];
+      ring.matrix.factor[i * ring.matrix.stride + j] =
+          top.schur[i * n + j] + top.schur[(f + i) * n + f + j] +
+          top.schur[i * n + f + j] + top.schur[j * n + f + i];
     }
   }
 }
@@ -219,148 +144,256 @@ bool RingFactor::update(const double* blocks, const std::int64_t* changed,
                         std::size_t count) {
   std::vector<char> stale(parts_.size(), 0);
   for (std::size_t i = 0; i < count; ++i) stale[changed[i]] = 1;
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    Part& part = parts_[i];
+  for (const std::size_t i : order_) {
+    const Part& part = parts_[i];
+    if (i >= sectors_) {
+      stale[i] = stale[part.left] || (part.right >= 0 && stale[part.right]);
+    }
+    if (!stale[i]) continue;
+    changed_[i] = 1;
     if (i < sectors_) {
-      if (!stale[i]) continue;
       gather(part, blocks + i * size_ * size_);
     } else if (part.right >= 0) {
-      if (!stale[part.left] && !stale[part.right]) continue;
-      stale[i] = 1;
       merge(part);
     } else {
-      if (!stale[part.left]) continue;
-      close();
+      close(part);
     }
-    if (!eliminate(part)) return false;
+    if (!eliminate_first(part.matrix)) return false;
   }
   return true;
 }
 
-// Load of one sector (n,), with entries `apart` from each other, interior unknowns first.
-void RingFactor::place(const double* load, std::size_t apart, double* to) const {
-  const std::size_t f = face_, m = inner_;
-  for (std::size_t j = 0; j < f; ++j) to[m + j] = load[j * apart];
-  for (std::size_t j = 0; j < m; ++j) to[j] = load[(f + j) * apart];
-  for (std::size_t j = m + f; j < size_; ++j) to[j] = load[j * apart];
+// Place of an unknown of a sector in its matrix.
+std::size_t RingFactor::place(const Part& part, std::size_t row) const {
+  if (row >= face_ && row < face_ + inner_) return row - face_;
+  const bool last = row >= face_;
+  const std::size_t in_face = last ? row - face_ - inner_ : row;
+  return inner_ + (last == part.turned ? 0 : face_) + in_face;
+}
+
+// Values at the faces of the two parts of a merge, or of the only part of the ring, from
+// those of the whole, in rows of `width` numbers.
+void RingFactor::spread(const Part& part, const double* own, std::size_t width,
+                        double* left, double* right) const {
+  const std::size_t block = face_ * width;
+  if (part.right < 0) {
+    std::copy_n(own, block, left);
+    std::copy_n(own, block, left + block);
+    return;
+  }
+  std::copy_n(own, block, left);
+  std::copy_n(own, block, right);
+  std::copy_n(own + block, block, (part.turned ? right : left) + block);
+  std::copy_n(own + 2 * block, block, (part.turned ? left : right) + block);
 }
 
 void RingFactor::solve(double* loads, std::size_t width) const {
-  const std::size_t n = size_, f = face_, m = inner_;
+  const std::size_t n = size_, block = face_ * kLanes;
   std::vector<std::size_t> begin(parts_.size() + 1, 0);
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    begin[i + 1] = begin[i] + parts_[i].size;
+    begin[i + 1] = begin[i] + (parts_[i].matrix.pivots + parts_[i].matrix.rest) * kLanes;
   }
   std::vector<double> values(begin.back());
   // values of a part at its two faces
   const auto faces = [&](std::int64_t i) {
-    return values.data() + begin[i] + parts_[i].pivots;
+    return i < 0 ? nullptr : values.data() + begin[i] + parts_[i].matrix.pivots * kLanes;
   };
-  for (std::size_t c = 0; c < width; ++c, ++loads) {
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
+  for (std::size_t c = 0; c < width; c += kLanes) {
+    const std::size_t count = std::min(kLanes, width - c);
+    std::fill(values.begin(), values.end(), 0.0);
+    for (const std::size_t i : order_) {
       const Part& part = parts_[i];
       double* own = values.data() + begin[i];
       if (i < sectors_) {
-        place(loads + i * n * width, width, own);
-      } else {
-        const double* left = faces(part.left);
-        if (part.right >= 0) {
-          const double* right = faces(part.right);
-          std::copy(left + f, left + 2 * f, own);
-          add_to(own, right, f);
-          std::copy(left, left + f, own + f);
-          std::copy(right + f, right + 2 * f, own + 2 * f);
-        } else {
-          std::copy(left, left + f, own);
-          add_to(own, left + f, f);
+        const double* from = loads + i * n * width + c;
+        for (std::size_t j = 0; j < n; ++j) {
+          std::copy_n(from + j * width, count, own + place(part, j) * kLanes);
         }
+      } else if (part.right >= 0) {
+        const double *left = faces(part.left), *right = faces(part.right);
+        add_to(own, left, block);
+        add_to(own, right, block);
+        add_to(own + block, (part.turned ? right : left) + block, block);
+        add_to(own + 2 * block, (part.turned ? left : right) + block, block);
+      } else {
+        add_to(own, faces(part.left), block);
+        add_to(own, faces(part.left) + block, block);
       }
-      forward(part.matrix, part.size, part.pivots, own, 1);
+      forward(part.matrix, own, kLanes);
     }
-    for (std::size_t i = parts_.size(); i-- > 0;) {
+    for (std::size_t k = order_.size(); k-- > 0;) {
+      const std::size_t i = order_[k];
       const Part& part = parts_[i];
       double* own = values.data() + begin[i];
-      backward(part.matrix, part.size, part.pivots, own);
-      if (i < sectors_) {
-        double* to = loads + i * n * width;
-        for (std::size_t j = 0; j < f; ++j) to[j * width] = own[m + j];
-        for (std::size_t j = 0; j < m; ++j) to[(f + j) * width] = own[j];
-        for (std::size_t j = m + f; j < n; ++j) to[j * width] = own[j];
+      backward(part.matrix, own, kLanes);
+      if (i >= sectors_) {
+        spread(part, own, kLanes, faces(part.left), faces(part.right));
         continue;
       }
-      double* left = faces(part.left);
-      if (part.right >= 0) {
-        double* right = faces(part.right);
-        std::copy(own + f, own + 2 * f, left);
-        std::copy(own, own + f, left + f);
-        std::copy(own, own + f, right);
-        std::copy(own + 2 * f, own + 3 * f, right + f);
-      } else {
-        std::copy(own, own + f, left);
-        std::copy(own, own + f, left + f);
+      double* to = loads + i * n * width + c;
+      for (std::size_t j = 0; j < n; ++j) {
+        std::copy_n(own + place(part, j) * kLanes, count, to + j * width);
       }
     }
   }
 }
 
-void RingFactor::condense(const double* loads, std::size_t d,
-                          const std::int64_t* sector, const double* rows,
-                          std::size_t k, double* result) const {
-  const std::size_t n = size_, f = face_, total = d + k;
-  // columns of a part: the loads on all sectors, then the rows on its own sectors
-  std::vector<std::size_t> order(k), begin(sectors_ + 1, 0);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return sector[a] < sector[b];
-  });
-  for (std::size_t i = 0; i < k; ++i) ++begin[sector[i] + 1];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  const auto width_of = [&](const Part& part) {
-    return d + begin[part.last] - begin[part.first];
-  };
-  std::vector<std::size_t> at(parts_.size() + 1, 0);
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    at[i + 1] = at[i] + parts_[i].size * width_of(parts_[i]);
+void RingFactor::reduce(const double* loads, std::size_t d, const std::int64_t* sector,
+                        const double* rows, std::size_t k, ReducedLoads* reduced) {
+  const std::size_t n = size_, f = face_, each = n * d;
+  std::vector<char> stale(parts_.size(), 1);
+  if (reduced->holds(sector, rows, k, n, d * sectors_)) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      stale[i] = changed_[i];
+      if (i < sectors_) {
+        const double* before = reduced->loads.data() + i * each;
+        stale[i] |= !std::equal(before, before + each, loads + i * each);
+      }
+    }
+  } else {
+    arrange(sector, rows, k, d, reduced);
   }
-  std::vector<double> gram(total * total, 0.0), values(at.back(), 0.0);
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
+  reduced->loads.assign(loads, loads + sectors_ * each);
+  std::fill(changed_.begin(), changed_.end(), 0);
+  const auto &order = reduced->order, &begin = reduced->begin;
+  for (const std::size_t i : order_) {
     const Part& part = parts_[i];
-    const std::size_t start = begin[part.first], width = width_of(part);
-    double* own = values.data() + at[i];
+    if (part.left >= 0) stale[i] |= stale[part.left];
+    if (part.right >= 0) stale[i] |= stale[part.right];
+    if (!stale[i]) continue;
+    const std::size_t start = begin[part.first], count = width_of(*reduced, part);
+    const std::size_t width = padded(count);
+    double* own = reduced->values.get() + reduced->at[i];
+    std::fill(own, reduced->values.get() + reduced->at[i + 1], 0.0);
     if (i < sectors_) {
-      for (std::size_t c = 0; c < d; ++c) place(loads + i * n * d + c, d, own + c * n);
-      for (std::size_t c = d; c < width; ++c) {
-        place(rows + order[start + c - d] * n, 1, own + c * n);
+      const double* from = loads + i * each;
+      for (std::size_t j = 0; j < n; ++j) {
+        double* to = own + place(part, j) * width;
+        for (std::size_t c = 0; c < d; ++c) to[c] = from[j * d + c];
+      }
+      for (std::size_t c = d; c < count; ++c) {
+        const double* row = rows + order[start + c - d] * n;
+        for (std::size_t j = 0; j < n; ++j) own[place(part, j) * width + c] = row[j];
       }
     } else {
-      // loads of a child on its faces, at given rows of the part
-      const auto take = [&](std::int64_t child, std::size_t first, std::size_t last) {
+      // loads of a child on its near face, and on the far one at a given row
+      const auto take = [&](std::int64_t child, std::size_t far) {
         const Part& from = parts_[child];
-        const std::size_t before = begin[from.first] - start, count = width_of(from);
-        for (std::size_t c = 0; c < count; ++c) {
-          const double* faces = values.data() + at[child] + c * from.size + from.pivots;
-          double* to = own + (c < d ? c : c + before) * part.size;
-          add_to(to + first, faces, f);
-          add_to(to + last, faces + f, f);
+        const std::size_t some = width_of(*reduced, from), apart = padded(some);
+        const std::size_t before = begin[from.first] - start;
+        const double* faces =
+            reduced->values.get() + reduced->at[child] + from.matrix.pivots * apart;
+        for (std::size_t j = 0; j < 2 * f; ++j, faces += apart) {
+          double* to = own + (j < f ? j : far + j - f) * width;
+          add_to(to, faces, d);
+          add_to(to + d + before, faces + d, some - d);
         }
       };
       if (part.right >= 0) {
-        take(part.left, f, 0);
-        take(part.right, 0, 2 * f);
+        take(part.left, part.turned ? 2 * f : f);
+        take(part.right, part.turned ? f : 2 * f);
       } else {
-        take(part.left, 0, 0);
+        take(part.left, 0);
       }
     }
-    forward(part.matrix, part.size, part.pivots, own, width);
-    add_products(own, part.size, part.pivots, d, width, start, total, gram.data());
+    forward(part.matrix, own, width);
   }
-  const auto number = [&](std::size_t a) { return a < d ? a : d + order[a - d]; };
-  for (std::size_t a = 0; a < total; ++a) {
-    for (std::size_t b = a; b < total; ++b) {
-      const std::size_t i = number(a), j = number(b);
-      result[i * total + j] = result[j * total + i] = gram[a * total + b];
+}
+
+// Order of loads by sector, and room for the values of all parts.
+void RingFactor::arrange(const std::int64_t* sector, const double* rows, std::size_t k,
+                         std::size_t d, ReducedLoads* reduced) const {
+  reduced->d = d;
+  reduced->k = k;
+  reduced->sector.assign(sector, sector + k);
+  reduced->rows.assign(rows, rows + k * size_);
+  reduced->order.resize(k);
+  std::iota(reduced->order.begin(), reduced->order.end(), 0);
+  std::stable_sort(
+      reduced->order.begin(), reduced->order.end(),
+      [&](std::size_t a, std::size_t b) { return sector[a] < sector[b]; });
+  reduced->begin.assign(sectors_ + 1, 0);
+  for (std::size_t i = 0; i < k; ++i) ++reduced->begin[sector[i] + 1];
+  std::partial_sum(reduced->begin.begin(), reduced->begin.end(), reduced->begin.begin());
+  reduced->at.assign(1, 0);
+  for (const Part& part : parts_) {
+    const std::size_t size = part.matrix.pivots + part.matrix.rest;
+    reduced->at.push_back(reduced->at.back() + size * padded(width_of(*reduced, part)));
+  }
+  reduced->values.reset(new double[reduced->at.back()]);
+}
+
+void RingFactor::products(const ReducedLoads& reduced, double* result) const {
+  const std::size_t d = reduced.d, total = d + reduced.k;
+  std::fill_n(result, total * total, 0.0);
+  std::vector<double> sums(padded(total) * padded(total));
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const Part& part = parts_[i];
+    const std::size_t count = width_of(reduced, part), width = padded(count);
+    minus_products(reduced.values.get() + reduced.at[i], part.matrix.pivots, width,
+                   sums.data());
+    for (std::size_t a = 0; a < count; ++a) {
+      double* row = result + number_of(reduced, part, a) * total;
+      for (std::size_t b = a; b < count; ++b) {
+        row[number_of(reduced, part, b)] -= sums[a * width + b];
+      }
     }
   }
+  // loads of different columns may come in any order
+  for (std::size_t a = 0; a < total; ++a) {
+    for (std::size_t b = a + 1; b < total; ++b) {
+      double &upper = result[a * total + b], &lower = result[b * total + a];
+      upper = lower = upper + lower;
+    }
+  }
+}
+
+void RingFactor::solve(const ReducedLoads& reduced, const double* factors,
+                       double* solution) const {
+  const std::size_t n = size_;
+  std::vector<std::size_t> begin(parts_.size() + 1, 0);
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    begin[i + 1] = begin[i] + parts_[i].matrix.pivots + parts_[i].matrix.rest;
+  }
+  std::vector<double> values(begin.back()), own_factors(reduced.d + reduced.k);
+  const auto faces = [&](std::int64_t i) {
+    return i < 0 ? nullptr : values.data() + begin[i] + parts_[i].matrix.pivots;
+  };
+  for (std::size_t k = order_.size(); k-- > 0;) {
+    const std::size_t i = order_[k];
+    const Part& part = parts_[i];
+    const std::size_t count = width_of(reduced, part), width = padded(count);
+    const double* row = reduced.values.get() + reduced.at[i];
+    double* own = values.data() + begin[i];
+    for (std::size_t c = 0; c < count; ++c) {
+      own_factors[c] = factors[number_of(reduced, part, c)];
+    }
+    for (std::size_t p = 0; p < part.matrix.pivots; ++p, row += width) {
+      double sum = 0.0;
+      for (std::size_t c = 0; c < count; ++c) sum += own_factors[c] * row[c];
+      own[p] = sum;
+    }
+    backward_one(part.matrix, own);
+    if (i >= sectors_) {
+      spread(part, own, 1, faces(part.left), faces(part.right));
+      continue;
+    }
+    double* to = solution + i * n;
+    for (std::size_t j = 0; j < n; ++j) to[j] = own[place(part, j)];
+  }
+}
+
+// Number of columns of a part: the loads on all sectors, then those on its own ones.
+std::size_t RingFactor::width_of(const ReducedLoads& reduced, const Part& part) const {
+  return reduced.d + reduced.begin[part.last] - reduced.begin[part.first];
+}
+
+// Number of the load in a column of a part.
+std::size_t RingFactor::number_of(const ReducedLoads& reduced, const Part& part,
+                                  std::size_t column) const {
+  const std::size_t d = reduced.d;
+  if (column < d) return column;
+  return d + reduced.order[reduced.begin[part.first] + column - d];
 }
 
 }  // namespace swgjoint

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dense_factors.h"
+#include "eight_lanes.h"
 #include "wide.h"
 
 namespace swgjoint {
@@ -46,31 +47,55 @@ void add_blocks(const double* blocks, std::size_t count, std::size_t size,
 SWGJOINT_WIDE void respond(const std::int64_t* offsets, const double* blocks,
                            std::size_t count, std::size_t rows, std::size_t size,
                            const double* force, std::size_t teeth, double* result) {
-  // most teeth carry no load, and one flank of the others does
+  // most teeth carry no load, and one flank of the others does: up to kLanes teeth whose
+  // loads begin at similar entries
   struct Loaded {
-    std::int64_t tooth;
-    const double* force;
-    std::size_t begin, end;
-    double* moved;
+    std::size_t tooth, begin, end;
   };
   std::vector<Loaded> loads;
-  const auto all = static_cast<std::int64_t>(teeth);
-  for (std::int64_t tooth = 0; tooth < all; ++tooth, force += size) {
+  for (std::size_t tooth = 0; tooth < teeth; ++tooth) {
+    const double* own = force + size * tooth;
     std::size_t begin = 0, end = size;
-    while (begin < size && force[begin] == 0.0) ++begin;
-    while (end > begin && force[end - 1] == 0.0) --end;
-    if (begin < end) loads.push_back({tooth, force, begin, end, nullptr});
+    while (begin < size && own[begin] == 0.0) ++begin;
+    while (end > begin && own[end - 1] == 0.0) --end;
+    if (begin < end) loads.push_back({tooth, begin, end});
   }
-  for (std::size_t k = 0; k < count; ++k) {
-    for (Loaded& load : loads) {
-      const std::int64_t at = ((load.tooth + offsets[k]) % all + all) % all;
-      load.moved = result + rows * static_cast<std::size_t>(at);
+  std::stable_sort(loads.begin(), loads.end(), [](const Loaded& a, const Loaded& b) {
+    return a.begin < b.begin;
+  });
+  std::vector<double> together(size * kLanes);
+  for (std::size_t first = 0; first < loads.size(); first += kLanes) {
+    const std::size_t lanes = std::min(kLanes, loads.size() - first);
+    const Loaded* group = loads.data() + first;
+    std::size_t end = 0;
+    for (std::size_t l = 0; l < lanes; ++l) end = std::max(end, group[l].end);
+    std::fill(together.begin(), together.end(), 0.0);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double* own = force + size * group[l].tooth;
+      for (std::size_t c = 0; c < size; ++c) together[c * kLanes + l] = own[c];
     }
-    for (std::size_t r = 0; r < rows; ++r, blocks += size) {
-      for (const Loaded& load : loads) {
-        const std::size_t b = load.begin;
-        load.moved[r] += sum_of_products(blocks + b, load.force + b, load.end - b);
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto all = static_cast<std::int64_t>(teeth);
+      const std::size_t after = static_cast<std::size_t>((offsets[k] % all + all) % all);
+      const double* block = blocks + rows * size * k;
+      double* moved[kLanes];
+      for (std::size_t l = 0; l < lanes; ++l) {
+        moved[l] = result + rows * ((group[l].tooth + after) % teeth);
       }
+      by_blocks(rows, [&](std::size_t row, auto some) SWGJOINT_INLINED {
+        Lanes sum[some];
+        for (std::size_t r = 0; r < some; ++r) sum[r] = Lanes{};
+        for (std::size_t c = group->begin; c < end; ++c) {
+          const Lanes push = lanes_at(&together[c * kLanes]);
+          const double* column = block + row * size + c;
+          for (std::size_t r = 0; r < some; ++r) sum[r] += column[r * size] * push;
+        }
+        double sums[some][kLanes];
+        std::memcpy(sums, sum, sizeof sums);
+        for (std::size_t l = 0; l < lanes; ++l) {
+          for (std::size_t r = 0; r < some; ++r) moved[l][row + r] += sums[r][l];
+        }
+      });
     }
   }
 }

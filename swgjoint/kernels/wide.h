@@ -1,6 +1,7 @@
 // Loops compiled for several widths of vectors, one of which is chosen when the library
 // is loaded. All give the same bits: vectors hold independent sums, and products are not
-// fused with sums. SWGJOINT_WIDE marks such a function, SWGJOINT_INLINE what it calls.
+// fused with sums. SWGJOINT_WIDE marks such a function, SWGJOINT_INLINE what it calls,
+// SWGJOINT_INLINED its lambdas.
 
 #ifndef SWGJOINT_KERNELS_WIDE_H_
 #define SWGJOINT_KERNELS_WIDE_H_
@@ -16,8 +17,17 @@
 #endif
 #if defined(__GNUC__)
 #define SWGJOINT_INLINE inline __attribute__((always_inline))
+#define SWGJOINT_INLINED __attribute__((always_inline))
 #else
 #define SWGJOINT_INLINE inline
+#define SWGJOINT_INLINED
+#endif
+
+// Loops over tiles stay in registers only if they are unrolled.
+#if defined(__GNUC__) && !defined(__clang__)
+#define SWGJOINT_UNROLL _Pragma("GCC unroll 8")
+#else
+#define SWGJOINT_UNROLL
 #endif
 
 namespace swgjoint {

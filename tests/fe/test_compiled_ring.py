@@ -88,6 +88,56 @@ def test_an_update_is_a_new_factorisation(monkeypatch, native):
         assert np.array_equal(ours, RingFactor(blocks, FACE).solve(rhs))
 
 
+@pytest.mark.parametrize("native", ["", "numpy"])
+def test_products_follow_changes_of_sectors_and_loads(monkeypatch, native):
+    """Bit for bit as those of a new factor, whatever changed since the last ones."""
+    monkeypatch.setenv("SWGJOINT_KERNELS", native)
+    rng = np.random.default_rng(8)
+    blocks, loads = blocks_of(rng, 13, 9), rng.normal(size=(13, 9, 3))
+    sector, rows = np.array([3, 9, 3, 12]), rng.normal(size=(4, 9))
+    factor = RingFactor(blocks, FACE)
+
+    def check():
+        ours = factor.condense(loads, sector, rows)
+        theirs = RingFactor(blocks.copy(), FACE).condense(loads, sector, rows)
+        assert np.array_equal(ours, theirs)
+
+    check()
+    for changed in ([], [5], [0, 12], [3]):
+        blocks[changed] = blocks_of(rng, len(changed), 9)
+        factor.update(np.array(changed, dtype=np.int64))
+        check()
+        loads[7, 2, 1] += 1.0
+        check()
+        loads[changed] *= 2.0
+        check()
+    rows[2, 1] = 0.0
+    check()
+    sector = np.array([3, 9, 4, 12])
+    check()
+    loads = loads[:, :, :2]
+    check()
+
+
+@pytest.mark.parametrize("inside", [14, 16, 18, 23])
+def test_large_sectors_as_with_pivoting(inside):
+    """Unknowns in whole blocks of eight, with four more, and single ones."""
+    rng = np.random.default_rng(inside)
+    for face in (16, 13):
+        n = 2 * face + inside
+        blocks, loads = blocks_of(rng, 5, n), rng.normal(size=(5, n, 11))
+        twin = CyclicFactor(blocks, face)
+        near(RingFactor(blocks, face).solve(loads), twin.solve(loads))
+        row = rng.normal(size=(3, n))
+        sector = np.array([4, 1, 4])
+        every = np.concatenate([loads, np.zeros((5, n, 3))], axis=2)
+        every[sector, :, 11 + np.arange(3)] = row
+        near(
+            RingFactor(blocks, face).condense(loads, sector, row),
+            np.einsum("snf,snl->fl", every, twin.solve(every), optimize=True),
+        )
+
+
 def test_indefinite_rings_are_solved_with_pivoting():
     """From the start, and once an update makes a ring indefinite."""
     rng = np.random.default_rng(6)
