@@ -170,6 +170,7 @@ SWGJOINT_WIDE void sector_tangents(const Sector& e, const double* place, const d
     const double c2 = cos * cos - sin * sin, s2 = 2.0 * sin * cos;
     const double *a = turned.data(), *b = a + m, *c = b + m, *d = c + m;
     const std::size_t part = m * m;
+    std::fill(tangent, tangent + n * n, 0.0);
     for (std::size_t i = 0; i < m; ++i) {
       const double* p = e.turning_parts + m * i;
       double* to = tangent + n * static_cast<std::size_t>(dofs[i]);
@@ -182,7 +183,7 @@ SWGJOINT_WIDE void sector_tangents(const Sector& e, const double* place, const d
       add(c[i], a, m, row);
       add(b[i], d, m, row);
       add(d[i], b, m, row);
-      for (std::size_t j = 0; j < m; ++j) to[dofs[j]] += row[j];
+      for (std::size_t j = 0; j < m; ++j) to[dofs[j]] = row[j];
     }
     tangent += n * n;
   }

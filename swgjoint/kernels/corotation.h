@@ -31,7 +31,7 @@ struct Kinematics {
   double* flank;                                                       // (count, flank)
 };
 
-// Fills the kinematics and adds gradient (count, n) and tangent (count, n, n).
+// Fills the kinematics and the tangent (count, n, n), and adds the gradient (count, n).
 // place: angles in the undeformed ring (count,); positions (count, nodes, 2) in the
 // global frame; force: tooth forces on the flanks (count, flank); dofs: degrees of freedom
 // of the coordinates (m,). tangent: null to leave it out.

@@ -89,7 +89,7 @@ class CompiledBore:
             normal: Outward normals of the outline (N, q, 2).
             into: Degrees of freedom of the nodes that the stations follow (2 m,).
             gradient: Gradient to add to (N, n) [N].
-            hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
+            hessian: Tangent to fill (N, n, n) [N/m]; None adds the forces only.
             curvature: Curvatures of the parallel curves through the stations (N, q)
                 [1/m]; None neglects them.
             sign: Signs of the degrees of freedom (N, n); None if all are 1.
@@ -192,7 +192,7 @@ def add_sector_tangents(
         flank_force: Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N].
         dofs: Degrees of freedom of the skeleton within a sector (2 n_a,).
         gradient: Gradient to add to (N, n) [N].
-        hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
+        hessian: Tangent to fill (N, n, n) [N/m]; None adds the forces only.
 
     Returns:
         Frames of the sectors, and displacements of the flank nodes in these frames

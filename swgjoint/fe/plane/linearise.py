@@ -218,7 +218,7 @@ def linearise(
     """
     sign, dofs, x = model.signs, model.dofs, model.skeleton(state)
     gradient = np.zeros(sign.shape)
-    hessian = np.zeros((*sign.shape, sign.shape[1])) if kept is None else None
+    hessian = np.empty((*sign.shape, sign.shape[1])) if kept is None else None
     frames, flank = _add_sectors(model, state, x, gradient, hessian)
     bore = _add_bore(model, state, x, gradient, hessian)
     fixed = np.zeros(sign.shape, dtype=bool)
@@ -298,11 +298,10 @@ def _add_sectors(
         state: State at which to linearise.
         x: Skeleton nodes (N, n_a, 2) [m].
         gradient: Gradient to add to (N, n) [N].
-        hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
+        hessian: Tangent to fill (N, n, n) [N/m]; None adds the forces only.
 
     Returns:
-        Frames of the sectors, and displacements of the flank nodes in these frames
-        (N, 2 n_b) [m].
+        Frames of the sectors, and flank displacements in these frames (N, 2 n_b) [m].
     """
     element, force, dofs = model.element, state.flank_force, model.dofs
     if model.nonlinear and kernels() is not None:
@@ -315,6 +314,7 @@ def _add_sectors(
     gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(len(x), -1)
     if hessian is not None:
         total = elastic - force @ element.flank_from_skeleton
+        hessian.fill(0.0)
         hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
     flank = frames.displacement @ element.flank_from_skeleton.T
     return frames, flank + force @ element.flank_compliance
