@@ -144,6 +144,20 @@ def test_a_mesh_of_another_kind_is_told_from_one_that_is_not_there(tmp_path):
             RigidArm(urdf(tmp_path, shape=shape))
 
 
+def test_shapes_of_one_name_are_read_in_silence(tmp_path, capfd):
+    """The engine would print a line for each of them, and one in Latin-1 is read."""
+    plain = quiet_arm(urdf(tmp_path)).model
+    path = tmp_path / "two.urdf"
+    named = path.read_text().replace("<collision>", "<collision\n name='part > 1'>")
+    assert named.count("part > 1") == 3
+    path.write_bytes(named.replace("<robot", "<!-- \xe9 --><robot").encode("latin-1"))
+    model = quiet_arm(str(path)).model
+    assert capfd.readouterr() == ("", "")
+    assert model.ngeom == plain.ngeom == 3
+    assert np.array_equal(model.body_mass, plain.body_mass)
+    assert np.array_equal(model.geom_pos, plain.geom_pos)
+
+
 def test_a_suffix_in_upper_case_is_read(tmp_path):
     """As the same file in lower case, with what it includes and meshes beside it."""
     lower = quiet_arm(urdf(tmp_path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections import Counter
 from collections.abc import Iterable
@@ -16,6 +17,9 @@ from swgjoint.sim.arm.class_names import check_class_names
 
 MESHES = (".stl", ".obj", ".msh")
 """Mesh formats that the engine reads."""
+_SHAPE_NAME = re.compile(
+    r"""(<(?:visual|collision)\b[^<>]*?)\sname\s*=\s*(?:"[^"]*"|'[^']*')"""
+)
 
 
 def open_model(path: Path) -> mujoco.MjSpec:
@@ -66,10 +70,16 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
         )
     check_class_names(path)
     try:
-        if suffix == path.suffix or suffix not in (".urdf", ".xml"):
+        if suffix == ".urdf":
+            # the engine reports every shape with the name of another one
+            text = path.read_bytes().decode(errors="replace")
+            text = _SHAPE_NAME.sub(r"\1", text)
+        elif suffix == ".xml" != path.suffix:
+            # the engine selects its reader by the suffix, in lower case only
+            text = path.read_text(encoding="utf-8")
+        else:
             return mujoco.MjSpec.from_file(str(path))
-        # the engine selects its reader by the suffix, in lower case only
-        spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
+        spec = mujoco.MjSpec.from_string(text)
         spec.modelfiledir = str(path.parent)
         return spec
     except (ValueError, OSError) as exc:
