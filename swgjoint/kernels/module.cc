@@ -188,8 +188,8 @@ class RingFactor {
             "result: (d + k, d + k)");
     check(sector);
     const nb::gil_scoped_release release;
-    ring_.reduce(loads.data(), d, sector.data(), rows.data(), k, &reduced_);
-    ring_.products(reduced_, result.data());
+    ring_.reduce(loads.data(), d, sector.data(), rows.data(), k);
+    ring_.products(result.data());
   }
 
   // Contact forces and increment of one Newton step: the condensed system of the loads
@@ -218,8 +218,8 @@ class RingFactor {
                                      held};
     const nb::gil_scoped_release release;
     std::vector<double> products((k + 3) * (k + 3));
-    ring_.reduce(loads.data(), 3, sector.data(), rows.data(), k, &reduced_);
-    ring_.products(reduced_, products.data());
+    ring_.reduce(loads.data(), 3, sector.data(), rows.data(), k);
+    ring_.products(products.data());
     double output = 0.0;
     double* z = result.data();
     if (!swgjoint::solve_contact_step(step, products.data(), active.data(), z, &output)) {
@@ -228,7 +228,7 @@ class RingFactor {
     // the loads on all sectors, then those of the teeth
     std::vector<double> factors = {1.0, z[k], z[k + 2]};
     factors.insert(factors.end(), z, z + k);
-    ring_.solve(reduced_, factors.data(), increment.data());
+    ring_.solve_reduced(factors.data(), increment.data());
     return output;
   }
 
@@ -247,7 +247,6 @@ class RingFactor {
   }
 
   swgjoint::RingFactor ring_;
-  swgjoint::ReducedLoads reduced_;  // of the call before
 };
 
 }  // namespace

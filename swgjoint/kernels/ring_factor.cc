@@ -35,8 +35,9 @@ void clear(double* rows, std::size_t count, std::size_t stride, std::size_t begi
 
 }  // namespace
 
-bool ReducedLoads::holds(const std::int64_t* others, const double* their_rows,
-                         std::size_t count, std::size_t n, std::size_t all) const {
+bool RingFactor::Reduced::holds(const std::int64_t* others, const double* their_rows,
+                                std::size_t count, std::size_t n,
+                                std::size_t all) const {
   return values != nullptr && count == k && all * n == loads.size() &&
          std::equal(sector.begin(), sector.end(), others) &&
          std::equal(rows.begin(), rows.end(), their_rows);
@@ -239,32 +240,32 @@ void RingFactor::solve(double* loads, std::size_t width) const {
 }
 
 void RingFactor::reduce(const double* loads, std::size_t d, const std::int64_t* sector,
-                        const double* rows, std::size_t k, ReducedLoads* reduced) {
+                        const double* rows, std::size_t k) {
   const std::size_t n = size_, f = face_, each = n * d;
   std::vector<char> stale(parts_.size(), 1);
-  if (reduced->holds(sector, rows, k, n, d * sectors_)) {
+  if (reduced_.holds(sector, rows, k, n, d * sectors_)) {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       stale[i] = changed_[i];
       if (i < sectors_) {
-        const double* before = reduced->loads.data() + i * each;
+        const double* before = reduced_.loads.data() + i * each;
         stale[i] |= !std::equal(before, before + each, loads + i * each);
       }
     }
   } else {
-    arrange(sector, rows, k, d, reduced);
+    arrange(sector, rows, k, d);
   }
-  reduced->loads.assign(loads, loads + sectors_ * each);
+  reduced_.loads.assign(loads, loads + sectors_ * each);
   std::fill(changed_.begin(), changed_.end(), 0);
-  const auto &order = reduced->order, &begin = reduced->begin;
+  const auto &order = reduced_.order, &begin = reduced_.begin;
   for (const std::size_t i : order_) {
     const Part& part = parts_[i];
     if (part.left >= 0) stale[i] |= stale[part.left];
     if (part.right >= 0) stale[i] |= stale[part.right];
     if (!stale[i]) continue;
-    const std::size_t start = begin[part.first], count = width_of(*reduced, part);
+    const std::size_t start = begin[part.first], count = width_of(part);
     const std::size_t width = padded(count);
-    double* own = reduced->values.get() + reduced->at[i];
-    std::fill(own, reduced->values.get() + reduced->at[i + 1], 0.0);
+    double* own = reduced_.values.get() + reduced_.at[i];
+    std::fill(own, reduced_.values.get() + reduced_.at[i + 1], 0.0);
     if (i < sectors_) {
       const double* from = loads + i * each;
       for (std::size_t j = 0; j < n; ++j) {
@@ -279,10 +280,10 @@ void RingFactor::reduce(const double* loads, std::size_t d, const std::int64_t* 
       // loads of a child on its near face, and on the far one at a given row
       const auto take = [&](std::int64_t child, std::size_t far) {
         const Part& from = parts_[child];
-        const std::size_t some = width_of(*reduced, from), apart = padded(some);
+        const std::size_t some = width_of(from), apart = padded(some);
         const std::size_t before = begin[from.first] - start;
         const double* faces =
-            reduced->values.get() + reduced->at[child] + from.matrix.pivots * apart;
+            reduced_.values.get() + reduced_.at[child] + from.matrix.pivots * apart;
         for (std::size_t j = 0; j < 2 * f; ++j, faces += apart) {
           double* to = own + (j < f ? j : far + j - f) * width;
           add_to(to, faces, d);
@@ -302,40 +303,40 @@ void RingFactor::reduce(const double* loads, std::size_t d, const std::int64_t* 
 
 // Order of loads by sector, and room for the values of all parts.
 void RingFactor::arrange(const std::int64_t* sector, const double* rows, std::size_t k,
-                         std::size_t d, ReducedLoads* reduced) const {
-  reduced->d = d;
-  reduced->k = k;
-  reduced->sector.assign(sector, sector + k);
-  reduced->rows.assign(rows, rows + k * size_);
-  reduced->order.resize(k);
-  std::iota(reduced->order.begin(), reduced->order.end(), 0);
+                         std::size_t d) {
+  reduced_.d = d;
+  reduced_.k = k;
+  reduced_.sector.assign(sector, sector + k);
+  reduced_.rows.assign(rows, rows + k * size_);
+  reduced_.order.resize(k);
+  std::iota(reduced_.order.begin(), reduced_.order.end(), 0);
   std::stable_sort(
-      reduced->order.begin(), reduced->order.end(),
+      reduced_.order.begin(), reduced_.order.end(),
       [&](std::size_t a, std::size_t b) { return sector[a] < sector[b]; });
-  reduced->begin.assign(sectors_ + 1, 0);
-  for (std::size_t i = 0; i < k; ++i) ++reduced->begin[sector[i] + 1];
-  std::partial_sum(reduced->begin.begin(), reduced->begin.end(), reduced->begin.begin());
-  reduced->at.assign(1, 0);
+  reduced_.begin.assign(sectors_ + 1, 0);
+  for (std::size_t i = 0; i < k; ++i) ++reduced_.begin[sector[i] + 1];
+  std::partial_sum(reduced_.begin.begin(), reduced_.begin.end(), reduced_.begin.begin());
+  reduced_.at.assign(1, 0);
   for (const Part& part : parts_) {
     const std::size_t size = part.matrix.pivots + part.matrix.rest;
-    reduced->at.push_back(reduced->at.back() + size * padded(width_of(*reduced, part)));
+    reduced_.at.push_back(reduced_.at.back() + size * padded(width_of(part)));
   }
-  reduced->values.reset(new double[reduced->at.back()]);
+  reduced_.values.reset(new double[reduced_.at.back()]);
 }
 
-void RingFactor::products(const ReducedLoads& reduced, double* result) const {
-  const std::size_t d = reduced.d, total = d + reduced.k;
+void RingFactor::products(double* result) const {
+  const std::size_t d = reduced_.d, total = d + reduced_.k;
   std::fill_n(result, total * total, 0.0);
   std::vector<double> sums(padded(total) * padded(total));
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Part& part = parts_[i];
-    const std::size_t count = width_of(reduced, part), width = padded(count);
-    minus_products(reduced.values.get() + reduced.at[i], part.matrix.pivots, width,
+    const std::size_t count = width_of(part), width = padded(count);
+    minus_products(reduced_.values.get() + reduced_.at[i], part.matrix.pivots, width,
                    sums.data());
     for (std::size_t a = 0; a < count; ++a) {
-      double* row = result + number_of(reduced, part, a) * total;
+      double* row = result + number_of(part, a) * total;
       for (std::size_t b = a; b < count; ++b) {
-        row[number_of(reduced, part, b)] -= sums[a * width + b];
+        row[number_of(part, b)] -= sums[a * width + b];
       }
     }
   }
@@ -348,25 +349,24 @@ void RingFactor::products(const ReducedLoads& reduced, double* result) const {
   }
 }
 
-void RingFactor::solve(const ReducedLoads& reduced, const double* factors,
-                       double* solution) const {
+void RingFactor::solve_reduced(const double* factors, double* solution) const {
   const std::size_t n = size_;
   std::vector<std::size_t> begin(parts_.size() + 1, 0);
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     begin[i + 1] = begin[i] + parts_[i].matrix.pivots + parts_[i].matrix.rest;
   }
-  std::vector<double> values(begin.back()), own_factors(reduced.d + reduced.k);
+  std::vector<double> values(begin.back()), own_factors(reduced_.d + reduced_.k);
   const auto faces = [&](std::int64_t i) {
     return i < 0 ? nullptr : values.data() + begin[i] + parts_[i].matrix.pivots;
   };
   for (std::size_t k = order_.size(); k-- > 0;) {
     const std::size_t i = order_[k];
     const Part& part = parts_[i];
-    const std::size_t count = width_of(reduced, part), width = padded(count);
-    const double* row = reduced.values.get() + reduced.at[i];
+    const std::size_t count = width_of(part), width = padded(count);
+    const double* row = reduced_.values.get() + reduced_.at[i];
     double* own = values.data() + begin[i];
     for (std::size_t c = 0; c < count; ++c) {
-      own_factors[c] = factors[number_of(reduced, part, c)];
+      own_factors[c] = factors[number_of(part, c)];
     }
     for (std::size_t p = 0; p < part.matrix.pivots; ++p, row += width) {
       double sum = 0.0;
@@ -384,16 +384,15 @@ void RingFactor::solve(const ReducedLoads& reduced, const double* factors,
 }
 
 // Number of columns of a part: the loads on all sectors, then those on its own ones.
-std::size_t RingFactor::width_of(const ReducedLoads& reduced, const Part& part) const {
-  return reduced.d + reduced.begin[part.last] - reduced.begin[part.first];
+std::size_t RingFactor::width_of(const Part& part) const {
+  return reduced_.d + reduced_.begin[part.last] - reduced_.begin[part.first];
 }
 
 // Number of the load in a column of a part.
-std::size_t RingFactor::number_of(const ReducedLoads& reduced, const Part& part,
-                                  std::size_t column) const {
-  const std::size_t d = reduced.d;
+std::size_t RingFactor::number_of(const Part& part, std::size_t column) const {
+  const std::size_t d = reduced_.d;
   if (column < d) return column;
-  return d + reduced.order[reduced.begin[part.first] + column - d];
+  return d + reduced_.order[reduced_.begin[part.first] + column - d];
 }
 
 }  // namespace swgjoint

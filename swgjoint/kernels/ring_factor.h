@@ -12,22 +12,6 @@
 
 namespace swgjoint {
 
-// Loads on a ring after its elimination, see RingFactor::reduce.
-struct ReducedLoads {
-  std::size_t d = 0, k = 0;           // loads on all sectors, loads on single ones
-  std::vector<double> loads, rows;    // the loads themselves
-  std::vector<std::int64_t> sector;   // sectors of single ones (k,)
-  std::vector<std::size_t> order;     // single ones by their sector (k,)
-  std::vector<std::size_t> begin;     // first of them on each sector (sectors + 1,)
-  std::vector<std::size_t> at;        // first value of each part
-  std::unique_ptr<double[]> values;   // of all parts
-
-  // Whether these are loads on the same sectors, with the same rows (k, n), and as many
-  // on all sectors, which take up `all` columns of n numbers.
-  bool holds(const std::int64_t* others, const double* their_rows, std::size_t count,
-             std::size_t n, std::size_t all) const;
-};
-
 // Twin of CyclicFactor in swgjoint/fe/common/cyclic.py for symmetric matrices whose sum
 // is positive definite. Neighbouring sectors are merged in pairs, the pairs again in
 // pairs, and so on: each merge eliminates the face between two parts. A load on one
@@ -51,16 +35,15 @@ class RingFactor {
   void solve(double* loads, std::size_t width) const;
 
   // Half of the solution for d loads on all sectors (sectors, n, d) and k rows (k, n),
-  // each on one sector only. With the result of the call before, only what has changed
-  // is computed.
+  // each on one sector only. Only what has changed since the call before is computed.
   void reduce(const double* loads, std::size_t d, const std::int64_t* sector,
-              const double* rows, std::size_t k, ReducedLoads* reduced);
+              const double* rows, std::size_t k);
 
   // Products L^T A^-1 L of these loads L with the inverse matrix (d + k, d + k).
-  void products(const ReducedLoads& reduced, double* result) const;
+  void products(double* result) const;
 
   // Solution (sectors, n) for the sum of these loads, each times its factor (d + k,).
-  void solve(const ReducedLoads& reduced, const double* factors, double* solution) const;
+  void solve_reduced(const double* factors, double* solution) const;
 
  private:
   // A sector, two merged parts, or the closed ring. After the unknowns that it
@@ -72,6 +55,22 @@ class RingFactor {
     PartialCholesky matrix;
   };
 
+  // Loads after the elimination.
+  struct Reduced {
+    std::size_t d = 0, k = 0;          // loads on all sectors, loads on single ones
+    std::vector<double> loads, rows;   // the loads themselves
+    std::vector<std::int64_t> sector;  // sectors of single ones (k,)
+    std::vector<std::size_t> order;    // single ones by their sector (k,)
+    std::vector<std::size_t> begin;    // first of them on each sector (sectors + 1,)
+    std::vector<std::size_t> at;       // first value of each part
+    std::unique_ptr<double[]> values;  // of all parts
+
+    // Whether these are loads on the same sectors, with the same rows (k, n), and as
+    // many on all sectors, which take up `all` columns of n numbers.
+    bool holds(const std::int64_t* others, const double* their_rows, std::size_t count,
+               std::size_t n, std::size_t all) const;
+  };
+
   std::int64_t add(std::size_t first, std::size_t last, bool turned);
   void gather(const Part& part, const double* block) const;
   void merge(const Part& part) const;
@@ -80,15 +79,15 @@ class RingFactor {
   void spread(const Part& part, const double* own, std::size_t width, double* left,
               double* right) const;
   void arrange(const std::int64_t* sector, const double* rows, std::size_t k,
-               std::size_t d, ReducedLoads* reduced) const;
-  std::size_t width_of(const ReducedLoads& reduced, const Part& part) const;
-  std::size_t number_of(const ReducedLoads& reduced, const Part& part,
-                        std::size_t column) const;
+               std::size_t d);
+  std::size_t width_of(const Part& part) const;
+  std::size_t number_of(const Part& part, std::size_t column) const;
 
   std::size_t sectors_, size_, face_, inner_;
   std::vector<Part> parts_;          // sectors, then merged parts, last the closed ring
   std::vector<std::size_t> order_;   // of the parts: those that are merged, then theirs
   std::vector<char> changed_;        // whether a part changed since the last loads
+  Reduced reduced_;
   std::unique_ptr<double[]> memory_;  // of all matrices
 };
 
