@@ -22,7 +22,7 @@
 # The cup is `reference-3d` of the thesis with 120 and 122 teeth at 20 N·m. The relief
 # is that of `reference-3d-modified`: 100 µm of crowning and 90 µm of slope on the wave
 # generator, 45 µm of crowning on the flexspline. Computing the five variants in 3D
-# takes ten minutes on one core, so this notebook reads the results from a file. The
+# takes two minutes on one core, so this notebook reads the results from a file. The
 # following command writes it:
 #
 #     python tests/benchmarks/micro_geometry.py notebooks/micro-geometry.json

@@ -3,8 +3,8 @@
 ``python tests/benchmarks/micro_geometry.py FILE`` simulates `reference-3d` with none,
 each and all of the micro-geometry of `reference-3d-modified` (half of the drive, two
 positions over half a pitch, rated torque) and writes contact forces over the face
-width, stresses by part and coning to FILE, ``notebooks/micro-geometry.json``. Ten
-minutes of one core, 1.1 GB.
+width, stresses by part and coning to FILE, ``notebooks/micro-geometry.json``. Two
+minutes of one core, 1.2 GB.
 """
 
 from __future__ import annotations
