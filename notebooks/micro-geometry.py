@@ -175,6 +175,6 @@ assert all(on_edges(variants["all"], key) < 0.05 for key in keys)
 # Beyond the play the stiffness of the improved drive rises from 1.0e5 to 2.0e5 N·m/rad,
 # while the initial drive starts at 1.66e5 N·m/rad and has no play. For a robot the play
 # is as important as the stress. The following command compares both drives as joints.
-# It builds two 3D maps (a quarter of an hour each), which are then stored in the cache:
+# It builds two 3D maps (about five minutes each), which are then stored in the cache:
 #
 #     swgjoint compare reference-3d reference-3d-modified --scene bench --out relief
