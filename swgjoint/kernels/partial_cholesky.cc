@@ -53,7 +53,7 @@ SWGJOINT_INLINE void reduce(Known factor, std::size_t known, const Corner* own,
   }
 }
 
-// Rows of a matrix whose columns begin with their own ones; the others mean nothing.
+// Square block of a matrix.
 template <std::size_t count>
 SWGJOINT_INLINE void copy_corner(const double* from, std::size_t from_stride, double* to,
                                  std::size_t to_stride) {

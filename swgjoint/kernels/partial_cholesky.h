@@ -1,8 +1,8 @@
 // Elimination of the first unknowns of small symmetric systems, for ring_factor.h.
 //
-// Rows of matrices and of right-hand sides begin at multiples of kLanes numbers. What
-// stands below a diagonal or behind the last column means nothing. The results have the
-// same bits on every machine.
+// Rows of matrices and of right-hand sides begin at multiples of kLanes numbers. Entries
+// below a diagonal or behind the last column are unused. The results have the same bits
+// on every machine.
 
 #ifndef SWGJOINT_KERNELS_PARTIAL_CHOLESKY_H_
 #define SWGJOINT_KERNELS_PARTIAL_CHOLESKY_H_

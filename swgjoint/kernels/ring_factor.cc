@@ -51,12 +51,13 @@ RingFactor::RingFactor(std::size_t sectors, std::size_t size, std::size_t face)
   parts_.push_back({0, sectors, top, -1, false, ring});
   order_.push_back(parts_.size() - 1);
   changed_.assign(parts_.size(), 1);
+  // tiles at the end of a row read up to kLanes numbers after it
   std::size_t total = kLanes;
   for (const Part& part : parts_) {
     total += part.matrix.pivots * part.matrix.stride;
     total += part.matrix.rest * part.matrix.rest_stride;
   }
-  memory_.reset(new double[total + kLanes]);
+  memory_.reset(new double[total + kLanes]);  // with room to align the first row
   double* next = memory_.get();
   while (reinterpret_cast<std::uintptr_t>(next) % (kLanes * sizeof(double))) ++next;
   for (const std::size_t i : order_) {
@@ -64,7 +65,7 @@ RingFactor::RingFactor(std::size_t sectors, std::size_t size, std::size_t face)
     matrix.factor = next;
     matrix.schur = next += matrix.pivots * matrix.stride;
     next += matrix.rest * matrix.rest_stride;
-    // what means nothing is computed with the rest: no slow denormal numbers there
+    // unused entries take part in the arithmetic: denormal numbers there would slow it
     const std::size_t size = matrix.pivots + matrix.rest;
     clear(matrix.factor, matrix.pivots, matrix.stride, size, matrix.stride);
     clear(matrix.schur, matrix.rest, matrix.rest_stride, matrix.rest, matrix.rest_stride);

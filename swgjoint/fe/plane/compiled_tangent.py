@@ -89,7 +89,7 @@ class CompiledBore:
             normal: Outward normals of the outline (N, q, 2).
             into: Degrees of freedom of the nodes that the stations follow (2 m,).
             gradient: Gradient to add to (N, n) [N].
-            hessian: Tangent to fill (N, n, n) [N/m]; None adds the forces only.
+            hessian: Tangent to add to (N, n, n) [N/m]; None adds the forces only.
             curvature: Curvatures of the parallel curves through the stations (N, q)
                 [1/m]; None neglects them.
             sign: Signs of the degrees of freedom (N, n); None if all are 1.
