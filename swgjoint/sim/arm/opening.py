@@ -70,15 +70,14 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
         )
     check_class_names(path)
     try:
-        if suffix == ".urdf":
-            # the engine reports every shape with the name of another one
-            text = path.read_bytes().decode(errors="replace")
-            text = _SHAPE_NAME.sub(r"\1", text)
-        elif suffix == ".xml" != path.suffix:
-            # the engine selects its reader by the suffix, in lower case only
-            text = path.read_text(encoding="utf-8")
-        else:
+        if suffix not in (".urdf", ".xml"):
             return mujoco.MjSpec.from_file(str(path))
+        # the engine reports every shape with the name of another one
+        text = path.read_bytes().decode(errors="replace")
+        text, named = _SHAPE_NAME.subn(r"\1", text)
+        if not named and suffix == path.suffix:
+            return mujoco.MjSpec.from_file(str(path))
+        # the engine selects its reader by the suffix, in lower case only
         spec = mujoco.MjSpec.from_string(text)
         spec.modelfiledir = str(path.parent)
         return spec
