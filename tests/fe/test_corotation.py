@@ -163,3 +163,13 @@ def test_tension_resists_slopes_within_a_sector(element):
     exact = 0.5 * width * float(np.sum(trace * omega**2 * basis.dx))
     # 2 % at this mesh: the tooth turns with the rim, but not as one with the bore
     assert ours == pytest.approx(exact, rel=0.05)
+
+
+@pytest.mark.parametrize("columns", [2, 3, 8, 16])
+def test_right_angle_does_not_depend_on_the_layout_of_the_vectors(columns):
+    """Vectors that are columns of a wider array turn like their copy."""
+    rows = np.random.default_rng(0).normal(size=(40, columns))
+    strided = rows[:, :2]
+    np.testing.assert_array_equal(
+        rotate_right_angle(strided), np.stack([-rows[:, 1], rows[:, 0]], axis=-1)
+    )

@@ -46,7 +46,8 @@ def rotate(vectors: Array, angle: Array | float) -> Array:
 def rotate_right_angle(vectors: Array) -> Array:
     """Rotate 2D vectors (..., 2) counter-clockwise by a right angle: J v."""
     rotated = np.empty(vectors.shape)
-    np.negative(vectors[..., 1], out=rotated[..., 0])
+    # np.negative with strided `out` reads wrong elements of rows of eight (numpy 2.4)
+    rotated[..., 0] = -vectors[..., 1]
     rotated[..., 1] = vectors[..., 0]
     return rotated
 
