@@ -121,6 +121,22 @@ def test_measured_loop_becomes_a_map(tmp_path, capsys):
     assert sum(line.startswith("warning: ") for line in out) == len(fit["warnings"])
 
 
+def test_lost_hysteresis_and_noise_of_a_loop_are_printed(tmp_path, capsys):
+    """Noise of a tenth of the torsion: what it costs the map is in the text."""
+    rng = np.random.default_rng(1)
+    leg = np.linspace(-90.0, 90.0, 91)
+    torque = np.concatenate([leg[45:], leg[-2::-1], leg[1:]])
+    noise = rng.normal(size=torque.size)
+    loop, path = tmp_path / "loop.csv", tmp_path / "a.swg"
+    rows = np.column_stack([torque, torque / 9.0 + noise])
+    np.savetxt(loop, rows, "%.6g", ",", header="torque_Nm,torsion_arcmin", comments="")
+    measured = ["--measured-teeth", "200/202", "--measured-rated", "80"]
+    assert main(["map", str(loop), "-o", str(path), *measured]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert any(names(line, "warning", "the loops differ", "rms") for line in out)
+    assert any(names(line, "no hysteresis in the map", "noise") for line in out)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

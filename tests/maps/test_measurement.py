@@ -416,7 +416,9 @@ def test_the_map_reads_as_its_loop(tmp_path, kind, width, n, sine, noise):
     assert played.hysteresis_loss() == pytest.approx(wanted.hysteresis_loss(), rel=0.05)
     assert played.lost_motion(67.0) == pytest.approx(wanted.lost_motion(67.0), rel=0.05)
     told = drive.info["fit"]["loop"]
-    assert told["warnings"] == []
+    # parallel elements have a constant width in torque
+    wide_under_load = [True] if kind == "load" else []
+    assert [names(line, "rms") for line in told["warnings"]] == wide_under_load
     for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin"):
         pair = told[key]
         assert pair["predicted"] == pytest.approx(pair["measured"], rel=0.08)

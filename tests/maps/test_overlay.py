@@ -155,9 +155,22 @@ def test_readings_more_than_a_tenth_off_are_said(synthetic_map):
     assert overlay(drive, loop).warnings() == []
     near = overlay(drive, replace(loop, torsion=1.08 * loop.torsion))
     assert near.as_dict()["warnings"] == []
-    loss, motion = overlay(drive, replace(loop, torsion=1.12 * loop.torsion)).warnings()
+    lines = overlay(drive, replace(loop, torsion=1.12 * loop.torsion)).warnings()
+    loss, motion, whole = lines
+    assert names(whole, "rms", "11%")
     sheet = drive.spec_sheet([*FIGURES])
     for line, key in ((loss, FIGURES[0]), (motion, FIGURES[1])):
         told = [float(value) for value in re.findall(r"([\d.]+) arcmin", line)]
         assert told == pytest.approx([sheet[key], 1.12 * sheet[key]], rel=0.02)
         assert names(line, "11%")
+
+
+def test_a_loop_that_the_map_does_not_follow_is_said(synthetic_map):
+    """Drift of a fifth of the torsion, with equal figures around zero, is one line."""
+    once = torque_loop(synthetic_map)
+    drift = 0.2 * np.sin(np.pi * once.torque / np.abs(once.torque).max())
+    bent = replace(once, torsion=once.torsion + drift * np.ptp(once.torsion))
+    laid = overlay(synthetic_map, bent)
+    (line,) = [one for one in laid.warnings() if names(one, "rms")]
+    rms = np.sqrt(np.mean(laid.residual**2))
+    assert names(line, f"{rms / arcmin:.4g} arcmin", "noise, drift, play")

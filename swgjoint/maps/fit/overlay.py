@@ -55,6 +55,11 @@ class Overlay:
         """Measured minus predicted torsion [rad]. Shape (n,)."""
         return self.measured.torsion - self.predicted.torsion
 
+    @property
+    def _rms(self) -> float:
+        """Root mean square of the residual [rad]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
     def segments(self) -> list[dict[str, Any]]:
         """Residual and stiffness on 0..T1, T1..T2 and T2..Tmax, both signs together.
 
@@ -106,7 +111,8 @@ class Overlay:
     def warnings(self) -> list[str]:
         """One line for each of the figures that differs by more than :data:`APART`.
 
-        The hysteresis loss is not compared if the prediction has none.
+        The hysteresis loss is not compared if the prediction has none. The last line
+        concerns the loops as a whole.
         """
         predicted, measured = (
             readings(loop, self.rated_torque)
@@ -117,12 +123,20 @@ class Overlay:
             "lost motion": (predicted.lost_motion, measured.lost_motion),
         }
         least = NO_WIDTH * float(np.ptp(self.predicted.torsion))
-        return [
+        lines = [
             f"{name} predicted {ours / arcmin:.4g} arcmin, measured"
             f" {theirs / arcmin:.4g} arcmin: {abs(ours / theirs - 1.0):.0%} apart"
             for name, (ours, theirs) in pairs.items()
             if ours > least and theirs > 0.0 and abs(ours / theirs - 1.0) > APART
         ]
+        rest, torsion = self._rms, float(np.std(self.measured.torsion))
+        if rest > APART * torsion:
+            lines.append(
+                f"the loops differ by {rest / arcmin:.4g} arcmin rms,"
+                f" {rest / torsion:.0%} of the measured torsion: noise, drift, play, a"
+                " width that depends on the load, or another stiffness"
+            )
+        return lines
 
     def as_dict(self) -> dict[str, Any]:
         """Figures of both loops, and residuals in total and by segment; JSON values.
@@ -150,7 +164,7 @@ class Overlay:
             "beyond_range": self.beyond_range,
             "shift_arcmin": self.shift / arcmin,
             "history": self.history,
-            "rms_arcmin": float(np.sqrt(np.mean(rest**2))),
+            "rms_arcmin": self._rms / arcmin,
             "largest_arcmin": float(np.abs(rest).max()),
             "segments": self.segments(),
             "warnings": self.warnings(),
