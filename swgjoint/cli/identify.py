@@ -182,7 +182,22 @@ def report(result: dict[str, Any]) -> str:
     doubts = result["doubts"]
     lines += [note for note in result["notes"] if note not in doubts]
     lines += [f"doubtful: {line}" for line in doubts]
-    return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
+    lines += [f"wrote {name}" for name in result["files"]]
+    if result["files"]:
+        lines.append(_not_in_map(result["estimates"]))
+    return "\n".join(lines)
+
+
+def _not_in_map(estimates: dict[str, Any]) -> str:
+    """Line on the parameters that a joint has and the map of its drive has not."""
+    line = "the map has no damping: a joint has its damping_ratio, 0.02 by default"
+    if "rotor_inertia" not in estimates:
+        return line
+    return (
+        f"{line}; nor a rotor: set rotor_inertia_kgm2 ="
+        f" {estimates['rotor_inertia']['value']:.4g} of the joint (--rotor-inertia of"
+        " export), by default it follows from ratio and rated torque"
+    )
 
 
 def status(result: dict[str, Any]) -> int:

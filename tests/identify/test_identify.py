@@ -474,6 +474,11 @@ def test_command(bench, csv_file, tmp_path, capsys):
     assert (out / "identified.png").read_bytes()[:4] == b"\x89PNG"
     assert main(["identify", str(csv_file), *options[:6]]) == 0
     assert "K1 [N·m/rad]" in capsys.readouterr().out
+    assert main(["identify", str(csv_file), *options]) == 0
+    # what the map cannot hand to a joint is printed with its value and its key
+    line = capsys.readouterr().out.splitlines()[-1]
+    rotor = result["estimates"]["rotor_inertia"]["value"]
+    assert names(line, "damping_ratio", f"rotor_inertia_kgm2 = {rotor:.4g}")
 
 
 @pytest.mark.parametrize(
