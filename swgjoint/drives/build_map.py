@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from swgjoint.drives.fidelity import default_model
+from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import ratings_of
-from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.design import Design, check_design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
 from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
@@ -47,10 +48,14 @@ def build_map(
         The fitted map of the drive.
 
     Raises:
+        InputError: If ``design`` is not a design, or there are no angles.
         DesignError: If the design cannot be built or contains something that the model
             does not cover.
         ComputationError: If the solver converges at none of the torques.
     """
+    check_design(design)
+    if angles is not None and not angles >= 1:
+        raise InputError(f"angles {angles}; accepted: >= 1, or None")
     model = model or default_model(design)
     if design.losses is not None:  # not part of the finite elements
         plain = design.with_changes({"losses": None})

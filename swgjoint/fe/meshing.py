@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from math import ceil, copysign, pi
+from math import ceil, copysign, isfinite, pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, InputError
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.plane.continuation import Continuation
@@ -22,7 +22,7 @@ from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima
 from swgjoint.gear.catalogue import ratings_of
-from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.design import Design, check_design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
@@ -80,11 +80,13 @@ def simulate_meshing(
         Results at all positions and at the equilibria before the first one.
 
     Raises:
+        InputError: If ``design`` is not a design, or a number is outside its range.
         DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If a solve fails; the message carries the outcome's advice.
             A failed deflection, engagement or loading is always an error, because no
             position can be solved without them.
     """
+    _check_arguments(design, torque, steps, turn)
     if steps is None:
         steps = default_steps(design, turn)
     if half == "auto":
@@ -166,6 +168,19 @@ def simulate_meshing(
         setup=tuple(setup),
         wall_s=time.perf_counter() - begin,
     )
+
+
+def _check_arguments(
+    design: Design, torque: float, steps: int | None, turn: float
+) -> None:
+    """Reject what no run can be computed from, before anything is computed."""
+    check_design(design)
+    if not isfinite(torque):
+        raise InputError(f"torque {torque:g} N·m; accepted: a finite number")
+    if steps is not None and not steps >= 1:
+        raise InputError(f"steps {steps}; accepted: >= 1, or None")
+    if not (isfinite(turn) and turn != 0.0):
+        raise InputError(f"turn {turn:g} turns; accepted: a finite number except 0")
 
 
 def _slide_to(follow: Continuation, state: State, angle: float, turn: float) -> State:

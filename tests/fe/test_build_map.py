@@ -7,15 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from messages import names
+from messages import names, naming
 from solved import coarse, few_teeth
 
 from swgjoint.drives import solve_map as solving
 from swgjoint.drives.build_map import build_map
-from swgjoint.errors import ComputationError, Outcome
+from swgjoint.errors import ComputationError, InputError, Outcome
 from swgjoint.fe.common import sampling
 from swgjoint.fe.common.columns.torque_columns import ColumnGrid
 from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.sampling import sample_tolerances
@@ -293,3 +294,21 @@ def test_a_map_in_3d_says_at_once_that_it_takes_long(monkeypatch):
         )
     (first,) = said
     assert names(first[0], "size-25-100", "3D", "min", "2d", "ring")
+
+
+@pytest.mark.parametrize(
+    ("function", "design", "options", "parts"),
+    [
+        (build_map, "reference-2d", {}, ("reference-2d", "str", "Design.load")),
+        (build_map, None, {"angles": 0}, ("angles", "0", ">= 1")),
+        (simulate_meshing, "reference-2d", {}, ("reference-2d", "str", "Design.load")),
+        (simulate_meshing, None, {"torque": np.nan}, ("torque", "nan N·m", "finite")),
+        (simulate_meshing, None, {"steps": 0}, ("steps", "0", ">= 1")),
+        (simulate_meshing, None, {"turn": np.nan}, ("turn", "nan turns", "finite")),
+    ],
+)
+def test_arguments_without_a_result_are_refused(function, design, options, parts):
+    """A name for a design, no positions, or a torque or turn that is not a number."""
+    given = design or Design.load("reference-2d")
+    with pytest.raises(InputError, match=naming(*parts)):
+        function(given, **options)

@@ -331,3 +331,16 @@ class Design(Section):
         )
         assert math.isfinite(material.youngs_modulus)
         return material
+
+
+def check_design(design: object) -> None:
+    """Reject an argument that is not a design, such as the name of one.
+
+    Raises:
+        InputError: If it is not a :class:`Design`.
+    """
+    if not isinstance(design, Design):
+        raise InputError(
+            f"design {str(design)[:40]!r} is a {type(design).__name__}; accepted: a"
+            " Design, e.g. swgjoint.Design.load('reference-2d')"
+        )
