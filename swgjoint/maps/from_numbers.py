@@ -20,6 +20,8 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.fit.error_spectrum import LARGEST
+from swgjoint.maps.fit.loop_units import IMPOSSIBLE, TORSION_AT_RATED
 from swgjoint.maps.from_catalogue import (
     CLOSE,
     CORNER,
@@ -113,6 +115,7 @@ def map_from_numbers(
     rule = f"default ({', '.join(absent)}): multiples of the rated torque"
     source = rule if absent else "given"
     r = Ratings(rated_torque=rated, source=source, **torques)
+    _check_units(K, r)
     orders, error = _harmonics(kinematic_error or {})
     teeth = LOBES * ratio
     drive = cls(
@@ -142,6 +145,26 @@ def map_from_numbers(
         loss = hysteresis_loss_arcmin
         loss = _positive(loss, "hysteresis_loss_arcmin", "arcmin") * arcmin
     return _with_loop(drive, K, lost, loss)
+
+
+def _check_units(K: Sequence[float], r: Ratings) -> None:
+    """Reject a stiffness with which no gear turns by so much at its rated torque."""
+    ends = [0.0, *(min(end, r.rated_torque) for end in (r.T1, r.T2)), r.rated_torque]
+    torsion = sum((b - a) / k for (a, b), k in zip(pairwise(ends), K, strict=True))
+    low, high = IMPOSSIBLE
+    if low <= torsion / arcmin <= high:
+        return
+    fitting = [
+        unit
+        for unit, factor in (("N·m/arcmin", 1.0 / arcmin), ("1e4 N·m/rad", 1e4))
+        if TORSION_AT_RATED[0] <= torsion / factor / arcmin <= TORSION_AT_RATED[1]
+    ]
+    hint = f": is it in {' or '.join(fitting)}?" if fitting else ""
+    raise InputError(
+        f"stiffness {', '.join(f'{k:g}' for k in dict.fromkeys(K))} N·m/rad: torsion"
+        f" {torsion / arcmin:.4g} arcmin at the rated {r.rated_torque:g} N·m{hint};"
+        f" accepted: {low:g} to {high:g} arcmin, catalogue drives have 5 to 7 arcmin"
+    )
 
 
 def _with_loop(
@@ -246,6 +269,10 @@ def _harmonics(error: Mapping[int, float]) -> tuple[Index, Array]:
         orders[k, 0] = order
         where = f"kinematic_error of order {order}"
         values[k, 0] = _positive(amplitude, where, "arcmin") * arcmin
+        if amplitude > LARGEST:
+            raise InputError(
+                f"{where} {amplitude:g} arcmin; accepted: up to {LARGEST:g} arcmin"
+            )
     return orders, values
 
 
@@ -253,5 +280,7 @@ def _positive(value: Any, key: str, unit: str) -> float:
     """A finite number above zero, or an error that names it."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if not (number and isfinite(value) and 1e-9 < value < 1e12):
-        raise InputError(f"{key} {value!s:.40} {unit}; accepted: a finite number > 0")
+        raise InputError(
+            f"{key} {value!s:.40} {unit}; accepted: a number > 1e-9 and < 1e12"
+        )
     return float(value)

@@ -85,7 +85,7 @@ def test_error_comes_back():
     ("change", "message"),
     [
         ({"stiffness": [1e4, 2e4]}, ("stiffness", "2 values", "K1, K2 and K3")),
-        ({"stiffness": -1e4}, ("stiffness", "-10000.0", "N·m/rad", "> 0")),
+        ({"stiffness": -1e4}, ("stiffness", "-10000.0", "N·m/rad", "> 1e-9")),
         ({"rated_torque": float("nan")}, ("rated_torque", "nan", "N·m")),
         ({"ratio": 7}, ("ratio 7", "30 to 320")),
         ({"T1": 30.0, "T2": 20.0}, ("T1 = 30", "T2 = 20", "increasing")),
@@ -101,6 +101,16 @@ def test_error_comes_back():
         ),
         ({"kinematic_error": {0.5: 1.0}}, ("order 0.5", "whole numbers")),
         ({"kinematic_error": {2: -1.0}}, ("order 2", "-1.0", "arcmin")),
+        ({"kinematic_error": {2: 61.0}}, ("order 2", "61 arcmin", "up to 60")),
+        (  # 50 N·m over 9 N·m/rad are 19,099 arcmin
+            {"stiffness": 9.0},
+            ("9 N·m/rad", "1.91e+04 arcmin", "rated 50 N·m", "in N·m/arcmin or 1e4"),
+        ),
+        (
+            {"stiffness": 3.1},
+            ("stiffness 3.1 N·m/rad", "1e4 N·m/rad?", "to 1200 arcmin"),
+        ),
+        ({"stiffness": 3e8}, ("3e+08 N·m/rad", "0.02 to 1200 arcmin")),
     ],
 )
 def test_wrong_figures_are_refused(change, message):
