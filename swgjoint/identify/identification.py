@@ -249,6 +249,7 @@ def _doubts_of(
 
 def _identified(log: BenchLog, options: _Options) -> Identified:
     """Identify the parameters from a log without correcting its delay."""
+    log = log.fill_windows(options.window)
     samples = log.average(options.window)
     model, no_orders = _model_of(log, samples, options)
     values, residuals, jacobian = solve(model)

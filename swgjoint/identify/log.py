@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from swgjoint.csv_columns import header_of, read_columns
 from swgjoint.errors import InputError
@@ -29,6 +31,10 @@ TORQUES = {
 }
 """Accepted columns of each channel and their factors to SI units; ``TORQUES`` are those
 of which at least one is required."""
+JITTER = 0.5
+"""Largest distance of a time from an even one, in steps, that counts as jitter [-]."""
+WHOLE = 1e-3
+"""Largest distance of the samples per window from a whole number [-]."""
 FEWEST = 200
 """Smallest number of averaged samples for a fit."""
 
@@ -106,6 +112,76 @@ class BenchLog:
             InputError: If the window is invalid, if a window contains no sample, or if
                 there are too few windows.
         """
+        _, place, counts = np.unique(
+            self._windows(window), return_inverse=True, return_counts=True
+        )
+
+        def mean(values: Array | None) -> Array | None:
+            return None if values is None else np.bincount(place, values) / counts
+
+        time, motor, link = (
+            np.bincount(place, x) / counts
+            for x in (self.time, self.motor_angle, self.link_angle)
+        )
+        return Averaged(
+            time=time,
+            motor_angle=motor,
+            link_angle=link,
+            output_torque=mean(self.output_torque),
+            motor_torque=mean(self.motor_torque),
+            window=np.asarray(place, dtype=np.intp),
+        )
+
+    def fill_windows(self, window: float) -> BenchLog:
+        """The log with the same number of evenly spaced samples in every window.
+
+        The mean of samples that are lost here and there, or of two and three samples in
+        turn, belongs to a time that differs from the centre of its window. At constant
+        speed this would look like an acceleration. Such a log is interpolated by cubic
+        splines; any other log is returned as it is. Times that stray by less than
+        :data:`JITTER` steps from even ones are taken as even, because a logger that
+        receives samples of an even clock gives them such times.
+
+        Args:
+            window: Duration of a window [s].
+
+        Raises:
+            InputError: As :meth:`average`.
+        """
+        self._windows(window)
+        number = np.arange(len(self.time))
+        step, first = np.polyfit(number, self.time - self.time[0], 1)
+        even = self.time[0] + first + step * number
+        per_window = window / step
+        if np.abs(self.time - even).max() > JITTER * step:
+            even = self.time
+        elif abs(per_window - round(per_window)) < WHOLE:
+            return self
+        count = ceil(per_window)
+        fine = window / count
+        time = even[0] + fine * np.arange(int(np.ptp(even) / fine) + 1)
+
+        def at(values: Array | None) -> Array | None:
+            return None if values is None else CubicSpline(even, values)(time)
+
+        motor, link = (
+            CubicSpline(even, x)(time) for x in (self.motor_angle, self.link_angle)
+        )
+        return replace(
+            self,
+            time=time,
+            motor_angle=motor,
+            link_angle=link,
+            output_torque=at(self.output_torque),
+            motor_torque=at(self.motor_torque),
+        )
+
+    def _windows(self, window: float) -> NDArray[np.intp]:
+        """Number of the window of every sample. Shape (n,).
+
+        Raises:
+            InputError: As :meth:`average`.
+        """
         if not (np.isfinite(window) and window > 0.0):
             raise InputError(f"window {window:g} s; accepted: > 0 s")
         # half a step early, so that round-off of the time moves no sample
@@ -123,29 +199,14 @@ class BenchLog:
                 f"{self.where}: no sample for {gap * window:g} s after {at:g} s;"
                 f" accepted: at least one sample in every {window:g} s"
             )
-        _, place, counts = np.unique(bins, return_inverse=True, return_counts=True)
-        if counts.size < FEWEST:
+        count = np.unique(bins).size
+        if count < FEWEST:
             raise InputError(
                 f"{self.where}: too few windows of {window:g} s in a log of"
                 f" {np.ptp(self.time):g} s with {len(self.time)} samples:"
-                f" {counts.size}; accepted: at least {FEWEST}"
+                f" {count}; accepted: at least {FEWEST}"
             )
-
-        def mean(values: Array | None) -> Array | None:
-            return None if values is None else np.bincount(place, values) / counts
-
-        time, motor, link = (
-            np.bincount(place, x) / counts
-            for x in (self.time, self.motor_angle, self.link_angle)
-        )
-        return Averaged(
-            time=time,
-            motor_angle=motor,
-            link_angle=link,
-            output_torque=mean(self.output_torque),
-            motor_torque=mean(self.motor_torque),
-            window=np.asarray(place, dtype=np.intp),
-        )
+        return np.asarray(bins, dtype=np.intp)
 
 
 def read_log(path: str | Path) -> BenchLog:

@@ -138,3 +138,39 @@ def test_a_small_negative_damping_is_a_note():
     assert damping.high < 0.0 and 0.0 < found.effects["damping"] < 0.01
     assert any(note.startswith("damping -") for note in found.notes)
     assert found.doubts == ()
+
+
+def taken(log: BenchLog, kept) -> BenchLog:
+    """The log with some of its samples."""
+    channels = ("time", "motor_angle", "link_angle", "output_torque", "motor_torque")
+    return replace(log, **{name: getattr(log, name)[kept] for name in channels})
+
+
+@pytest.mark.parametrize(
+    ("kept", "window"),
+    [
+        (slice(None, None, 2), 0.005),  # two and three samples per window in turn
+        (slice(None), 0.0044),
+        (np.random.default_rng(4).random(8000) > 0.3, 0.01),  # lost samples
+    ],
+)
+def test_uneven_windows_leave_the_inertia(kept, window):
+    """Windows of unequal samples have the rotor, stiffness and error of equal ones."""
+    even = identify(log_of(), **OPTIONS)
+    found = identify(taken(log_of(), kept), window=window, **OPTIONS)
+    assert found.doubts == ()
+    for name in ("rotor_inertia", "K1", "error_2_0_cos", "friction_viscous"):
+        value = found.estimates[name].value
+        assert value == pytest.approx(even.estimates[name].value, rel=0.05), name
+
+
+def test_jitter_of_the_clock_of_a_logger_is_left_out():
+    """Times within a quarter of a step of even ones change nothing but the times."""
+    log = log_of()
+    stray = 2.5e-4 * np.random.default_rng(4).uniform(-1.0, 1.0, len(log.time))
+    late = replace(log, time=log.time + stray)
+    assert late.fill_windows(0.005) is late
+    found, even = (identify(one, **OPTIONS) for one in (late, log))
+    for name in ("rotor_inertia", "K1"):
+        value = found.estimates[name].value
+        assert value == pytest.approx(even.estimates[name].value, rel=0.01)
