@@ -133,6 +133,27 @@ def check_angles(log: BenchLog) -> None:
             )
 
 
+def check_torsion(log: BenchLog, ratio: float) -> None:
+    """Reject single samples that one of the encoders lost.
+
+    Args:
+        log: Log of the bench, with the ratio of the drive.
+        ratio: Signed ratio i [-].
+
+    Raises:
+        InputError: If the torsion changes by more than half a turn of the motor over
+            the ratio from one sample to the next.
+    """
+    steps = np.abs(np.diff(log.motor_angle / ratio - log.link_angle))
+    at = int(steps.argmax()) if steps.size else 0
+    if steps.size and steps[at] > np.pi / abs(ratio):
+        raise InputError(
+            f"{log.where}: the torsion, motor_angle/{ratio:g} - link_angle, jumps by"
+            f" {steps[at] / arcmin:.4g} arcmin at {log.time[at + 1]:g} s; accepted:"
+            " angles without lost samples"
+        )
+
+
 def check_torques(model: Model, where: str) -> None:
     """Reject two torques whose signs or units contradict each other.
 

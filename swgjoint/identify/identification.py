@@ -49,6 +49,7 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients
+from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.gear.ratings import Ratings
 from swgjoint.identify.checks import (
     SMALL,
@@ -56,6 +57,7 @@ from swgjoint.identify.checks import (
     check_angles,
     check_ratio,
     check_torques,
+    check_torsion,
     doubts_of,
     negative,
     remarks,
@@ -201,6 +203,7 @@ def identify(
     teeth = (teeth_flexspline, teeth_circular_spline)
     check_angles(log)
     check_ratio(log, layout, teeth)
+    check_torsion(log, signed_ratio(layout, *teeth))
     options = _Options(
         teeth=teeth,
         ratings=ratings,

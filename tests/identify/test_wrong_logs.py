@@ -115,6 +115,17 @@ def test_angles_of_a_single_turn_encoder_are_refused(channel):
         identify(log, **OPTIONS)
 
 
+@pytest.mark.parametrize("channel", ["motor_angle", "link_angle"])
+def test_a_lost_reading_of_an_encoder_is_refused(channel):
+    """One zero in a channel is named by its time, not as a stiffness without data."""
+    log = log_of()
+    values = getattr(log, channel).copy()
+    values[2000] = 0.0
+    told = naming("bench.csv", channel, "jumps by", "2 s")
+    with pytest.raises(InputError, match=told):
+        identify(replace(log, **{channel: values}), **OPTIONS)
+
+
 @pytest.mark.parametrize("turns", [0.0, 0.1])
 def test_less_than_a_turn_of_the_input_tells_no_kinematic_error(turns):
     """A locked or almost locked input: the note names the travel and the remedy.
