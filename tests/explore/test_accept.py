@@ -261,6 +261,45 @@ def test_measured_logs_are_judged_instead(good, tmp_path, capsys):
     assert np.array_equal(back.link_angle, log.link_angle)
 
 
+def measured_loop(sign: float) -> BenchLog:
+    """A torque loop of 3e4 N·m/rad with a locked input; sign 1 is that of a bench."""
+    torque = 120.0 * np.sin(2 * pi * np.arange(4001) / 2000)
+    return log_of(0.0 * torque, -sign * torque / 3e4, output=torque)
+
+
+def measured_efficiency(percent: float) -> BenchLog:
+    """Two seconds each at -500, -1000 and -2000 rpm of the input under 67 N·m."""
+    speed = np.repeat([-500.0, -1000.0, -2000.0], 2000) * rpm
+    motor = np.cumsum(speed) * 1e-3
+    output = np.full(speed.size, 67.0)
+    return log_of(motor, motor / -100.0, output, output / percent)
+
+
+@pytest.mark.parametrize(
+    ("test", "right", "wrong", "message"),
+    [
+        ("stiffness", measured_loop(1.0), measured_loop(-1.0), ("K1_Nm_rad", "-3e+04")),
+        (
+            "efficiency",
+            measured_efficiency(-80.0),
+            measured_efficiency(-105.0),
+            ("efficiency_percent", "500 rpm", "105", "at most 100"),
+        ),
+    ],
+)
+def test_impossible_measurements_do_not_meet_limits(
+    good, tmp_path, test, right, wrong, message
+):
+    """Wrong signs or units: a lost motion of -0.6 arcmin is below any upper limit."""
+    path, _ = good
+    file = tmp_path / f"{test}.csv"
+    file.write_text(log_csv(right))
+    assert accept(path, only=[test], measured=tmp_path).passed
+    file.write_text(log_csv(wrong))
+    with pytest.raises(InputError, match=naming(f"{test}.csv", *message)):
+        accept(path, only=[test], measured=tmp_path)
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from swgjoint.drives.references import given_drives, load_drive
 from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import InputError
 from swgjoint.explore.accept.figures import FIGURES, LOWER, TESTS, Bench, Figures
+from swgjoint.identify.checks import check_angles, check_ratio, check_torsion
 from swgjoint.identify.log import BenchLog, read_log
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import bundled_names
@@ -37,6 +39,8 @@ AT_INPUT_SPEED = ("no_load", "starting", "efficiency")
 other ratios."""
 RATIO = 100.0
 """Magnitude of the ratio for which the scenes state speeds of the output [-]."""
+EFFICIENCY = ("efficiency_percent", 100.0)
+"""Figure that has a largest possible value, and this value [%]."""
 WITH_FRICTION = ("no_load", "starting", "efficiency", "back_driving")
 """Tests of the friction of a drive."""
 
@@ -142,8 +146,8 @@ def accept(
             if figures["verdict"] != VALID:
                 invalid[name] = tuple(figures["reasons"])
         if name in files:
-            logs["measured"][name] = read_log(files[name])
-            found["measured"] = _evaluate(scene, logs["measured"][name], bench)
+            logs["measured"][name] = log = read_log(files[name])
+            found["measured"] = _evaluate_measured(scene, log, bench, drive)
         elif measured is not None:
             reason = f"no file {name}.csv"
         judged = "simulated" if measured is None else "measured"
@@ -259,6 +263,34 @@ def _log_of(run: Run) -> BenchLog:
 def _evaluate(scene: Scene, log: BenchLog, bench: Bench) -> Figures:
     assert scene.acceptance is not None
     return TESTS[scene.acceptance.test](log, bench)
+
+
+def _evaluate_measured(
+    scene: Scene, log: BenchLog, bench: Bench, drive: DriveMap
+) -> Figures:
+    """Figures of a measured log whose signs and units are those of the drive.
+
+    Raises:
+        InputError: If they are not, or if the log cannot be evaluated. A negative lost
+            motion would meet any limit, and so would an efficiency above 100 %.
+    """
+    check_angles(log)
+    check_ratio(
+        log, drive.layout, (drive.teeth_flexspline, drive.teeth_circular_spline)
+    )
+    check_torsion(log, drive.ratio)
+    found = _evaluate(scene, log, bench)
+    for figure, most in (*((f"K{k}_Nm_rad", inf) for k in (1, 2, 3)), EFFICIENCY):
+        for at, value in found.get(figure, {}).items():
+            if value is not None and not 0.0 < value <= most:
+                where = f" at {at}" if at else ""
+                raise InputError(
+                    f"{log.where}: {figure}{where} = {value:.4g}; accepted: more than 0"
+                    + (f", at most {most:g}" if isfinite(most) else "")
+                    + ", from torques and angles with the signs, units and zeros of"
+                    " the bench"
+                )
+    return found
 
 
 def _rows(
