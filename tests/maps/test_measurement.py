@@ -240,6 +240,28 @@ def test_harmonics_come_back(tmp_path):
     assert found.spec_sheet([key])[key] == pytest.approx(drive.spec_sheet([key])[key])
 
 
+@pytest.mark.parametrize(("noise", "told"), [(0.05, 0), (0.3, 1)])
+def test_what_the_harmonics_leave_of_an_error_is_said(tmp_path, noise, told):
+    """Noise of 5 % of the rms of the record is silent, noise of 30 % is one line."""
+    drive = DriveMap.from_numbers(
+        stiffness=2e4, rated_torque=50.0, ratio=60, kinematic_error={2: 1.0}
+    )
+    loop = write(
+        tmp_path / "loop.csv", "torque_Nm,torsion_rad", *hysteresis_loop(drive)
+    )
+    psi, error = error_record(drive)
+    error = error + noise * error.std() * np.random.default_rng(2).normal(size=psi.size)
+    record = write(
+        tmp_path / "e.csv", "output_deg,error_arcmin", psi / deg, error / arcmin
+    )
+    found = DriveMap.from_measurement(
+        loop, kinematic_error=record, ratings=50.0, **TEETH
+    )
+    lines = [one for one in found.info["fit"]["loop"]["warnings"] if "leave" in one]
+    assert len(lines) == told
+    assert all(names(line, "kinematic error", "29%") for line in lines)
+
+
 def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path):
     """A coarse record gives the low orders and says which it cannot carry."""
     drive = synthetic_map.with_harmonics([True, True, True, False, False])
@@ -258,6 +280,10 @@ def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path)
         **TEETH,
     )
     assert found.info["fit"]["kinematic_error"]["unresolved"] == [[122, 0]]
+    told = found.info["fit"]["loop"]["warnings"]
+    # 2.5 samples for each of the 122 waves of 60 turns of the input
+    (line,) = [one for one in told if names(one, "122:0")]
+    assert names(line, "kinematic error", "2000 samples", "need 18300")
     assert [tuple(pq) for pq in found.orders] == [(0, 0), (2, 0), (4, 0)]
 
 

@@ -24,6 +24,8 @@ ORDERS: tuple[tuple[int, int], ...] = (
 """Orders (p, q) of p alpha + q beta that are fitted to a record: one to six cycles per
 turn of alpha and of beta, and one and two cycles per turn of alpha - beta, which is the
 output angle up to sign if the wave generator is the input."""
+APART = 0.1
+"""Rest of a record relative to its rms above which a warning is given [-]."""
 KEEP = 0.01
 """A harmonic is kept if its amplitude reaches this fraction of the largest one."""
 
@@ -43,6 +45,26 @@ class ErrorFit:
     """Cosine and sine amplitudes [rad]. Shape (n, 2)."""
     report: dict[str, Any]
     """Residuals, kept, dropped and unresolved orders; JSON values."""
+
+    def warnings(self) -> list[str]:
+        """One line on orders that the samples do not resolve, one on a large rest."""
+        found, lines = self.report, []
+        if missing := found["unresolved"]:
+            lines.append(
+                f"kinematic error: {found['samples'] / found['turns']:.0f} samples per"
+                " output turn do not resolve the orders"
+                f" {', '.join(f'{p}:{q}' for p, q in missing)} (waves per turn of the"
+                " wave generator against circular spline and flexspline), which the map"
+                f" lacks; all of them need {found['samples_needed']:.0f}"
+            )
+        rest, rms = found["residual_rms_arcmin"], found["rms_arcmin"]
+        if rest > APART * rms > 0.0:
+            lines.append(
+                f"kinematic error: the harmonics of the map leave {rest:.4g} arcmin"
+                f" rms, {rest / rms:.0%} of the record: noise, drift, other orders, or"
+                " other units"
+            )
+        return lines
 
 
 def fit_error(
@@ -132,6 +154,7 @@ def fit_error(
             "samples": int(output.size),
             "turns": span / (2.0 * np.pi),
             "peak_to_peak_arcmin": float(np.ptp(error)) / arcmin,
+            "rms_arcmin": float(np.std(error)) / arcmin,
             "residual_rms_arcmin": float(np.sqrt(np.mean(rest**2))) / arcmin,
             "residual_max_arcmin": float(np.abs(rest).max()) / arcmin,
             "harmonics": [
@@ -140,5 +163,6 @@ def fit_error(
             ],
             "dropped": dropped,
             "unresolved": unresolved,
+            "samples_needed": _PER_WAVE * float(per_turn.max()),
         },
     )

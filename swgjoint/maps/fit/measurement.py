@@ -226,7 +226,13 @@ def _fit_report(
     compared = overlay(smooth, loop).as_dict()
     return report | {
         "loop": {key: compared[key] for key in ("rms_arcmin", *COMPARED)}
-        | {"warnings": [*doubts, *compared["warnings"]]}
+        | {
+            "warnings": [
+                *doubts,
+                *compared["warnings"],
+                *(error.warnings() if error is not None else ()),
+            ]
+        }
     }
 
 
