@@ -283,6 +283,12 @@ def find_drive(reference: str | Path | Design | DriveMap) -> DriveMap | Design:
     reference = str(reference)
     if reference.endswith(".swg"):
         return DriveMap.load(reference)
+    if reference.endswith(".csv"):
+        raise InputError(
+            f"drive {reference!r}: a measured torque loop needs the teeth and the rated"
+            f" torque of its drive; make a map of it: swgjoint map {reference} -o"
+            " drive.swg --measured-teeth FS/CS --measured-rated NM"
+        )
     if names_catalogue(reference):
         return DriveMap.from_catalogue(reference)
     try:

@@ -146,6 +146,13 @@ def test_values_out_of_range(key, value, words):
         Scene.from_data(SCENE, overrides={f"joints.elbow.{key}": value})
 
 
+def test_a_measured_loop_as_a_drive_is_sent_to_its_map():
+    """A CSV file has neither teeth nor ratings: the command that asks for them."""
+    message = naming("'loop.csv'", "swgjoint map loop.csv", "--measured-teeth FS/CS")
+    with pytest.raises(InputError, match=message):
+        load_drive("loop.csv")
+
+
 def test_a_loaded_drive_takes_an_error_where_it_has_none(tmp_path, synthetic_map):
     """Catalogue and map file alike; a map with an error of its own refuses."""
     assert peak_to_peak(load_drive("CSG-25-100", kinematic_error_arcmin=0.0)) == 0.0
