@@ -41,7 +41,7 @@ pytestmark = [
 ]
 
 
-SLOW_TO_COMPILE = ("module.cc", "combined.cpp", "local_sums.cc")
+SLOW_TO_COMPILE = ("module.cc", "combined.cpp", "local_sums.cc", "cholesky.cc")
 """Sources whose templates take longer to optimise than their loops to run."""
 OPTIONS = "-std=c++17 -g1 -fPIC -fvisibility=hidden".split()
 OPTIONS += [*SANITIZERS, "-fno-sanitize=vptr"]
