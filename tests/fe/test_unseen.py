@@ -1,32 +1,59 @@
-"""Maps against finite elements at torques and angles that no map has seen."""
+"""Maps against finite elements at torques and angles that no map has seen.
+
+Most meshes have half as many elements in each direction as those of the designs: a map
+takes 0.6 of the time. ``map_accuracy.py`` measures the figures of the designs' meshes.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from map_accuracy import DESIGNS, OTHERS, Compared, differences, scaled
-from solved import few_teeth
+from solved import coarse, few_teeth
 
 from swgjoint.gear.design.design import Design
 
 GOAL = (0.05, 0.02)
 """Largest and rms difference, in the peak to peak at the torque."""
+FOUND = {
+    "reference-2d of few teeth": (0.43, 0.37, 0.81),
+    "reference-2d-dca of few teeth": (0.65, 0.42, 0.24),
+    "reference-2d": (0.56, 0.30, 0.16),
+    "reference-2d-dca": (0.78, 0.62, 0.099),
+    "reference-2d-dca-improved": (0.89, 0.63, 0.050),
+    "reference-2d-qca-improved": (0.96, 0.66, 0.052),
+    "reference-2d-involute": (0.79, 0.41, 0.13),
+    "reference-2d-flexspline-fixed": (0.94, 0.44, 0.052),
+    "dca-80-to-1": (0.71, 1.64, 0.0038),
+    "reference-2d-simplified": (1.67, 0.69, 0.0047),
+    "reference-2d-four-roller": (0.53, 1.10, 0.036),
+    "reference-2d-parabolic": (0.83, 1.35, 0.031),
+    "reference-2d-asymmetric": (0.88, 1.71, 0.043),
+    "own-100": (1.17, 0.73, 0.0014),
+    "own-80": (0.20, 0.41, 0.49),
+    "own-140": (0.96, 0.42, 0.028),
+}
+"""Rms difference of output error and of input torque, in the peak to peak [%], and
+difference of the mean torsion [%], each at the worst torque. The goal alone would allow
+an error of 5 % in the strongest harmonic."""
+WORSE, LEAST = 1.4, 0.05
+"""Factor by which these differences may grow, and what is always accepted [%]."""
+OWN_MESH = ("reference-2d-parabolic", "reference-2d-asymmetric")
+"""Designs that need their own mesh: on the coarser one, maps are off by 12 and 10 % of
+the input torque at small torques instead of 2.8 and 3.4 %."""
 SEEN = 0.7
 """Smallest part of the largest difference at these equilibria that a record states."""
-PATHS = {"output_error": 0.0, "input_torque": 7.6e-6}
-"""Scatter of one equilibrium over the path to it [rad], [N·m]: dca-80-to-1 at 16.6 N·m
-has 0.0033 of its 2.3 mN·m of input torque over five paths."""
-LEAST = 0.004
-"""Scatter that is always accepted, in the peak to peak."""
 
 
-def check(design: Design) -> None:
-    """Hold a map to the goal, and its record too."""
+def check(name: str, design: Design) -> None:
+    """Hold a map to the goal and to its own figures, and its record too."""
     compared = Compared(design)
     found, record = differences(compared, design), compared.record
     largest, rms = GOAL
     assert found[:, [1, 3]].max() < largest
     assert found[:, [2, 4]].max() < rms
+    own = 100.0 * found[:, [2, 4, 5]].max(axis=0)
+    assert (own < np.maximum(WORSE * np.array(FOUND[name]), LEAST)).all(), own
     for key, column, unit in (
         ("output_error", 1, "rad"),
         ("input_torque", 3, "Nm"),
@@ -35,14 +62,13 @@ def check(design: Design) -> None:
         stated, worst = record[key], found[:, column].max()
         assert worst < 0.5 * GOAL[0] or stated["largest"] > SEEN * worst
         # and no more than there is: a solve of our own at the place that it names
-        torque, theta = stated["at_Nm"], np.array([stated["input_angle_rad"]])
-        state = compared.follow.to_torque(compared.rest, torque)
-        wrong = compared.at(state, theta)[column][0]
+        torque, theta = stated["at_Nm"], stated["input_angle_rad"]
+        state = compared.follow.to_position(compared.rest, torque, theta)
+        wrong = compared.at(state, np.array([theta]))[column][0]
         (row,) = (r for r in record["rows"] if r["torque_Nm"] == torque)
-        high = row[f"{key}_pp_{unit}"]
-        scatter = max(LEAST, PATHS[key] / high)
-        assert abs(wrong) / high == pytest.approx(
-            stated["largest"], rel=0.1, abs=scatter
+        # 0.4 % with the conforming flanks of dca-80-to-1, 0.2 % with the involute ones
+        assert abs(wrong) / row[f"{key}_pp_{unit}"] == pytest.approx(
+            stated["largest"], rel=0.02
         )
     assert record["solves"] > 100
     assert record["secant_stiffness"]["largest"] < GOAL[0]
@@ -52,16 +78,16 @@ def check(design: Design) -> None:
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
 def test_small_maps_meet_unseen_solves(name):
     """Two maps of few teeth meet the goal between their samples."""
-    check(few_teeth(name))
+    check(f"{name} of few teeth", few_teeth(name))
 
 
 @pytest.mark.fe
 @pytest.mark.slow
-@pytest.mark.timeout(2400)  # conforming flanks: 2656 equilibria in 600 s
+@pytest.mark.timeout(2400)  # conforming flanks: 2656 equilibria
 @pytest.mark.parametrize("name", DESIGNS)
 def test_bundled_maps_meet_unseen_solves(name):
     """All bundled 2D designs meet the goal."""
-    check(Design.load(name))
+    check(name, Design.load(name) if name in OWN_MESH else coarse(name))
 
 
 @pytest.mark.fe
@@ -69,4 +95,4 @@ def test_bundled_maps_meet_unseen_solves(name):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_maps_meet_unseen_solves(name):
     """Drives of other sizes do so, too: other wave generators, teeth with clearance."""
-    check(scaled(OTHERS[name]))
+    check(name, scaled({**OTHERS[name], "mesh.refinement": 0.5}))

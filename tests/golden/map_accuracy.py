@@ -161,8 +161,8 @@ def at_torques(
 
     Returns:
         Rows of torque [N·m], then largest and rms difference of the loaded error and of
-        the input torque, in the peak to peak of the finite elements at that torque (n,
-        5).
+        the input torque, in the peak to peak of the finite elements at that torque, and
+        the difference of the mean torsion, in the mean torsion (n, 6).
     """
     rows = []
     theta = 2.0 * pi / design.periodicity * (np.arange(angles) + 0.37) / angles
@@ -170,14 +170,16 @@ def at_torques(
     for torque in torques:
         state = found.follow.to_torque(state, float(torque))
         error, apart, moment, missed = found.at(state, theta)
+        torsion = error.mean() - torque * found.series - found.offset
+        mean = apart.mean()
         # a constant angle has no meaning: each code counts from its own zero
-        apart -= apart.mean()
+        apart -= mean
         row = [float(torque)]
         for values, wrong in ((error, apart), (moment, missed)):
             height = np.ptp(values)
             rms = np.sqrt(np.mean(wrong**2))
             row += [np.abs(wrong).max() / height, rms / height]
-        rows.append(row)
+        rows.append([*row, abs(mean / torsion)])
     return np.array(rows)
 
 
