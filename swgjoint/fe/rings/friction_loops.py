@@ -181,7 +181,8 @@ def path_loop(
 
     x, t, work = 0.0, 0.0, 0.0
     rows = [(x, work)]
-    reach = float(torsion[-1])
+    # the largest torque is reached at the last torsion up to rounding
+    reach = (1.0 + 1e-9) * float(torsion[-1])
     for wanted in torque[1:].tolist():
         x_0, t_0 = x, t
         x = float(brentq(excess, -reach, reach, args=(x_0, t_0, wanted), xtol=1e-15))
