@@ -175,9 +175,9 @@ def test_features_are_margins_in_steps_up_to_the_cut():
     margin = influence().respond(errors(50), 2.0).margin
     guess = StateGuess.fit(errors(50), [], margin)
     cut = guess.most
-    row = np.array([[0.5 * cut, -cut, 9.0 * cut, np.nan]])
+    row = np.array([[0.6 * cut, -cut, 9.0 * cut, np.nan]])
     seen = replace(guess, varied=np.ones(4, dtype=bool)).features(row)
-    assert seen.tolist() == [[64, -127, 127, 0]]
+    assert seen.tolist() == [[76, -127, 127, 0]]
 
 
 def test_contacts_close_to_a_change_are_guessed():
