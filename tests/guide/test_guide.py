@@ -347,12 +347,23 @@ def test_linear_control_page(tmp_path, monkeypatch, capsys):
 
 
 def test_optimal_control_page(tmp_path, monkeypatch, capsys):
-    """The motions and the arms are found, and print what the page shows."""
+    """The motions and the arms are found, and print what the page shows.
+
+    IPOPT ends in one of several local optima, and which one depends on the processor.
+    """
     for name in ("casadi", "pinocchio"):
         pytest.importorskip(name)
     page = GUIDE / "how-to" / "optimal-control.md"
-    out = follow(page, tmp_path, monkeypatch, capsys)
-    assert out == "".join(blocks(page, "text"))
+    out, shown = (
+        re.split(r"(\d+\.\d+)", text)
+        for text in (
+            follow(page, tmp_path, monkeypatch, capsys),
+            "".join(blocks(page, "text")),
+        )
+    )
+    assert out[::2] == shown[::2]
+    numbers = [[float(x) for x in part[1::2]] for part in (out, shown)]
+    assert numbers[0] == pytest.approx(numbers[1], rel=0.1)
 
 
 def test_own_environment_page(capsys):
