@@ -11,7 +11,7 @@ from solved import PITCH, coarse
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.fe.plane.fields import flexspline_field
-from swgjoint.fe.plane.shape_fields import plane_surface
+from swgjoint.fe.plane.figures.shape_fields import plane_surface
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.shape_fields import solid_surface
 from swgjoint.maps.root_stress import root_points, root_stress

@@ -18,7 +18,7 @@ from swgjoint.fe.label import label_of
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import in_plane, sector_model
 from swgjoint.fe.plane.equilibrium import MAP_SOLVER
-from swgjoint.fe.plane.shape_fields import (
+from swgjoint.fe.plane.figures.shape_fields import (
     SectorFields,
     ShapeSurface,
     drive_fields,

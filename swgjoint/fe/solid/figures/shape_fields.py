@@ -1,4 +1,6 @@
-"""Fields of 3D equilibria for display, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
+"""Fields of 3D equilibria for display.
+
+:mod:`swgjoint.fe.plane.figures.shape_fields` has those in 2D.
 
 The displayed surface starts at the bore of the open edge, follows the outline of the
 teeth at both edges of the face width and continues along the outside of the cup, with
@@ -9,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swgjoint.fe.plane.shape_fields import (
+from swgjoint.fe.plane.figures.shape_fields import (
     EVERY,
     SectorFields,
     ShapeSurface,
