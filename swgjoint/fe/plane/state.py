@@ -36,7 +36,13 @@ class StateFigures:
     """Elastic energy of the whole drive, including that of the contacts [J]."""
     compliance: float = 0.0
     """Tangent compliance -d(output rotation)/dT at the active contacts [rad/(N·m)]; NaN
-    in a 3D model whose torque is not prescribed."""
+    in a 3D model whose torque is not prescribed.
+
+    The tangent takes tooth forces as turning with the tooth. Compared with differences
+    of output angles, the compliance of 2D models is up to 2 % off under high torques:
+    -0.5 % at 10 % and -2.0 % at 100 % of the repeated peak of ``size-25-100``, 1.8 % on
+    four rollers, 0.02 % in the reference drive.
+    """
     outcome: Outcome = Outcome.CONVERGED
     """Outcome of the solve."""
     history: tuple[float, ...] = ()
