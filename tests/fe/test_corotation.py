@@ -10,6 +10,7 @@ from swgjoint.fe.plane.corotation import (
     elastic_force,
     project_to_frames,
     rotate,
+    rotate_right_angle,
     sector_frames,
     tangent,
 )
