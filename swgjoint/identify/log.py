@@ -161,20 +161,10 @@ class BenchLog:
         fine = window / count
         time = even[0] + fine * np.arange(int(np.ptp(even) / fine) + 1)
 
-        def at(values: Array | None) -> Array | None:
-            return None if values is None else CubicSpline(even, values)(time)
-
-        motor, link = (
-            CubicSpline(even, x)(time) for x in (self.motor_angle, self.link_angle)
-        )
-        return replace(
-            self,
-            time=time,
-            motor_angle=motor,
-            link_angle=link,
-            output_torque=at(self.output_torque),
-            motor_torque=at(self.motor_torque),
-        )
+        keys = ("motor_angle", "link_angle", "output_torque", "motor_torque")
+        known = {key: x for key in keys if (x := getattr(self, key)) is not None}
+        filled = {key: CubicSpline(even, x)(time) for key, x in known.items()}
+        return replace(self, time=time, **filled)
 
     def _windows(self, window: float) -> NDArray[np.intp]:
         """Number of the window of every sample. Shape (n,).
