@@ -134,7 +134,7 @@ def report(result: dict[str, Any]) -> str:
                 ),
             )
         )
-    lines += turn_lines(result)
+    lines += [*_rigid_generator(result), *turn_lines(result)]
     error = result["validity"].get("kinematic_error", "none")
     if error not in ("none", "given") and any(key in result for key in TURN_KEYS):
         lines.append(f"kinematic error (determines accuracy and ripple): {error}")
@@ -156,6 +156,19 @@ def report(result: dict[str, Any]) -> str:
     lines += [f"- {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join(lines)
+
+
+def _rigid_generator(result: dict[str, Any]) -> list[str]:
+    """State which figures are those of a drive without its wave-generator bearing."""
+    keys = ("K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad", "lost_motion_arcmin")
+    left_out = result["validity"].get("left_out") or ""
+    if "wave_generator.bearing" not in left_out or not any(map(result.get, keys)):
+        return []
+    return [
+        "K1, K2, K3 and lost motion: with a rigid wave generator instead of the ball"
+        " bearing, whose clearance and balls give way; K1 of size-25-100-bought is 2.5"
+        " times as large without it; the models ring and 2d contain the bearing"
+    ]
 
 
 def turn_lines(result: dict[str, Any]) -> list[str]:

@@ -204,6 +204,20 @@ def test_a_sheet_says_that_its_ripple_has_no_friction(
     assert says == rubs
 
 
+@pytest.mark.parametrize("key", ["K1_Nm_rad", "T1_Nm"])
+@pytest.mark.parametrize("left_out", ["", "wave_generator.bearing, more"])
+def test_a_sheet_says_that_its_stiffness_has_no_bearing(
+    capsys, monkeypatch, synthetic_map, left_out, key
+):
+    """Maps of the 3D model have a rigid wave generator, which triples K1."""
+    label = {"model": "3d", "left_out": left_out}
+    drive = replace(synthetic_map, info={**synthetic_map.info, "label": label})
+    monkeypatch.setattr(builder, "build_map", lambda design, **options: drive)
+    assert main(["spec", "reference-3d", "--only", key, "--quiet"]) == 0
+    says = "rigid wave generator" in capsys.readouterr().out
+    assert says == (bool(left_out) and key == "K1_Nm_rad")
+
+
 def test_figures_of_the_solid_model(built, solid, capsys):
     """Each alone computes nothing else; details stand beside them."""
     found = spec(capsys, "xb1-100-80", "--only", "radial_stiffness_N_mm")
