@@ -2,7 +2,13 @@ from swgjoint.typing import Array, Index, Mask
 
 class Limits:
     def __init__(
-        self, *, corner: float, beyond: float, refined: float, refinements: float
+        self,
+        *,
+        corner: float,
+        beyond: float,
+        past: float,
+        refined: float,
+        refinements: float,
     ) -> None: ...
 
 class Flank:

@@ -229,12 +229,12 @@ void bind_search(nb::module_& m) {
   nb::class_<swgjoint::Limits>(m, "Limits")
       .def(
           "__init__",
-          [](swgjoint::Limits* self, double corner, double beyond, double refined,
-             int refinements) {
-            new (self) swgjoint::Limits{corner, beyond, refined, refinements};
+          [](swgjoint::Limits* self, double corner, double beyond, double past,
+             double refined, int refinements) {
+            new (self) swgjoint::Limits{corner, beyond, past, refined, refinements};
           },
-          nb::kw_only(), nb::arg("corner"), nb::arg("beyond"), nb::arg("refined"),
-          nb::arg("refinements"));
+          nb::kw_only(), nb::arg("corner"), nb::arg("beyond"), nb::arg("past"),
+          nb::arg("refined"), nb::arg("refinements"));
   nb::class_<Flank>(m, "Flank")
       .def(nb::init<In<2>, In<2>, Index, In<1>, In<3>, double>(), nb::arg("pieces"),
            nb::arg("edges"), nb::arg("intervals"), nb::arg("stations"),

@@ -391,6 +391,11 @@ Meeting ToothSearch::meet(const double* flank, const Place& place, double* weigh
   const double sign = place.side == 0 ? 1.0 : -1.0;
   const Vec out = seen.foot.normal;
   meeting.gap = seen.foot.gap;
+  // a corner that has slipped past the tip of the flexspline touches nothing
+  const double corner = place.station - dot(seen.rest, tangent) / length;
+  if (seen.foot.corner && corner < low_ - limits_.past * (high_ - low_)) {
+    meeting.gap = kInfinity;
+  }
   meeting.normal = {sign * seen.normal.x, seen.normal.y};
   meeting.point = {sign * point.x, point.y};
   // in the mirrored frame the flexspline's normal is -n: its tangent is J n

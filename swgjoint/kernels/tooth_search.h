@@ -83,6 +83,7 @@ struct Pose {
 // Constants of the search, with the values of the Python modules.
 struct Limits {
   double corner, beyond;  // CORNER, BEYOND of circular_spline.py, per flank length [-]
+  double past;            // PAST of compiled_search.py, per flank length [-]
   double refined;         // change of the arc lengths below which refinement ends [m]
   int refinements;        // largest number of refinement steps
 };

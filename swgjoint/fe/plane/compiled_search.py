@@ -18,6 +18,9 @@ from swgjoint.typing import Array, Index, Mask
 if TYPE_CHECKING:
     from swgjoint.kernels.compiled import Flank, Search
 
+PAST = 1e-3
+"""Distance of a corner past the tip of the flexspline from which the two tips have
+slipped past each other and do not touch, as a fraction of the flank length [-]."""
 _flanks: WeakKeyDictionary[Flanks | CircularSpline, Flank] = WeakKeyDictionary()
 """Compiled profiles of members, which every search between these members uses."""
 
@@ -58,6 +61,28 @@ class SeenFeet:
     """Vector from a corner to each point; zero for a perpendicular foot (n, 2) [m]."""
     tooth: Index
     """Tooth of the circular spline that each point faces (n,)."""
+
+    def contact_gaps(
+        self, station: Array, tangent: Array, flank: tuple[float, float]
+    ) -> Array:
+        """Gaps of the points, infinite where two tips have slipped past each other.
+
+        A corner of the circular spline that is beyond the tip of the flexspline, seen
+        along the flank, has nothing to touch, although it is close to the tip.
+
+        Args:
+            station: Arc lengths of the points (n,) [m].
+            tangent: Tangents of the flexspline there, from tip to root (n, 2) [-].
+            flank: Arc lengths of the tip and of the root end of the flexspline's flank
+                [m].
+
+        Returns:
+            The gaps (n,) [m].
+        """
+        beside = np.einsum("ki,ki->k", self.rest, tangent)
+        corner = station - beside / np.hypot(tangent[:, 0], tangent[:, 1])
+        past = self.feet.corner & (corner < flank[0] - PAST * (flank[1] - flank[0]))
+        return np.where(past, np.inf, self.feet.gap)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +154,7 @@ class CompiledSearch:
             teeth_in_model,
             np.ascontiguousarray(angle),
             np.ascontiguousarray(bearing),
-            native.Limits(**limits),
+            native.Limits(past=PAST, **limits),
         )
         return cls(
             search=search,

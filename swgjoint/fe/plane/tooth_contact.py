@@ -110,9 +110,8 @@ class ToothContact:
             flank: Displacements of the flank nodes in the sector frames (N, 2 n_b) [m].
             reach: Largest gap of a candidate [m].
             held: Points of the last iteration that carry force; None if there are none.
-            thorough: Whether to sample the gap densely, including the displacement of
-                the circular spline: minima on conforming flanks can be closer together
-                than the nodes.
+            thorough: Whether to sample the gap densely, on the displaced circular
+                spline: minima on conforming flanks can be closer than the nodes.
             searched: Whether to search each flank (N, 2); None for all.
         """
         if searched is None:
@@ -352,7 +351,7 @@ class ToothContact:
             weighted: Whether the derivatives are needed; compiled code may omit them.
 
         Returns:
-            The contacts; an infinite gap where a point faces no flank.
+            The contacts; the gap of a point that faces no flank is infinite.
         """
         if self._compiled is not None:
             at = sector, side, station, flank
@@ -364,6 +363,7 @@ class ToothContact:
         mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
         point = mirrored * mirror
         seen = self._feet(mirrored, outward_normals(tangent), sector, side)
+        gap = seen.contact_gaps(station, tangent, element.flank_range)
         normal = seen.normal * mirror
         # in the mirrored frame the flexspline's normal is -n: its tangent is J n
         tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
@@ -381,7 +381,7 @@ class ToothContact:
             sector=sector,
             side=side,
             station=station,
-            gap=seen.feet.gap,
+            gap=gap,
             normal=normal,
             point=point,
             weight=node_weights(side, spline, normal),
