@@ -11,9 +11,13 @@ from messages import naming
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.friction_loop import FrictionLoop
-from swgjoint.maps.fit.hysteresis_elements import REACHES, fit_elements
+from swgjoint.maps.fit.hysteresis_elements import (
+    REACHES,
+    STEEPEST_SUM,
+    fit_elements,
+)
 from swgjoint.maps.fit.hysteresis_loops import play_loops, played_loop, with_hysteresis
-from swgjoint.maps.hysteresis import Jenkin, sticking_stiffness
+from swgjoint.maps.hysteresis import Jenkin, sticking_stiffness, total_yield
 from swgjoint.units import arcmin
 
 N = 24
@@ -206,6 +210,29 @@ def test_fit_keeps_to_the_stiffness_that_a_joint_can_integrate(synthetic_map):
     assert 0.3 * stiffest < sticking_stiffness(found) <= stiffest
     back = played_loop(replace(drive, hysteresis=found), loop)
     assert back.area == pytest.approx(loop.area, rel=0.05)
+
+
+def test_steep_yields_keep_their_dependence_on_the_load(synthetic_map):
+    """Yields that grow too fast for the law are fitted with the largest slope instead.
+
+    The fit fell back to constant yields, which held the unloaded output with 9 instead
+    of 0.5 N·m.
+    """
+    (base,) = elements(synthetic_map, (2.0, REACHES[10]))
+    curve = ((50.0, 1.5), (70.0, 20.0), (90.0, 20.0))
+    element = Jenkin(
+        stiffness=40.0 * base.stiffness, yield_torque=0.5, yield_curve=curve
+    )
+    drive = replace(synthetic_map, hysteresis=(element,))
+    loops = [rubbed(drive), *small(drive, 0.1, [80.0, 0.0])]
+    found = fit_elements(loops, synthetic_map.max_stiffness)
+    at = np.linspace(0.0, 90.0, 181)
+    slopes = sum(np.abs(np.diff(e.yields(at)) / np.diff(at)) for e in found)
+    assert slopes.max() == pytest.approx(STEEPEST_SUM, abs=1e-3)
+    assert total_yield(found, 0.0) == pytest.approx(0.5, rel=0.05)
+    back = played_loop(replace(drive, hysteresis=found), loops[0])
+    assert back.loss == pytest.approx(loops[0].loss, rel=0.05)
+    assert back.area == pytest.approx(loops[0].area, rel=0.05)
 
 
 def test_round_off_does_not_choose_a_yield_torsion(synthetic_map):

@@ -45,6 +45,9 @@ the largest stiffness of the map; the rest is a margin for specimens that are st
 STEEPEST_SUM = 0.9
 """Largest sum of the slopes of all yield torques over the elastic torque [-]; the law
 requires less than 1."""
+SLACK = 1e-3
+"""Excess of this sum over its limit that costs as much as a residual of the largest
+friction torque [-]."""
 CLOSE = 0.05
 """Residual of constant yield torques, relative to the friction torque, below which they
 suffice [-]."""
@@ -105,15 +108,26 @@ def _fit_reaches(
     if not plain or not loaded or off <= CLOSE:
         return plain
     elements, left = _elements(loops, at, constant + loaded)
-    steep_sum = sum(np.abs(np.diff(e.yields(at)) / np.diff(at)) for e in elements)
-    too_many = len(elements) > MAX_ELEMENTS
-    if left > BETTER * off or too_many or np.max(steep_sum) > STEEPEST_SUM:
+    if _largest_slope(elements, at) > STEEPEST_SUM:
+        elements, left = _elements(loops, at, constant + loaded, limited=True)
+    too_steep = _largest_slope(elements, at) > STEEPEST_SUM + SLACK
+    if left > BETTER * off or too_steep or len(elements) > MAX_ELEMENTS:
         return plain
     return elements
 
 
+def _largest_slope(elements: Sequence[Jenkin], at: Array) -> float:
+    """Largest sum of the slopes of all yield torques between torques ``at`` [-]."""
+    slopes = (np.abs(np.diff(one.yields(at)) / np.diff(at)) for one in elements)
+    return float(np.max(sum(slopes, np.zeros(at.size - 1))))
+
+
 def _elements(
-    loops: Sequence[FrictionLoop], at: Array, candidates: Sequence[tuple[float, Array]]
+    loops: Sequence[FrictionLoop],
+    at: Array,
+    candidates: Sequence[tuple[float, Array]],
+    *,
+    limited: bool = False,
 ) -> tuple[tuple[Jenkin, ...], float]:
     """Elements chosen from candidates, and the relative residual of the fit [-].
 
@@ -121,6 +135,7 @@ def _elements(
         loops: Large and small loops.
         at: Torques at which the candidates are given, from zero [N·m]. Shape (m,).
         candidates: Yield torsion [rad] and its factors at these torques [-], (m,).
+        limited: Whether to keep the sum of the slopes within :data:`STEEPEST_SUM`.
     """
     from scipy.optimize import nnls
 
@@ -128,13 +143,13 @@ def _elements(
     rows, wanted = [], []
     for loop in loops:
         path, elastic = loop.torsion - loop.torsion[0], np.abs(loop.elastic_torque)
-        signals = [
+        columns = [
             stretches(path, d * np.interp(elastic, at, shape)) / d
             for d, shape in candidates
         ]
         step = np.abs(np.gradient(path))[loop.round]
         weight = np.sqrt(step / step.sum() / (1.0 if is_large(loop) else count))
-        rows.append(weight[:, None] * np.column_stack(signals)[loop.round])
+        rows.append(weight[:, None] * np.column_stack(columns)[loop.round])
         wanted.append(weight * loop.friction_torque[loop.round])
     target = np.concatenate(wanted)
     unit = float(np.abs(target).max())
@@ -142,7 +157,14 @@ def _elements(
         return (), 0.0
     matrix = np.concatenate(rows)
     alike = _alike(matrix, candidates)
-    factors, off = nnls(matrix[:, [group[0] for group in alike]], target / unit)
+    signals = matrix[:, [group[0] for group in alike]]
+    if limited:
+        shapes = np.array([candidates[group[0]][1] for group in alike]).T
+        slopes = unit * np.abs(np.diff(shapes, axis=0)) / np.diff(at)[:, None]
+        factors = nnls(*_with_limits(signals, target / unit, slopes))[0][: len(alike)]
+        off = np.linalg.norm(signals @ factors - target / unit)
+    else:
+        factors, off = nnls(signals, target / unit)
     reaches = np.log([reach for reach, _ in candidates])
     typical = _typical_reach(factors, alike, reaches)
     yields = np.zeros(len(candidates))
@@ -155,6 +177,27 @@ def _elements(
         if f > FAINT * yields.sum()
     )
     return elements, unit * float(off) / float(np.linalg.norm(target))
+
+
+def _with_limits(matrix: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
+    """Least squares whose sums of slopes stay within :data:`STEEPEST_SUM`.
+
+    A non-negative slack variable per interval turns each limit into an equation, which
+    a large weight enforces.
+
+    Args:
+        matrix: Signals of the candidates (n_points, n_candidates).
+        target: Friction torque in units of its largest value (n_points,).
+        slopes: Slope of each candidate's yield torque (n_intervals, n_candidates).
+
+    Returns:
+        Matrix and right-hand side; the slack variables follow the candidates.
+    """
+    count = len(slopes)
+    free = np.zeros((len(matrix), count))
+    limits = np.hstack([slopes, np.eye(count)]) / SLACK
+    full = np.vstack([np.hstack([matrix, free]), limits])
+    return full, np.append(target, np.full(count, STEEPEST_SUM / SLACK))
 
 
 def _alike(
