@@ -193,7 +193,8 @@ def report(result: dict[str, Any]) -> str:
         pairs.append(("rms difference of the loops", None, fit["rms_arcmin"]))
         lines.append(table(pairs, header=("[arcmin]", "measured", "map")))
         lines += [f"warning: {line}" for line in fit["warnings"]]
-        left_out = result["info"]["missing"].get("hysteresis_loss_arcmin")
+    if fit or (result["info"].get("label") or {}).get("friction"):
+        left_out = (result["info"].get("missing") or {}).get("hysteresis_loss_arcmin")
         if left_out:
             lines.append(f"no hysteresis in the map: {left_out}")
     return "\n".join(lines)

@@ -97,7 +97,7 @@ def _write(folder: Any, result: dict[str, Any], evaluated: DriveSheet) -> None:
 def report(result: dict[str, Any]) -> str:
     """Format the values, the strongest orders, remarks and missing values."""
     from swgjoint.gear.catalogue_stated import LOSS_KEYS
-    from swgjoint.maps.sheet.spec_sheet import KEYS, TURN_KEYS
+    from swgjoint.maps.sheet.spec_sheet import KEYS, LOOP_KEYS, TURN_KEYS
 
     keys = [key for key in KEYS if key in result and key != "orders"]
     ratings = result["validity"]["ratings"]
@@ -138,6 +138,10 @@ def report(result: dict[str, Any]) -> str:
     error = result["validity"].get("kinematic_error", "none")
     if error not in ("none", "given") and any(key in result for key in TURN_KEYS):
         lines.append(f"kinematic error (determines accuracy and ripple): {error}")
+    rubs = result["validity"].get("hysteresis", "none")
+    told = "hysteresis_loss_arcmin" in result["missing"]
+    if rubs.startswith("none: ") and not told and set(keys) & set(LOOP_KEYS):
+        lines.append(f"torque loop: {rubs.removeprefix('none: ')}")
     friction = result["validity"].get("friction", "none")
     if friction != "none" and any(key in result for key in LOSS_KEYS):
         speed = result["validity"]["running_speed_rpm"]

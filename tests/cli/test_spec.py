@@ -297,6 +297,31 @@ def test_report(capsys, tmp_path, synthetic_map):
     assert row.split() == ["K1", "3.115e+04", "3.1e+04", "N·m/rad"]
 
 
+@pytest.mark.parametrize("rubs", [False, True])
+def test_friction_that_a_map_lacks_is_named(capsys, tmp_path, synthetic_map, rubs):
+    """Loop figures of a design with friction say if the map has no hysteresis.
+
+    The loop of a map with a clearance has a width without it.
+    """
+    lacks = "friction of the teeth gives no hysteresis: clearance"
+    info = {
+        **synthetic_map.info,
+        "label": {"friction": "left out of the potential" if rubs else None},
+        "missing": {"hysteresis_loss_arcmin": lacks},
+    }
+    path = tmp_path / "a.swg"
+    synthetic_map.with_parts(info=info).save(path)
+    assert main(["spec", str(path), "--only", "K1_Nm_rad"]) == 0
+    assert (f"torque loop: {lacks}" in capsys.readouterr().out) == rubs
+    assert main(["spec", str(path), "--only", "K1_Nm_rad", "--json"]) == 0
+    source = json.loads(capsys.readouterr().out)["validity"]["hysteresis"]
+    assert source == (f"none: {lacks}" if rubs else "none")
+    run = ["run", "bench", "--set", f"defaults.drive={path}"]
+    assert main([*run, "--set", "simulation.duration_s=0.7", "--json"]) in (0, 1)
+    left = json.loads(capsys.readouterr().out)["contains"]["left_out"]
+    assert any(item["reason"] == lacks for item in left) == rubs
+
+
 def test_report_of_losses(capsys):
     """Losses stand with their conditions and source, or with the reason."""
     keys = "starting_torque_Nm,back_driving_torque_Nm"

@@ -1,4 +1,4 @@
-"""Reasons why the torque loop of a map has no width at zero torque."""
+"""Reasons why the torque loop of a map lacks hysteresis."""
 
 from __future__ import annotations
 
@@ -23,6 +23,37 @@ def why_no_width(drive: Potential) -> str:
         "the loop of the map has no width at zero torque: its hysteresis elements do"
         " not slip there"
     )
+
+
+def why_no_friction(drive: Potential) -> str | None:
+    """Reason why the friction of the teeth is not in the map of a design that has it.
+
+    The loop of such a map may have a width nevertheless, that of a clearance.
+
+    Args:
+        drive: The map.
+
+    Returns:
+        The reason; None if the map has the friction, or if the design has none.
+    """
+    label, stated = drive.info.get("label"), drive.info.get("missing")
+    rubs = isinstance(label, dict) and bool(label.get("friction"))
+    if drive.hysteresis or not rubs or not isinstance(stated, dict):
+        return None
+    reason = stated.get("hysteresis_loss_arcmin")
+    return None if reason is None else str(reason)
+
+
+def hysteresis_source(drive: Potential) -> str:
+    """Source of the hysteresis of a map; ``none``, with a reason if it should have any.
+
+    Args:
+        drive: The map.
+    """
+    if drive.hysteresis:
+        return str(drive.info.get("hysteresis", "given"))
+    why = why_no_friction(drive)
+    return "none" if why is None else f"none: {why}"
 
 
 def held_clearance_text(drive: Potential, loop: TorqueLoop) -> str:

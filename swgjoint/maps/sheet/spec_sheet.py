@@ -25,7 +25,11 @@ from swgjoint.maps.sheet.friction_running import (
 )
 from swgjoint.maps.sheet.loop import NO_WIDTH, TorqueLoop, largest_torque, torque_loop
 from swgjoint.maps.sheet.map_validity import Difference, validation_json
-from swgjoint.maps.sheet.no_width import held_clearance_text, why_no_width
+from swgjoint.maps.sheet.no_width import (
+    held_clearance_text,
+    hysteresis_source,
+    why_no_width,
+)
 from swgjoint.maps.sheet.spec_validity import judge_figures
 from swgjoint.maps.sheet.turn import Turn, measure_turns, strongest_orders
 from swgjoint.progress import Progress, silent
@@ -390,9 +394,7 @@ def validity(drive: Potential) -> dict[str, Any]:
         "kinematic_error": str(drive.info.get("kinematic_error", "given"))
         if drive.kinematic_error[1:].any()
         else "none",
-        "hysteresis": str(drive.info.get("hysteresis", "given"))
-        if drive.hysteresis
-        else "none",
+        "hysteresis": hysteresis_source(drive),
         "friction": drive.friction.source if drive.friction else "none",
         "running_speed_rpm": RUNNING_SPEED / rpm if drive.friction else None,
     }

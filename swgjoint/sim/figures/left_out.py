@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from swgjoint.joint.prescribed import ratio_variation
 from swgjoint.maps.hysteresis import vary_with_load
+from swgjoint.maps.sheet.no_width import why_no_friction
 from swgjoint.sim.figures.ripple_validity import HARMONIC_LEVELS
 from swgjoint.units import arcmin
 
@@ -47,6 +48,8 @@ def parts_left_out(transmission: Transmission) -> list[dict[str, str]]:
     if isinstance(label, dict) and label.get("friction") and attached.level == "full":
         part = "effect of the friction of the teeth on the ripple"
         reason = "maps carry it as hysteresis, which is the same at all input angles"
+        if why := why_no_friction(transmission.drive):
+            part, reason = "hysteresis", why
         items.append({"part": part, "reason": reason})
     lossless = f"not at level {attached.level}; use level native or full"
     if attached.drive.hysteresis and attached.level not in LOSSY:
