@@ -420,6 +420,27 @@ def test_one_of_two_hands_is_named_as_the_tool(tmp_path, capsys):
     assert told == [False, True, False]
 
 
+def test_a_chain_of_fixed_links_on_a_column_is_no_tool(tmp_path, capsys):
+    """A camera on the first link or on the stand changes neither tool nor figures."""
+    names = ("mount", "box", "plate", "camera", "lens")
+    camera = "".join(f'<body name="{name}">' for name in names) + 5 * "</body>"
+    arm = """<mujoco><worldbody><body name="stand">{0}
+      <body name="column"><joint name="turn" axis="0 0 1"/>
+      <geom size="0.05" mass="1"/>{1}<body name="upper" pos="0 0 0.3">
+      <joint name="lift" axis="0 1 0"/><geom size="0.05" mass="1"/>
+      <body name="fore" pos="0.3 0 0"><joint name="bend" axis="0 1 0"/>
+      <geom size="0.05" mass="1"/><body name="flange" pos="0.3 0 0"/>
+      </body></body></body></body></worldbody></mujoco>"""
+    file, found = tmp_path / "camera.xml", []
+    for on_stand, on_column in (("", ""), ("", camera), (camera, "")):
+        file.write_text(arm.format(on_stand, on_column))
+        assert main(["run", str(file), "--set", STEADY, *QUICK, "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["tool"])
+    assert found[0]["site"] == "flange"
+    assert found[0]["path_rms_mm"] > 0.01
+    assert found[1:] == found[:1] * 2
+
+
 def test_only_assumed_values_are_called_assumed(tmp_path, capsys):
     """A stated rotor inertia and the stated size of an error are not."""
     file = urdf(tmp_path)

@@ -81,15 +81,31 @@ class RigidArm:
 
     @property
     def ends(self) -> list[str]:
-        """Last bodies of the longest chains, one of those with the same parent."""
+        """Ends of the arm, the most likely tool first.
+
+        The tool is the last body of the longest chain of links. Links that fewer joints
+        move, such as a camera on a column, do not count; a chain may lack one joint,
+        which may be that of a jaw. The other ends are those of chains of equal length
+        and of chains with all joints, one for bodies with the same parent.
+        """
         model = self.model
-        depth = np.zeros(model.nbody, dtype=int)
+        moving, depth = np.zeros((2, model.nbody), dtype=int)
         for body in range(1, model.nbody):
-            depth[body] = depth[model.body_parentid[body]] + 1
-        last = np.flatnonzero(depth == depth.max())
-        _, first = np.unique(model.body_parentid[last], return_index=True)
+            parent = model.body_parentid[body]
+            moving[body] = moving[parent] + model.body_jntnum[body]
+            depth[body] = depth[parent] + 1
+        most = moving.max()
+        reach = np.where(moving >= max(1, most - 1), depth, 0)
+        # the last body of everything that moves as one
+        welded = model.body_weldid
+        last = [int((reach * (welded == k)).argmax()) for k in set(welded[reach > 0])]
+        last.sort(key=lambda body: (-reach[body], body))
+        found: dict[int, int] = {}
+        for body in last:
+            if reach[body] == reach.max() or moving[body] == most:
+                found.setdefault(int(model.body_parentid[body]), body)
         kind = mujoco.mjtObj.mjOBJ_BODY
-        return [mujoco.mj_id2name(model, kind, int(b)) for b in last[np.sort(first)]]
+        return [mujoco.mj_id2name(model, kind, body) for body in found.values()]
 
     def without_tool(self) -> RigidArm:
         """This arm, whose tool positions are not computed."""
