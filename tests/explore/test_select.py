@@ -15,6 +15,7 @@ from messages import names, naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError
+from swgjoint.explore.compare.compare import compare
 from swgjoint.explore.select import search, select
 from swgjoint.explore.select.evaluation import (
     SimulatedSet,
@@ -310,6 +311,24 @@ def test_exhaustive_search_finds_the_same_set(spec, sizes):
     for one in found.simulated:  # the same simulation, by either way
         (twin,) = [other for other in everything if other.drives == one.drives]
         assert one.figures == twin.figures and one.met == twin.met
+
+
+def test_a_joint_at_rest_meets_limits_of_the_ripple(tmp_path):
+    """A set that compare accepts is selected, even if one joint has no ripple."""
+    file = tmp_path / "arm.xml"
+    file.write_text(
+        """<mujoco><worldbody><body><joint name="turn" axis="0 0 1"/>
+        <geom size="0.05" mass="1"/><body><joint name="lift" axis="0 1 0"/>
+        <geom size="0.05" mass="2" pos="0.2 0 0"/></body></body></worldbody></mujoco>"""
+    )
+    changes = {"trajectory.end_deg": {"lift": 10.0}, "simulation.duration_s": 3.0}
+    task = scene_of_arm(str(file), overrides=changes)
+    for limit in (50.0, 1e-3):
+        found = select_drives(task, small()[:1], spec={"ripple_rms_percent": limit})
+        (row,) = compare(["full"], found.scene or task, spec=found.spec)
+        joints = row.run.metrics()["joints"]
+        assert joints["turn"]["ripple_missing"] and not joints["lift"]["ripple_missing"]
+        assert bool(row.missed) == (found.winner is None) == (limit < 1.0)
 
 
 def cost_of(found) -> float:

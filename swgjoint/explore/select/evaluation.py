@@ -129,6 +129,7 @@ def evaluate_set(
         raise ComputationError(f"{run.name}: {metrics['reasons'][0]}")
     figures: dict[str, dict[str, Any]] = {}
     missed = []
+    at_rest = _without_ripple(metrics["joints"])
     for name in ("", *run.joints):
         keys = [key for key in spec if (key in OF_ARM) == (not name)]
         row = row_of(run.name, run, None, level=None, of=[name] if name else [])
@@ -137,7 +138,7 @@ def evaluate_set(
         figures[name] = {key: row.figure(key) for key in keys}
         unlimited = name and metrics["joints"][name]["life"]["bearing"]["unlimited"]
         for key in missed_limits(row, {key: spec[key] for key in keys}):
-            if key == LIFE and unlimited:
+            if (key == LIFE and unlimited) or (key in RIPPLE and name in at_rest):
                 continue
             value = figures[name][key]
             why = row.ripple_missing if key in RIPPLE else None
@@ -158,6 +159,20 @@ def evaluate_set(
         faults=faults,
         run=run,
     )
+
+
+def _without_ripple(joints: Mapping[str, Any]) -> set[str]:
+    """Joints without ripple, if others have some, such as joints that rest.
+
+    They meet every limit of the ripple, as in a comparison, which judges the largest
+    one. Joints whose orders the step leaves out do not.
+
+    Args:
+        joints: Figures of the joints.
+    """
+    none = {name for name, of in joints.items() if of["ripple_missing"] is not None}
+    left_out = {name for name in none if joints[name]["ripple_left_out_percent"] > 0.0}
+    return none - left_out if len(none) < len(joints) else set()
 
 
 def _with_cycle(row: Compared, joint: Mapping[str, Any]) -> Compared:
