@@ -202,6 +202,8 @@ def report(result: dict[str, Any]) -> str:
         for key in row["missed"]:
             value = cell(row, key)
             found = "has no value" if value == "-" else f"= {value}"
+            if value.startswith("> ") and row["ripple_is_lower_bound"]:
+                found = f"{value}, a lower bound, because the step leaves out orders"
             lines.append(f"{row['argument']}: {key} {found}; limit {spec[key]:g}")
     if spec is not None:
         passing = ", ".join(result["kept_by"])

@@ -12,7 +12,7 @@ from swgjoint.cli.main import main
 from swgjoint.cli.run import joint_row, notes, verdict_lines
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
-from swgjoint.sim.figures.ripple_validity import integration_noise
+from swgjoint.sim.figures.ripple_validity import integration_noise, may_exceed
 from swgjoint.sim.figures.verdict import energy_reasons
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.run import run_scene
@@ -353,3 +353,15 @@ def test_run_prints_the_judgement_and_turns_the_status(synthetic_map, tmp_path, 
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("~ uncertain") for line in lines)
     assert main([*arguments, "--strict"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("rms", "left_out", "exceeds"),
+    [(0.1, 3.0, True), (0.1, 0.5, False), (1.0, 0.5, True), (2.0, 0.0, False)],
+)
+def test_a_ripple_is_a_bound_if_left_out_orders_of_any_joint_may_exceed_it(
+    rms, left_out, exceeds
+):
+    """Largest ripple 1 %: the joint with its left-out orders has more by 5 % or not."""
+    joint = {"ripple_rms_percent": rms, "ripple_left_out_percent": left_out}
+    assert may_exceed(joint, 1.0) == exceeds

@@ -27,6 +27,7 @@ from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.sim.figures.line_source import drive_order
 from swgjoint.sim.figures.metrics import strongest_left_out
 from swgjoint.sim.figures.resonance import lowest_resonance
+from swgjoint.sim.figures.ripple_validity import may_exceed
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.run import run_scene
@@ -64,8 +65,8 @@ class Compared:
     """Reason why no ripple is reported, such as a ripple below the integration noise;
     None if it is reported."""
     ripple_is_lower_bound: bool
-    """Whether the step leaves out significant orders in the joint with the largest
-    ripple."""
+    """Whether orders that the step leaves out may raise the largest ripple, in its
+    joint or in another one. Such a ripple meets no limit."""
     ripple_valid: bool | None
     """Whether the maps of all joints meet the limit of their validation at the torques
     of the run; None if no map has a validation."""
@@ -215,7 +216,8 @@ def _is_design(reference: str) -> bool:
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """Limits that a row does not meet; a figure without a valid value meets none.
 
-    A level without compliance meets every lower limit of stiffness and resonance.
+    Neither does a ripple that is a lower bound. A level without compliance meets every
+    lower limit of stiffness and resonance.
 
     Args:
         row: Results of one argument.
@@ -226,7 +228,9 @@ def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
         value = row.figure(key)
         if key in OF_SPRINGS and value is None and row.level in UNYIELDING:
             continue
-        valid = key not in RIPPLE or row.ripple_valid is not False
+        valid = key not in RIPPLE or not (
+            row.ripple_valid is False or row.ripple_is_lower_bound
+        )
         kept = (
             valid
             and value is not None
@@ -263,6 +267,7 @@ def row_of(
         drives = [t.drive for t in run.assembly.transmissions if t.joint in joints]
         drive = min(drives, key=lambda d: d.mean_stiffness)
     worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
+    ripple = float(joints[worst]["ripple_rms_percent"])
     ratings = [joint["ratings"] for joint in joints.values()]
     resonance = lowest_resonance(run)
     errors = [joint["transmission_error_arcmin"] for joint in joints.values()]
@@ -279,7 +284,7 @@ def row_of(
         ripple_rms_percent=largest("ripple_rms_percent"),
         ripple_pp_percent=largest("ripple_pp_percent"),
         ripple_missing=joints[worst]["ripple_missing"],
-        ripple_is_lower_bound=bool(joints[worst]["ripple_is_lower_bound"]),
+        ripple_is_lower_bound=any(may_exceed(of, ripple) for of in joints.values()),
         **joints_judged(joints.values()),
         transmission_error_arcmin=max(float(error["pp"]) for error in errors),
         transmission_error_ripple_arcmin=_error_ripple(run, joints),

@@ -58,7 +58,7 @@ class LimitCheck:
     limit: float
     """Limit: a lower one for the keys of :data:`LOWER`, else an upper one."""
     reason: str = ""
-    """Reason why the value is not known."""
+    """Reason why the value is not known, or why it meets no limit."""
 
     @property
     def use(self) -> float:
@@ -72,10 +72,9 @@ class LimitCheck:
     @property
     def text(self) -> str:
         """Figure, value and limit."""
-        if self.value is None:
-            why = f" ({self.reason})" if self.reason else ""
-            return f"{self.key} without a value{why}, limit {self.limit:.4g}"
-        return f"{self.key} = {self.value:.4g}, limit {self.limit:.4g}"
+        value = "without a value" if self.value is None else f"= {self.value:.4g}"
+        why = f" ({self.reason})" if self.reason else ""
+        return f"{self.key} {value}{why}, limit {self.limit:.4g}"
 
     def to_json(self) -> dict[str, Any]:
         """Figure, value, limit and use; an infinite number is None."""

@@ -17,6 +17,7 @@ If r is the recorded rms, the rms of the ripple of the drive is at least r, and 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -198,6 +199,18 @@ def left_out_torque(run: Run, j: int) -> float:
             )
         )
     )
+
+
+def may_exceed(joint: Mapping[str, Any], ripple: float) -> bool:
+    """Whether a joint with the orders that the step leaves out may exceed a ripple.
+
+    Args:
+        joint: Figures of the joint.
+        ripple: Rms ripple, relative to the rated torque [%].
+    """
+    left = float(joint["ripple_left_out_percent"])
+    whole = float(np.hypot(joint["ripple_rms_percent"], left))
+    return left > 0.0 and whole > (1.0 + SHARE) * ripple
 
 
 def find_resolving_step(run: Run, j: int) -> dict[str, float] | None:
