@@ -12,6 +12,8 @@ from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
+_ERROR_RIPPLE = "transmission_error_ripple_arcmin"
+
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: drives or levels, scene, sorting, limits, output folder."""
@@ -204,6 +206,8 @@ def report(result: dict[str, Any]) -> str:
             found = "has no value" if value == "-" else f"= {value}"
             if value.startswith("> ") and row["ripple_is_lower_bound"]:
                 found = f"{value}, a lower bound, because the step leaves out orders"
+            if key == _ERROR_RIPPLE and row[key] is None:
+                found += ", because the inputs turn too little for it"
             lines.append(f"{row['argument']}: {key} {found}; limit {spec[key]:g}")
     if spec is not None:
         passing = ", ".join(result["kept_by"])

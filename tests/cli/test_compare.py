@@ -419,6 +419,28 @@ def test_a_coarser_step_does_not_meet_a_limit_of_the_ripple(capsys):
     assert bound == {0.5: (False, False), 1.5: (True, True)}
 
 
+def test_a_record_of_less_than_two_waves_tells_no_error_of_that_order(capsys):
+    """Half an input turn does not show order 2 of 0.3 arcmin; six turns do.
+
+    The line of 0.1 arcmin at order 4, of which it has two waves, is not the strongest.
+    """
+    errors = "{2=0.3,4=0.1}"
+    numbers = f"{{K1_Nm_rad=3e4,rated_torque_Nm=67.0,kinematic_error_arcmin={errors}}}"
+    keys = [f"defaults.numbers={numbers}", "load.joint.torque_Nm=0.0"]
+    common = [part for key in keys for part in ("--set", key)]
+    common += ["--limit", "transmission_error_ripple_arcmin=0.4"]
+    for duration in (1.1, 8.0):
+        asked = [*common, "--set", f"simulation.duration_s={duration}"]
+        assert main(["compare", "full", "--scene", "bench", *asked, "--json"]) == 1
+        (row,) = json.loads(capsys.readouterr().out)["rows"]
+        assert row["missed"] == ["transmission_error_ripple_arcmin"]
+        value = row["transmission_error_ripple_arcmin"]
+        assert value == (None if duration < 2 else pytest.approx(0.6, rel=0.01))
+        assert main(["compare", "full", "--scene", "bench", *asked]) == 1
+        out = capsys.readouterr().out
+        assert ("because the inputs turn too little for it" in out) == (duration < 2)
+
+
 def test_the_joint_of_the_largest_ripple_is_named():
     """One name if it is the same in all rows; rows without ripple have none."""
 

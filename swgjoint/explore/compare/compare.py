@@ -24,7 +24,7 @@ from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
-from swgjoint.sim.figures.line_source import drive_order
+from swgjoint.sim.figures.line_source import error_ripple
 from swgjoint.sim.figures.metrics import strongest_left_out
 from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.figures.ripple_validity import may_exceed
@@ -75,9 +75,9 @@ class Compared:
     the form of the figures of a joint."""
     transmission_error_arcmin: float
     """Peak-to-peak transmission error [arcmin]."""
-    transmission_error_ripple_arcmin: float
+    transmission_error_ripple_arcmin: float | None
     """Peak-to-peak amplitude of the strongest spectral line at an order of the drive
-    [arcmin]."""
+    [arcmin]; None if the inputs turn too little for the strongest orders."""
     torsion_arcmin: float
     """Largest absolute mean torsion of a joint [arcmin]."""
     tool_path_rms_mm: float | None
@@ -287,7 +287,7 @@ def row_of(
         ripple_is_lower_bound=any(may_exceed(of, ripple) for of in joints.values()),
         **joints_judged(joints.values()),
         transmission_error_arcmin=max(float(error["pp"]) for error in errors),
-        transmission_error_ripple_arcmin=_error_ripple(run, joints),
+        transmission_error_ripple_arcmin=error_ripple(run, joints),
         torsion_arcmin=max(
             abs(float(joint["torsion_arcmin"]["mean"])) for joint in joints.values()
         ),
@@ -338,21 +338,6 @@ def smallest_of_cycle(
     values = [life[key] for life in lives if life.get(key) is not None]
     unknown = any(life["missing"] and not life["unlimited"] for life in lives)
     return None if unknown else min(values, default=None)
-
-
-def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
-    """Twice the strongest transmission-error line at an order of the drive.
-
-    Most of the total peak-to-peak value is torsion that follows the load.
-    """
-    lines = [
-        2.0 * float(line["amplitude_arcmin"])
-        for j, name in enumerate(run.joints)
-        if name in joints
-        for line in joints[name]["transmission_error_orders"]
-        if drive_order(run, j, line["order"]) is not None
-    ]
-    return max(lines, default=0.0)
 
 
 def _safety(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.joint.drive import JointDrive, input_orders
+from swgjoint.sim.figures.orders import lowest_order
 from swgjoint.sim.figures.ripple_validity import HARMONIC_LEVELS
+from swgjoint.typing import Array
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -55,3 +59,59 @@ def sharing_joints(run: Run, j: int, order: float) -> list[str]:
         if (np.abs(waves - here) <= 0.5).any():
             names.append(run.joints[k])
     return names
+
+
+def order_strength(attached: JointDrive) -> Array:
+    """Strength of every harmonic of a drive as simulated [rad]. Shape (n_harmonics,).
+
+    It is the amplitude in the kinematic error plus the amplitude in the output torque
+    at rated torque, divided by the stiffness. The first harmonic is the mean.
+
+    Args:
+        attached: The drive.
+    """
+    drive = attached.drive
+    torsion = drive.mean_torsion(drive.ratings.rated_torque)
+    torque = np.hypot(*drive.coefficients(torsion, 1).T)
+    return np.asarray(np.hypot(*drive.kinematic_error.T) + torque / attached.stiffness)
+
+
+def error_ripple(run: Run, joints: Mapping[str, Any]) -> float | None:
+    """Twice the strongest transmission-error line at an order of the drive [arcmin].
+
+    Most of the total peak-to-peak value is torsion that follows the load. A joint whose
+    input turns too little for the strongest order of its drive does not count.
+
+    Args:
+        run: The run.
+        joints: Figures of the joints to consider.
+
+    Returns:
+        The value; zero if no drive has harmonics, None if no joint counts.
+    """
+    lines: list[float] = []
+    short = False
+    for j, name in enumerate(run.joints):
+        if name not in joints:
+            continue
+        if _is_short(run, j):
+            short = True
+            continue
+        lines += [
+            2.0 * float(line["amplitude_arcmin"])
+            for line in joints[name]["transmission_error_orders"]
+            if drive_order(run, j, line["order"]) is not None
+        ]
+    return max(lines, default=None if short else 0.0)
+
+
+def _is_short(run: Run, j: int) -> bool:
+    """Whether a record cannot have a line at the strongest order of its drive."""
+    attached = run.assembly.transmissions[j].attached
+    if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
+        return False
+    order = input_orders(attached.drive)
+    waves = order >= lowest_order(np.inf)  # slower ones belong to any record's trend
+    strongest = order[(order_strength(attached) * waves).argmax()]
+    turns = float(np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi))
+    return bool(waves.any() and strongest < lowest_order(turns))

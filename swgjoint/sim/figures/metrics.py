@@ -19,7 +19,11 @@ import numpy as np
 
 from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
-from swgjoint.sim.figures.line_source import drive_order, sharing_joints
+from swgjoint.sim.figures.line_source import (
+    drive_order,
+    order_strength,
+    sharing_joints,
+)
 from swgjoint.sim.figures.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.figures.output_bearing import bearing_figures
 from swgjoint.sim.figures.rating_use import use_of_ratings
@@ -318,19 +322,18 @@ def line_error(run: Run, j: int, order: float) -> float | None:
 
 
 def strongest_left_out(transmission: Transmission) -> bool:
-    """Whether the step leaves out the strongest harmonic of a drive.
+    """Whether the step leaves out the strongest harmonic, see :func:`order_strength`.
 
-    The strength of a harmonic is its amplitude in the kinematic error [rad], plus its
-    amplitude in the output torque at rated torque divided by the stiffness.
+    Args:
+        transmission: Drive of a joint.
     """
     attached = transmission.attached
     if not attached.unresolved:
         return False
-    kept, stiffness = attached.drive, attached.stiffness
-    torsion = kept.mean_torsion(kept.ratings.rated_torque)
-    strength = np.hypot(*kept.kinematic_error.T)
-    strength = strength + np.hypot(*kept.coefficients(torsion, 1).T) / stiffness
-    lost = max(left.error + left.torque / stiffness for left in attached.unresolved)
+    strength = order_strength(attached)
+    lost = max(
+        left.error + left.torque / attached.stiffness for left in attached.unresolved
+    )
     return bool(lost > strength[1:].max(initial=0.0))
 
 

@@ -115,7 +115,7 @@ def strongest_lines(
         return ()
     grid, values = even
     turns = grid[-1] / (2.0 * np.pi)
-    lowest = max(0.5, 2.0 / turns)
+    lowest = lowest_order(turns)
     orders: list[float] = []
     residual, amplitudes = _fit(grid, values, orders)
     while len(orders) < count:
@@ -136,6 +136,15 @@ def strongest_lines(
         if amplitude > floor
     ]
     return tuple(sorted(lines, key=lambda line: -line.amplitude))
+
+
+def lowest_order(turns: float) -> float:
+    """Lowest order that lines of a record can have; slower waves belong to the trend.
+
+    Args:
+        turns: Input turns of the record.
+    """
+    return max(0.5, 2.0 / turns) if turns > 0.0 else float("inf")
 
 
 def _detrend(grid: Array, values: Array) -> Array:
