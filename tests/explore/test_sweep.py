@@ -30,6 +30,8 @@ from swgjoint.store import json_content, json_file
 from swgjoint.toml_file import parse_toml
 from swgjoint.view.plots.sweep import label_of, sweep_picture
 
+ERROR_RIPPLE = "transmission_error_ripple_arcmin"
+
 SHEET = """
 design = "reference-2d"
 [spec]
@@ -513,3 +515,31 @@ def test_a_ripple_that_is_not_valid_is_no_figure_of_a_sweep(
     assert figures["torsion_arcmin"] > 0.0
     assert set(reasons) == ({"ripple_rms_percent"} if lost else set())
     assert all(names(why, "60 %", "20 N·m") for why in reasons.values())
+
+
+@pytest.mark.parametrize(
+    ("step", "duration", "reasons"),
+    [
+        (0.5, 3.0, {}),
+        (1.5, 3.0, {"ripple_rms_percent": "step", ERROR_RIPPLE: "step"}),
+        (0.5, 0.52, {ERROR_RIPPLE: "turn too little"}),
+    ],
+)
+def test_a_ripple_that_a_run_does_not_resolve_is_no_figure_of_a_sweep(
+    step, duration, reasons
+):
+    """Order 20 beyond the step, and less than two waves of it in the window.
+
+    A sweep would find its smallest ripple where the step leaves the orders out.
+    """
+    numbers = "{K1_Nm_rad=3e4,rated_torque_Nm=67.0,kinematic_error_arcmin={20=0.2}}"
+    changes = [f"defaults.numbers={numbers}", "trajectory.speed_deg_s.joint=12.0"]
+    changes += [f"simulation.step_s={1e-3 * step}", f"simulation.duration_s={duration}"]
+    scene = Scene.load_file("bench", changes)
+    task = RunTask(figures=("ripple_rms_percent", ERROR_RIPPLE, "torsion_arcmin"))
+    figures, found = sweep_figures._run(scene, None, task)
+    assert {name: figures[name] is None for name in figures} == {
+        name: name in reasons for name in task.figures
+    }
+    assert set(found) == set(reasons)
+    assert all(names(found[name], word) for name, word in reasons.items())

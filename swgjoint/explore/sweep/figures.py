@@ -313,8 +313,12 @@ def _run(
         run = run_scene(scene.with_drive(name), drives={name: drive})
     row = row_of(scene.name, run, drive, level=None)
     found = {name: getattr(row, name) for name in task.figures}
-    lost = [name for name in task.figures if name in RIPPLE]
-    if row.ripple_valid is not False or not lost:
-        return found, {}
-    why = f"not valid: the map {joint_doubt(row.to_json())}"
-    return found | dict.fromkeys(lost), dict.fromkeys(lost, why)
+    ripple = [name for name in task.figures if name in RIPPLE]
+    if row.ripple_valid is False:
+        why = f"not valid: the map {joint_doubt(row.to_json())}"
+    elif row.ripple_is_lower_bound:
+        why = "not resolved: the step leaves out orders of the drive"
+    else:
+        ripple = [name for name in ripple if found[name] is None]
+        why = "the inputs turn too little for the strongest order of the drive"
+    return found | dict.fromkeys(ripple), dict.fromkeys(ripple, why)
