@@ -234,6 +234,20 @@ def race_contact(
 def add_station_stiffness(
     weights: Array, direction: Array, stiffness: Array, result: Array
 ) -> None: ...
+def add_contact_tangents(
+    carried: Array,
+    angle: Array,
+    spin: Array,
+    position: Array,
+    sector: Index,
+    side: Index,
+    weights: Array,
+    normal: Array,
+    numbers: Array,
+    force: Array,
+    dofs: Index,
+    tangent: Array,
+) -> None: ...
 def add_blocks(blocks: Array, into: Index, result: Array) -> None: ...
 def respond(offsets: Index, blocks: Array, force: Array, result: Array) -> None: ...
 def follow_path(

@@ -4,6 +4,7 @@
 
 #include "banded.h"
 #include "bore.h"
+#include "contact_tangent.h"
 #include "corotation.h"
 #include "flank_arrays.h"
 #include "hermite_ring.h"
@@ -183,6 +184,39 @@ class Sector {
   swgjoint::Sector sector_{};
 };
 
+// weights: of the displacement and of its slope; numbers: see contact_tangent.py.
+void add_contact_tangents(In<2> carried, In<1> angle, In<2> spin, In<2> position,
+                          Index sector, Index side, In<3> weights, In<2> normal,
+                          In<2> numbers, In<1> force, Index dofs, Out<3> tangent) {
+  const std::size_t count = sector.shape(0), m = dofs.shape(0), n = tangent.shape(1);
+  const std::size_t sectors = tangent.shape(0), nodes = weights.shape(2);
+  require(carried.shape(0) == 4 * nodes && carried.shape(1) == m && m % 2 == 0,
+          "carried: (4 nodes, m)");
+  require(angle.shape(0) == sectors && spin.shape(0) == sectors && spin.shape(1) == m &&
+              position.shape(0) == sectors && position.shape(1) == m,
+          "angle: (sectors,), spin, position: (sectors, m)");
+  require(side.shape(0) == count && weights.shape(0) == 2 && weights.shape(1) == count &&
+              normal.shape(0) == count && normal.shape(1) == 2 &&
+              numbers.shape(0) == count && numbers.shape(1) == 6 &&
+              force.shape(0) == count,
+          "contacts: one row each");
+  require(tangent.shape(2) == n, "tangent: (sectors, n, n)");
+  check_dofs(dofs, n);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int64_t s = sector.data()[i], f = side.data()[i];
+    require(s >= 0 && s < static_cast<std::int64_t>(sectors) && (f == 0 || f == 1),
+            "sector or side");
+  }
+  const swgjoint::Turning turning{angle.data(), spin.data(), position.data()};
+  const swgjoint::Loaded loaded{count,          sector.data(),
+                                side.data(),    weights.data(),
+                                weights.data() + count * nodes, normal.data(),
+                                numbers.data(), force.data()};
+  const nb::gil_scoped_release release;
+  swgjoint::add_contact_tangents(carried.data(), nodes, m, turning, loaded, dofs.data(),
+                                 n, tangent.data());
+}
+
 void race_contact(In<1> places, In<1> press, double half_thickness,
                   std::size_t per_sector, In<1> q, In<3> points, Masks touching,
                   Out<2> gap, Out<3> normal, Out<3> rows, Out<2> gradient,
@@ -326,6 +360,13 @@ void bind_plane(nb::module_& m) {
            nb::arg("gyration").noconvert(), nb::arg("kinematics").noconvert(),
            nb::arg("flank").noconvert(), nb::arg("gradient").noconvert(),
            nb::arg("tangent").noconvert().none());
+  m.def("add_contact_tangents", &add_contact_tangents, nb::arg("carried").noconvert(),
+        nb::arg("angle").noconvert(), nb::arg("spin").noconvert(),
+        nb::arg("position").noconvert(), nb::arg("sector").noconvert(),
+        nb::arg("side").noconvert(), nb::arg("weights").noconvert(),
+        nb::arg("normal").noconvert(), nb::arg("numbers").noconvert(),
+        nb::arg("force").noconvert(), nb::arg("dofs").noconvert(),
+        nb::arg("tangent").noconvert());
   m.def("add_banded", &add_banded, nb::arg("rows").noconvert(),
         nb::arg("parts").noconvert(), nb::arg("columns").noconvert());
   m.def("solve_banded", &solve_banded, nb::arg("columns").noconvert(),

@@ -152,7 +152,7 @@ def test_feet_of_any_point_are_those_of_numpy(contact, monkeypatch):
     corners = 0
     for rigid in (False, True):
         found, wanted = (
-            one._feet(points, outward, sector, side, rigid=rigid)
+            one.find_feet(points, outward, sector, side, rigid=rigid)
             for one in both(monkeypatch, search)
         )
         monkeypatch.delenv("SWGJOINT_KERNELS")
@@ -191,7 +191,7 @@ def test_minima_are_refined_as_in_numpy(contact, monkeypatch):
     np.testing.assert_allclose(compiled._refine(*given), wanted, rtol=0.0, atol=1e-12)
     point, tangent, _ = reference._displaced(wanted, mirrored)
     outward = np.stack([-tangent[:, 1], tangent[:, 0]], -1)
-    corner = reference._feet(point, outward, sector, side).feet.corner
+    corner = reference.find_feet(point, outward, sector, side).feet.corner
     assert (corner.sum() > 100) == (search.circular_spline.flank_dofs > 0)
 
 

@@ -188,9 +188,11 @@ def test_gradients_of_mean_gaps_are_those_of_the_gaps():
 def test_gradient_and_tangent_are_derivatives_of_the_energy():
     """Rim and layer below the bore against differences, with half a ring closed."""
     model, h = follow().model, 1e-8
+    loaded = follow().to_torque(meshed(), TORQUE)
     state = replace(
-        follow().to_torque(meshed(), TORQUE),
+        loaded,
         flank_force=np.zeros((model.sectors, 4 * model.element.flank_size)),
+        tooth_force=np.zeros(loaded.tooth_force.size),
     )
     here = linearise(model, state, None)
     rng = np.random.default_rng(3)

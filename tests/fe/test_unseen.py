@@ -24,7 +24,7 @@ FOUND = {
     "reference-2d-qca-improved": (0.96, 0.66, 0.052),
     "reference-2d-involute": (0.79, 0.41, 0.13),
     "reference-2d-flexspline-fixed": (0.94, 0.44, 0.052),
-    "dca-80-to-1": (0.71, 1.64, 0.0038),
+    "dca-80-to-1": (0.60, 0.94, 0.0038),
     "reference-2d-simplified": (1.67, 0.69, 0.0047),
     "reference-2d-four-roller": (0.53, 1.10, 0.036),
     "reference-2d-parabolic": (0.83, 1.35, 0.031),
@@ -38,9 +38,10 @@ difference of the mean torsion [%], each at the worst torque. The goal alone wou
 an error of 5 % in the strongest harmonic."""
 WORSE, LEAST = 1.4, 0.05
 """Factor by which these differences may grow, and what is always accepted [%]."""
-OWN_MESH = ("reference-2d-parabolic", "reference-2d-asymmetric")
-"""Designs that need their own mesh: on the coarser one, maps are off by 12 and 10 % of
-the input torque at small torques instead of 2.8 and 3.4 %."""
+OWN_MESH = ("dca-80-to-1", "reference-2d-parabolic", "reference-2d-asymmetric")
+"""Designs that need their own mesh: on the coarser one, maps are off by 7, 12 and 10 %
+of the input torque at small torques instead of 1.6, 2.8 and 3.4 %. Flanks of few nodes
+need more angles than the largest number of equilibria allows."""
 SEEN = 0.7
 """Smallest part of the largest difference at these equilibria that a record states."""
 

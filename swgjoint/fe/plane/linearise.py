@@ -13,6 +13,7 @@ from swgjoint.fe.plane.compiled_tangent import (
     add_sector_tangents,
 )
 from swgjoint.fe.plane.contact_points import Contacts
+from swgjoint.fe.plane.contact_tangent import add_contact_tangents
 from swgjoint.fe.plane.corotation import (
     Frames,
     elastic_force,
@@ -234,17 +235,31 @@ def linearise(
     anchor = np.zeros(sign.shape)
     anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
     stiffness = model.element.mean_stiffness
+    flank = model.shift_flank(flank, model.tooth_shift)
+    elastic = model.circular_spline_displacement(state)
+    facing = model.shift_flank(elastic, model.circular_spline_tooth_shift)
+    centre = frames.position.reshape(model.sectors, -1, 2).mean(axis=1)
+    angle = frames.angle - state.circular_spline_rotation
+    search = ToothContact(
+        rubs=model.friction is not None,
+        element=model.element,
+        circular_spline=model.circular_spline,
+        circular_spline_flank=facing,
+        angle=angle,
+        bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
+    )
     if hessian is None:
         assert kept is not None
         hessian = kept.hessian
     else:
+        # the contact points slide, and the forces follow their normals
+        if model.nonlinear and state.contacts is not None and len(state.contacts):
+            at = model.element, search, frames, flank, state.contacts
+            add_contact_tangents(*at, state.tooth_force, dofs, hessian)
         # signs other than 1 occur in the last sector only
         hessian[-1] *= np.outer(sign[-1], sign[-1])
         hessian[0] += stiffness * np.outer(anchor[0], anchor[0])
         _hold(hessian, np.arange(len(hessian)), fixed, stiffness)
-    centre = frames.position.reshape(model.sectors, -1, 2).mean(axis=1)
-    angle = frames.angle - state.circular_spline_rotation
-    circular_spline_elastic = model.circular_spline_displacement(state)
     return Linearised(
         element=model.element,
         frames=frames,
@@ -263,18 +278,9 @@ def linearise(
         rotation_gradient=sign * rotation_gradient,
         anchor=anchor,
         anchor_stiffness=stiffness,
-        flank=model.shift_flank(flank, model.tooth_shift),
-        circular_spline_elastic=circular_spline_elastic,
-        search=ToothContact(
-            rubs=model.friction is not None,
-            element=model.element,
-            circular_spline=model.circular_spline,
-            circular_spline_flank=model.shift_flank(
-                circular_spline_elastic, model.circular_spline_tooth_shift
-            ),
-            angle=angle,
-            bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
-        ),
+        flank=flank,
+        circular_spline_elastic=elastic,
+        search=search,
     )
 
 
@@ -290,8 +296,8 @@ def _add_sectors(
 ) -> tuple[Frames, Array]:
     """Add the elastic forces and tangents of the sectors.
 
-    They are computed in the sector frames and rotated to the global frame. Tooth forces
-    enter only the tangent, because they are unknowns of the step.
+    Tooth forces enter only the tangent, because they are unknowns of the step; here
+    they turn with the frames of their sectors.
 
     Args:
         model: The 2D model.
@@ -315,7 +321,7 @@ def _add_sectors(
     if hessian is not None:
         total = elastic - force @ element.flank_from_skeleton
         hessian.fill(0.0)
-        hessian[_block(dofs)] = tangent(element, frames, total, frames.angle)
+        hessian[:, dofs[:, None], dofs] = tangent(element, frames, total, frames.angle)
     flank = frames.displacement @ element.flank_from_skeleton.T
     return frames, flank + force @ element.flank_compliance
 
@@ -386,15 +392,3 @@ def _gaps(model: SectorModel, state: State) -> tuple[Array, Array, Array]:
         values[near] = fine
         gaps.append(values.reshape(*points.shape[:2], *coarse.shape[2:]))
     return gaps[0], gaps[1], gaps[2]
-
-
-def _block(dofs: Index) -> tuple[Index | slice, ...]:
-    """Index of the rows and columns of some degrees of freedom in all sectors.
-
-    Args:
-        dofs: Degrees of freedom of a sector, increasing (k,).
-    """
-    first, end = int(dofs[0]), int(dofs[-1]) + 1
-    if end - first == dofs.size:  # faster than a list of indices
-        return slice(None), slice(first, end), slice(first, end)
-    return slice(None), dofs[:, None], dofs

@@ -194,7 +194,7 @@ class ToothContact:
         farthest = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
         deep = farthest > self.circular_spline.profile.addendum_radius
         sector, side = sector[deep], side[deep]
-        seen = self._feet(
+        seen = self.find_feet(
             points[deep].reshape(-1, 2),
             np.tile(outward, (len(sector), 1)),
             np.repeat(sector, s.size),
@@ -204,7 +204,7 @@ class ToothContact:
         )
         return s, seen.feet.gap.reshape(len(sector), s.size), sector, side
 
-    def _feet(
+    def find_feet(
         self,
         points: Array,
         outward: Array,
@@ -305,7 +305,7 @@ class ToothContact:
         s, foot = station, None
         for _ in range(REFINEMENTS):
             point, tangent, curvature = self._displaced(s, mirrored)
-            seen = self._feet(
+            seen = self.find_feet(
                 point,
                 outward_normals(tangent),
                 sector,
@@ -362,7 +362,7 @@ class ToothContact:
         spline = element.spline(station) if n else np.zeros((0, size))
         mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
         point = mirrored * mirror
-        seen = self._feet(mirrored, outward_normals(tangent), sector, side)
+        seen = self.find_feet(mirrored, outward_normals(tangent), sector, side)
         gap = seen.contact_gaps(station, tangent, element.flank_range)
         normal = seen.normal * mirror
         # in the mirrored frame the flexspline's normal is -n: its tangent is J n
