@@ -285,8 +285,11 @@ def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
     gear, ring = design.drive, design.circular_spline
     teeth, cup = gear.teeth_circular_spline, design.cup
     depth = ring.dedendum_coefficient * gear.module_mm + ring.rim_mm
-    diameter = gear.module_mm * teeth + 2.0 * depth
-    length = gear.face_width_mm if cup is None else cup.length_mm
+    diameter, length = gear.module_mm * teeth + 2.0 * depth, gear.face_width_mm
+    if cup is not None:
+        length += cup.length_mm  # of the wall behind the teeth
+    if cup is not None and cup.kind == "hat":
+        diameter = max(diameter, 2.0 * cup.bore_radius_mm)  # of the flange
     found = {
         "outer_diameter_mm": diameter,
         "length_mm": length,
