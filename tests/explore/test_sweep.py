@@ -22,8 +22,9 @@ from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.points import _engine_version, points_of
 from swgjoint.explore.sweep.results import parquet_bytes, place_of
 from swgjoint.explore.sweep.sweep import run_sweep
-from swgjoint.explore.sweep.tasks import RunTask
+from swgjoint.explore.sweep.tasks import RunTask, SpecTask
 from swgjoint.faults import validate
+from swgjoint.gear.design.design import Design
 from swgjoint.pool import LocalPool, Lost
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.store import json_content, json_file
@@ -499,11 +500,14 @@ def test_processes_give_what_this_process_gives(tmp_path):
     assert rows(LocalPool(2)) == rows(LocalPool(1))
 
 
-@pytest.mark.parametrize(("share", "lost"), [(0.04, False), (0.6, True)])
+@pytest.mark.parametrize(("share", "lost"), [(0.04, None), (0.2, False), (0.6, True)])
 def test_a_ripple_that_is_not_valid_is_no_figure_of_a_sweep(
-    synthetic_map, tmp_path, share, lost
+    synthetic_map, tmp_path, monkeypatch, share, lost
 ):
-    """Its reason names figure and torque; other figures of the run stay."""
+    """Its reason names figure and torque; other figures of the run stay.
+
+    An uncertain ripple stays with the same remark, also that of a spec sheet.
+    """
     path = tmp_path / "a.swg"
     validated_map(synthetic_map, {20.0: (share, 0.01)}).save(path)
     short = {"simulation.duration_s": 0.5, "trajectory.settle_s": 0.2}
@@ -511,10 +515,22 @@ def test_a_ripple_that_is_not_valid_is_no_figure_of_a_sweep(
     scene = Scene.load_file("bench", short | load)
     task = RunTask(figures=("ripple_rms_percent", "torsion_arcmin"))
     figures, reasons = sweep_figures._run(scene, None, task)
-    assert (figures["ripple_rms_percent"] is None) == lost
+    assert (figures["ripple_rms_percent"] is None) == bool(lost)
     assert figures["torsion_arcmin"] > 0.0
-    assert set(reasons) == ({"ripple_rms_percent"} if lost else set())
-    assert all(names(why, "60 %", "20 N·m") for why in reasons.values())
+    wrong = set() if lost is None else {"ripple_rms_percent"}
+    assert set(reasons) == wrong
+    percent = f"{100.0 * share:.0f} %"
+    assert all(names(why, percent, "20 N·m") for why in reasons.values())
+    drive = validated_map(synthetic_map, {20.0: (share, 0.01)})
+    design = Design.load("reference-2d")
+    monkeypatch.setattr(sweep_figures, "_map", lambda *_, **__: (drive, design))
+    monkeypatch.setattr("swgjoint.gear.catalogue.ratings_of", lambda _: drive.ratings)
+    spec = SpecTask(figures=("ripple_rms_percent", "K1_Nm_rad"))
+    figures, reasons = sweep_figures._spec(design, spec)
+    assert (figures["ripple_rms_percent"] is None) == bool(lost)
+    assert figures["K1_Nm_rad"] > 0.0
+    assert set(reasons) == wrong
+    assert all(names(why, percent, "20 N·m") for why in reasons.values())
 
 
 @pytest.mark.parametrize(

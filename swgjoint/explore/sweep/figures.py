@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from swgjoint.fe.meshing_run import MeshingRun
     from swgjoint.fe.solid.meshing import SolidRun
     from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.sheet.map_validity import Difference
     from swgjoint.sim.scene.scene import Scene
 
 _STRESSES = ("von_mises_MPa", "tensile_MPa", "compressive_MPa")
@@ -98,7 +99,7 @@ class Record:
     process died, or memory, disk space or a package was missing). A lost record is not
     stored, because another machine may succeed."""
     reason: str = ""
-    """Why there are no figures, or why some are missing."""
+    """Why there are no figures, or why some are missing or uncertain."""
     figures: dict[str, float | None] = field(default_factory=dict)
     """Figures by name; None where the model provides no value."""
     work_s: float = 0.0
@@ -277,7 +278,9 @@ def _spec(
     if needs_map(keys):
         drive, design = _map(design, task, turn=needs_turn(keys))
     sheet = measure_spec(drive, ratings=ratings_of(design), only=keys)
-    return {name: sheet.figures[name] for name in task.figures}, sheet.missing
+    doubts = {name: _uncertain(why) for name, why in sheet.uncertain.items()}
+    figures = {name: sheet.figures[name] for name in task.figures}
+    return figures, {**sheet.missing, **doubts}
 
 
 def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
@@ -316,12 +319,20 @@ def _run(
         run = run_scene(scene.with_drive(name), drives={name: drive})
     row = row_of(scene.name, run, drive, level=None)
     found = {name: getattr(row, name) for name in task.figures}
-    ripple = [name for name in task.figures if name in RIPPLE]
+    lost = [name for name in task.figures if name in RIPPLE]
+    doubt = joint_doubt(row.to_json())
     if row.ripple_valid is False:
-        why = f"not valid: the map {joint_doubt(row.to_json())}"
+        why = f"not valid: the map {doubt}"
     elif row.ripple_is_lower_bound:
         why = "not resolved: the step leaves out orders of the drive"
     else:
-        ripple = [name for name in ripple if found[name] is None]
+        short = [name for name in lost if found[name] is None]
         why = "the inputs turn too little for the strongest order of the drive"
-    return found | dict.fromkeys(ripple), dict.fromkeys(ripple, why)
+        remarks = {} if doubt is None else dict.fromkeys(lost, _uncertain(doubt))
+        return found, remarks | dict.fromkeys(short, why)
+    return found | dict.fromkeys(lost), dict.fromkeys(lost, why)
+
+
+def _uncertain(doubt: Difference) -> str:
+    """Remark on a figure that depends on an inaccurate part of the map."""
+    return f"uncertain: the map {doubt}"
