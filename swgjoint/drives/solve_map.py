@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
@@ -19,8 +21,10 @@ from swgjoint.maps.fit.friction_bending import without_friction
 from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.fit.hysteresis_loops import with_hysteresis
 from swgjoint.maps.friction_temperature import KEY, at_temperature, friction_table
+from swgjoint.maps.sheet.efficiency import EfficiencyTable, efficiency_of_map
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress
+from swgjoint.units import ZERO_CELSIUS, rpm
 
 
 def solve_map(
@@ -152,8 +156,46 @@ def with_losses(design: Design, drive: DriveMap, progress: Progress) -> DriveMap
         f" {section.base_oil_40C_mm2_s:g} and {section.base_oil_100C_mm2_s:g} mm²/s at"
         " 40 and 100 °C",
     )
-    drive = drive.with_parts(info={**info, "missing": missing, KEY: table})
+    info = {**info, "missing": missing}
+    simple = efficiency_of_map(drive.with_parts(info={**info, KEY: table}))
+    assert simple is not None
+    table["source"] += _simplification(model.table(), simple)
+    drive = drive.with_parts(info={**info, KEY: table})
     return at_temperature(drive, own.temperature, where=design.drive.name)
+
+
+def _simplification(model: EfficiencyTable, law: EfficiencyTable) -> str:
+    """Remark on the largest difference of the law of a map from the model.
+
+    The law has the same losses at rest, without load and at rated torque at 2000 rpm.
+
+    Args:
+        model: Efficiency of the model.
+        law: Efficiency of the law at the same speeds, of which loads and temperatures
+            that both tables have are compared.
+    """
+    (T, *at), (load, *under) = (
+        np.intersect1d(np.round(one, 6), np.round(other, 6), return_indices=True)
+        for one, other in (
+            (model.temperature, law.temperature),
+            (model.load, law.load),
+        )
+    )
+    exact, simple = (
+        table.efficiency[rows][:, :, columns]
+        for table, rows, columns in zip((model, law), at, under, strict=True)
+    )
+    if not exact.size:
+        return ""
+    off = np.abs(exact - simple).max()
+    low, high = T[[0, -1]] - ZERO_CELSIUS
+    loads = 100.0 * load[[0, -1]] / law.load[-1]
+    return (
+        f"; the efficiency of this law is within {100.0 * off:.2g} percentage points of"
+        f" that of the model at {law.speed[0] / rpm:.4g} to"
+        f" {law.speed[-1] / rpm:.4g} rpm, {loads[0]:.3g} to {loads[1]:.3g} % of the"
+        f" rated torque and {low:.3g} to {high:.3g} °C"
+    )
 
 
 def _without_losses(design: Design, drive: DriveMap) -> DriveMap:

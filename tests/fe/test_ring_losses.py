@@ -9,6 +9,7 @@ import pytest
 from messages import naming
 from solved import hundred_elements
 
+from swgjoint.drives import solve_map
 from swgjoint.errors import DesignError
 from swgjoint.fe.rings import losses as ring_losses
 from swgjoint.fe.rings.losses import LossModel, loss_model
@@ -21,6 +22,7 @@ from swgjoint.gear.design.losses import LossConditions
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.friction_bending import cup_bending_energy
 from swgjoint.maps.fit.friction_fit import friction_of_losses
+from swgjoint.maps.sheet.efficiency import efficiency_of_map
 from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,
     efficiency,
@@ -176,3 +178,22 @@ def test_losses_of_a_design(monkeypatch):
     for key in ("teeth", "race", "balls", "bending"):
         assert (np.diff(parts[key]) > 0.0).all()
     assert 0.5 < model.catalogue_losses(model.conditions.temperature).efficiency < 0.95
+
+
+def test_a_map_states_how_far_its_law_of_friction_is_off(monkeypatch):
+    """The largest difference of both tables of the efficiency, in the source."""
+    oil = {"base_oil_40C_mm2_s": 25.0, "base_oil_100C_mm2_s": 5.0}
+    design = Design.preset("size-25-50").with_changes({"losses": oil})
+    drive = DriveMap.from_numbers(stiffness=5e4, rated_torque=51.0, ratio=50)
+    drive = drive.with_parts(info={**drive.info, "missing": {}})
+    monkeypatch.setattr(ring_losses, "LOADED_POSITIONS", 1)
+    with hundred_elements():
+        model = loss_model(design)
+    monkeypatch.setattr(solve_map, "loss_model", lambda *_, **__: model)
+    found = solve_map.with_losses(design, drive, lambda *_: None)
+    ours, exact = efficiency_of_map(found), model.table()
+    kept = np.isin(np.round(exact.temperature, 6), np.round(ours.temperature, 6))
+    off = 100.0 * np.abs(exact.efficiency[kept] - ours.efficiency).max()
+    assert 2.0 < off < 50.0
+    assert f"within {off:.2g} percentage points" in found.friction.source
+    assert "500 to 3500 rpm, 10 to 100 % of the" in found.friction.source
