@@ -204,7 +204,7 @@ def report(result: dict[str, Any]) -> str:
         for key in row["missed"]:
             value = cell(row, key)
             found = "has no value" if value == "-" else f"= {value}"
-            if value.startswith("> ") and row["ripple_is_lower_bound"]:
+            if value.startswith("> ") and not key.endswith("_h"):
                 found = f"{value}, a lower bound, because the step leaves out orders"
             if key == _ERROR_RIPPLE and row[key] is None:
                 found += ", because the inputs turn too little for it"

@@ -392,17 +392,26 @@ def test_a_ripple_that_is_not_valid_is_marked_and_misses_its_limit(
     assert any(line.startswith("! not valid") for line in lines)
 
 
-def test_a_coarser_step_does_not_meet_a_limit_of_the_ripple(capsys):
-    """Where the step leaves out the strong order 20, the smaller ripple is a bound.
+@pytest.mark.parametrize(
+    ("figure", "limit"),
+    [("ripple_rms_percent", 1.0), ("transmission_error_arcmin", 0.1)],
+)
+def test_a_coarser_step_does_not_meet_a_limit_that_a_fine_one_misses(
+    figure, limit, capsys
+):
+    """Where the step leaves out the strong order 20, the smaller figure is a bound.
 
-    Here it is 0.007 % of the rated torque at 1.5 ms, and 2.4 % at 0.5 ms.
+    The ripple is 2.4 % of the rated torque at 0.5 ms and 0.007 % at 1.5 ms, the
+    transmission error 0.23 and 0.041 arcmin.
     """
     errors = "{2=0.02,20=0.2}"
     numbers = f"{{K1_Nm_rad=3e4,rated_torque_Nm=67.0,kinematic_error_arcmin={errors}}}"
     keys = [f"defaults.numbers={numbers}", "trajectory.speed_deg_s.joint=12.0"]
     keys += ["load.joint.torque_Nm=20.0", "simulation.duration_s=2.0"]
     common = [part for key in keys for part in ("--set", key)]
-    common += ["--limit", "ripple_rms_percent=1.0"]
+    common += ["--limit", f"{figure}={limit}"]
+    bounded = figure.removesuffix("_arcmin").removesuffix("_rms_percent")
+    bounded += "_is_lower_bound"
     status, bound = {}, {}
     for step in (0.5, 1.5):
         asked = [*common, "--set", f"simulation.step_s={1e-3 * step}"]
@@ -413,8 +422,8 @@ def test_a_coarser_step_does_not_meet_a_limit_of_the_ripple(capsys):
         )
         assert main(["compare", "full", "--scene", "bench", *asked, "--json"]) == 1
         (row,) = json.loads(capsys.readouterr().out)["rows"]
-        bound[step] = row["ripple_is_lower_bound"], row["ripple_rms_percent"] < 1.0
-        assert row["missed"] == ["ripple_rms_percent"]
+        bound[step] = row[bounded], row[figure] < limit
+        assert row["missed"] == [figure]
     assert status == {0.5: 1, 1.5: 1}
     assert bound == {0.5: (False, False), 1.5: (True, True)}
 

@@ -24,7 +24,7 @@ from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
-from swgjoint.sim.figures.line_source import error_ripple
+from swgjoint.sim.figures.line_source import error_may_exceed, error_ripple
 from swgjoint.sim.figures.metrics import strongest_left_out
 from swgjoint.sim.figures.resonance import lowest_resonance
 from swgjoint.sim.figures.ripple_validity import may_exceed
@@ -37,6 +37,7 @@ STRESS_POSITIONS = 6
 SLOW = "fatigue_safety_factor"
 """Figure that is computed only if a spec or the sorting needs it, because its 3D model
 takes minutes."""
+ERROR = "transmission_error_arcmin"
 STIFFNESS = "K1_Nm_rad"
 OF_SPRINGS = (STIFFNESS, "resonance_Hz")
 """Figures that a level without compliance does not have and whose limits it meets."""
@@ -75,6 +76,9 @@ class Compared:
     the form of the figures of a joint."""
     transmission_error_arcmin: float
     """Peak-to-peak transmission error [arcmin]."""
+    transmission_error_is_lower_bound: bool
+    """Whether orders that the step leaves out may raise this error, in its joint or in
+    another one. Such an error meets no limit."""
     transmission_error_ripple_arcmin: float | None
     """Peak-to-peak amplitude of the strongest spectral line at an order of the drive
     [arcmin]; None if the inputs turn too little for the strongest orders."""
@@ -123,6 +127,12 @@ class Compared:
     def figure(self, key: str) -> Any:
         """Value of a figure; None if the run does not provide it."""
         return None if self.ripple_missing and key in RIPPLE else getattr(self, key)
+
+    def is_lower_bound(self, key: str) -> bool:
+        """Whether orders that the step leaves out may raise a figure."""
+        if key == ERROR:
+            return self.transmission_error_is_lower_bound
+        return self.ripple_is_lower_bound and key in RIPPLE
 
     def to_json(self) -> dict[str, Any]:
         """All figures as JSON."""
@@ -216,8 +226,8 @@ def _is_design(reference: str) -> bool:
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """Limits that a row does not meet; a figure without a valid value meets none.
 
-    Neither does a ripple that is a lower bound. A level without compliance meets every
-    lower limit of stiffness and resonance.
+    Neither does a lower bound meet an upper limit. A level without compliance meets
+    every lower limit of stiffness and resonance.
 
     Args:
         row: Results of one argument.
@@ -228,11 +238,10 @@ def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
         value = row.figure(key)
         if key in OF_SPRINGS and value is None and row.level in UNYIELDING:
             continue
-        valid = key not in RIPPLE or not (
-            row.ripple_valid is False or row.ripple_is_lower_bound
-        )
+        valid = key not in RIPPLE or row.ripple_valid is not False
         kept = (
             valid
+            and not row.is_lower_bound(key)
             and value is not None
             and (value >= limit if key in LOWER else value <= limit)
         )
@@ -287,6 +296,7 @@ def row_of(
         ripple_is_lower_bound=any(may_exceed(of, ripple) for of in joints.values()),
         **joints_judged(joints.values()),
         transmission_error_arcmin=max(float(error["pp"]) for error in errors),
+        transmission_error_is_lower_bound=error_may_exceed(run, joints),
         transmission_error_ripple_arcmin=error_ripple(run, joints),
         torsion_arcmin=max(
             abs(float(joint["torsion_arcmin"]["mean"])) for joint in joints.values()

@@ -142,7 +142,7 @@ def evaluate_set(
                 continue
             value = figures[name][key]
             why = row.ripple_missing if key in RIPPLE else None
-            if key in RIPPLE and row.ripple_is_lower_bound and not why:
+            if row.is_lower_bound(key) and not why:
                 why = "a lower bound, because the step leaves out orders of the drive"
             if name and key == GOODMAN:
                 why = metrics["joints"][name]["life"]["flexspline"]["missing"]

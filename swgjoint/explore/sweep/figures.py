@@ -319,18 +319,18 @@ def _run(
         run = run_scene(scene.with_drive(name), drives={name: drive})
     row = row_of(scene.name, run, drive, level=None)
     found = {name: getattr(row, name) for name in task.figures}
-    lost = [name for name in task.figures if name in RIPPLE]
+    reasons, remarks = {}, {}
     doubt = joint_doubt(row.to_json())
-    if row.ripple_valid is False:
-        why = f"not valid: the map {doubt}"
-    elif row.ripple_is_lower_bound:
-        why = "not resolved: the step leaves out orders of the drive"
-    else:
-        short = [name for name in lost if found[name] is None]
-        why = "the inputs turn too little for the strongest order of the drive"
-        remarks = {} if doubt is None else dict.fromkeys(lost, _uncertain(doubt))
-        return found, remarks | dict.fromkeys(short, why)
-    return found | dict.fromkeys(lost), dict.fromkeys(lost, why)
+    for name in task.figures:
+        if name in RIPPLE and row.ripple_valid is False:
+            reasons[name] = f"not valid: the map {doubt}"
+        elif row.is_lower_bound(name):
+            reasons[name] = "not resolved: the step leaves out orders of the drive"
+        elif name in RIPPLE and found[name] is None:
+            reasons[name] = "the inputs turn too little for the strongest order"
+        elif name in RIPPLE and doubt is not None:
+            remarks[name] = _uncertain(doubt)
+    return found | dict.fromkeys(reasons), remarks | reasons
 
 
 def _uncertain(doubt: Difference) -> str:

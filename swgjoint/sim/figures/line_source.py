@@ -9,8 +9,9 @@ import numpy as np
 
 from swgjoint.joint.drive import JointDrive, input_orders
 from swgjoint.sim.figures.orders import lowest_order
-from swgjoint.sim.figures.ripple_validity import HARMONIC_LEVELS
+from swgjoint.sim.figures.ripple_validity import HARMONIC_LEVELS, SHARE
 from swgjoint.typing import Array
+from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -103,6 +104,29 @@ def error_ripple(run: Run, joints: Mapping[str, Any]) -> float | None:
             if drive_order(run, j, line["order"]) is not None
         ]
     return max(lines, default=None if short else 0.0)
+
+
+def error_may_exceed(run: Run, joints: Mapping[str, Any]) -> bool:
+    """Whether orders that the step leaves out may raise the largest transmission error.
+
+    The amplitudes of these orders are estimated as for the ripple, see
+    :mod:`swgjoint.sim.figures.ripple_validity`, and added to the error of their joint.
+
+    Args:
+        run: The run.
+        joints: Figures of the joints to consider.
+    """
+    found = {name: of["transmission_error_arcmin"]["pp"] for name, of in joints.items()}
+    largest = max(found.values())
+    for name, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
+        attached = transmission.attached
+        left = 2.0 * sum(
+            one.error + one.torque / attached.stiffness for one in attached.unresolved
+        )
+        whole = found.get(name, 0.0) + left / arcmin
+        if name in joints and left > 0.0 and whole > (1.0 + SHARE) * largest:
+            return True
+    return False
 
 
 def _is_short(run: Run, j: int) -> bool:

@@ -60,8 +60,8 @@ _WIDE = 30.0
 def cell(row: Mapping[str, Any], key: str) -> str:
     """Format a figure with its marks.
 
-    The text is a dash if the run reports no ripple. ``>`` marks a ripple that is a
-    lower bound, ``~`` an uncertain and ``!`` an invalid figure, see
+    The text is a dash if the run reports no ripple. ``>`` marks a lower
+    bound, ``~`` an uncertain and ``!`` an invalid figure, see
     :mod:`swgjoint.maps.sheet.validity_marks`.
 
     Args:
@@ -70,12 +70,15 @@ def cell(row: Mapping[str, Any], key: str) -> str:
     """
     if key in RIPPLE and row["ripple_missing"]:
         return "-"
-    bound = "> " if key in RIPPLE and row["ripple_is_lower_bound"] else ""
+    bounded = key in RIPPLE and row["ripple_is_lower_bound"]
+    bounded |= key == _ERROR and row["transmission_error_is_lower_bound"]
+    text = format_named(key, row[key])
+    bound = "> " if bounded and text != "-" else ""
     if key in JUDGED_BY:
         sign = joint_mark(row, JUDGED_BY[key])
     else:
         sign = error_mark(row, row[key]) if key == _ERROR else ""
-    return f"{sign} {bound}{format_named(key, row[key])}".strip()
+    return f"{sign} {bound}{text}".strip()
 
 
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
