@@ -25,6 +25,7 @@ from swgjoint.units import arcmin, deg, rpm
 RUBS = Friction(stiffness=30.0, coulomb=0.04, static=0.05, viscous=3e-4, load=0.06)
 SLOPES = {"stiffness": [31e3, 50e3, 57e3], "rated_torque": 67.0}
 QUICK = "starting,resonance"
+ACCURACY = "transmission_accuracy_arcmin"
 
 
 def bench(*speeds: float, ratio: float = -100.0) -> Bench:
@@ -200,6 +201,27 @@ def test_a_drive_without_friction_has_no_friction_figures(tmp_path):
     )
     asked = accept(drive, only=["starting"], spec={"starting_torque_Nm": 0.1})
     assert [row.passed for row in asked.rows] == [False, None] and not asked.passed
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "limit", "shown"),
+    [(0.5, 0.5, False), (0.02, 0.23, False), (0.02, 0.5, True)],
+)
+def test_an_error_that_the_step_leaves_out_is_not_accepted(amplitude, limit, shown):
+    """Order 160 advances by 1.3 rad in a step of 1 ms at a ratio of 160.
+
+    The run shows 0.2 arcmin, which is order 2. The figure remains if the rest is less
+    than that and the limit is not between both.
+    """
+    drive = DriveMap.from_numbers(
+        **SLOPES, ratio=160, kinematic_error={2: 0.1, 160: amplitude}
+    )
+    found = accept(drive, only=["kinematic-error"], spec={ACCURACY: limit})
+    rows = [row for row in found.rows if row.figure == ACCURACY]
+    for row in rows:
+        assert (row.simulated is not None) == shown == (not row.reason)
+        assert shown or names(row.reason, "1 ms", "order 160")
+        assert row.passed == shown == found.passed
 
 
 # ---- command
