@@ -173,6 +173,7 @@ def status(result: dict[str, Any]) -> int:
 
 def report(result: dict[str, Any]) -> str:
     """Format one line per argument, then every missed limit."""
+    from swgjoint.sim.figures.keys import is_lower_bound
     from swgjoint.view.plots.compare import cell
 
     columns, spec = result["columns"], result["spec"]
@@ -204,7 +205,7 @@ def report(result: dict[str, Any]) -> str:
         for key in row["missed"]:
             value = cell(row, key)
             found = "has no value" if value == "-" else f"= {value}"
-            if value.startswith("> ") and not key.endswith("_h"):
+            if value != "-" and is_lower_bound(row, key):
                 found = f"{value}, a lower bound, because the step leaves out orders"
             if key == _ERROR_RIPPLE and row[key] is None:
                 found += ", because the inputs turn too little for it"

@@ -23,7 +23,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
-from swgjoint.sim.figures.keys import LOWER, RIPPLE
+from swgjoint.sim.figures.keys import LOWER, RIPPLE, is_lower_bound
 from swgjoint.sim.figures.line_source import error_may_exceed, error_ripple
 from swgjoint.sim.figures.metrics import strongest_left_out
 from swgjoint.sim.figures.resonance import lowest_resonance
@@ -37,7 +37,6 @@ STRESS_POSITIONS = 6
 SLOW = "fatigue_safety_factor"
 """Figure that is computed only if a spec or the sorting needs it, because its 3D model
 takes minutes."""
-ERROR = "transmission_error_arcmin"
 STIFFNESS = "K1_Nm_rad"
 OF_SPRINGS = (STIFFNESS, "resonance_Hz")
 """Figures that a level without compliance does not have and whose limits it meets."""
@@ -130,9 +129,7 @@ class Compared:
 
     def is_lower_bound(self, key: str) -> bool:
         """Whether orders that the step leaves out may raise a figure."""
-        if key == ERROR:
-            return self.transmission_error_is_lower_bound
-        return self.ripple_is_lower_bound and key in RIPPLE
+        return is_lower_bound(vars(self), key)
 
     def to_json(self) -> dict[str, Any]:
         """All figures as JSON."""

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+ERROR = "transmission_error_arcmin"
 UPPER = (
     "ripple_rms_percent",
     "ripple_pp_percent",
-    "transmission_error_arcmin",
+    ERROR,
     "transmission_error_ripple_arcmin",
     "torsion_arcmin",
     "tool_path_rms_mm",
@@ -34,3 +38,15 @@ RIPPLE = (
     "transmission_error_ripple_arcmin",
 )
 """Ripple figures, which a drive without harmonics does not have."""
+
+
+def is_lower_bound(row: Mapping[str, Any], key: str) -> bool:
+    """Whether orders that the step leaves out may raise a figure of a comparison.
+
+    Args:
+        row: Figures of an argument by key.
+        key: Key of the figure.
+    """
+    if key == ERROR:
+        return bool(row["transmission_error_is_lower_bound"])
+    return key in RIPPLE and bool(row["ripple_is_lower_bound"])

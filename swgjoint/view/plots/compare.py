@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.maps.sheet.map_validity import QUANTITIES
 from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
 from swgjoint.pictures import png
-from swgjoint.sim.figures.keys import LOWER, RIPPLE
+from swgjoint.sim.figures.keys import ERROR, LOWER, RIPPLE, is_lower_bound
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.words import NOISE_NOTE, format_named
@@ -42,7 +42,6 @@ JUDGED_BY = {
     "transmission_error_ripple_arcmin": ("output_error",),
 }
 """Quantities of the map validation on which a figure depends, by key of the figure."""
-_ERROR = "transmission_error_arcmin"
 PANELS = (
     "ripple_rms_percent",
     "transmission_error_ripple_arcmin",
@@ -60,8 +59,8 @@ _WIDE = 30.0
 def cell(row: Mapping[str, Any], key: str) -> str:
     """Format a figure with its marks.
 
-    The text is a dash if the run reports no ripple. ``>`` marks a lower
-    bound, ``~`` an uncertain and ``!`` an invalid figure, see
+    The text is a dash if the run reports no ripple. ``>`` marks a lower bound, ``~`` an
+    uncertain and ``!`` an invalid figure, see
     :mod:`swgjoint.maps.sheet.validity_marks`.
 
     Args:
@@ -70,14 +69,12 @@ def cell(row: Mapping[str, Any], key: str) -> str:
     """
     if key in RIPPLE and row["ripple_missing"]:
         return "-"
-    bounded = key in RIPPLE and row["ripple_is_lower_bound"]
-    bounded |= key == _ERROR and row["transmission_error_is_lower_bound"]
     text = format_named(key, row[key])
-    bound = "> " if bounded and text != "-" else ""
+    bound = "> " if text != "-" and is_lower_bound(row, key) else ""
     if key in JUDGED_BY:
         sign = joint_mark(row, JUDGED_BY[key])
     else:
-        sign = error_mark(row, row[key]) if key == _ERROR else ""
+        sign = error_mark(row, row[key]) if key == ERROR else ""
     return f"{sign} {bound}{text}".strip()
 
 
@@ -148,7 +145,7 @@ def left_out_notes(rows: Sequence[Compared]) -> list[str]:
         marks |= {joint_mark(figures), error_mark(figures, error)}
     if marks - {""}:
         notes.append(mark_legend(marks))
-    figures_of_run = (_ERROR, "torsion_arcmin", "tool_path_rms_mm")
+    figures_of_run = (ERROR, "torsion_arcmin", "tool_path_rms_mm")
     if any(_is_noise(row, key) for row in rows for key in figures_of_run):
         notes.append(NOISE_NOTE)
     return notes
