@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
+from swgjoint.fe.common.block_circulant import SharedShapes, respond
 from swgjoint.fe.plane.circular_spline import FlankSplines
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
@@ -28,6 +29,24 @@ def test_compliance_is_reciprocal():
         assert np.abs(block - blocks[-offset].T).max() < 1e-12 * np.abs(block).max()
     force = np.random.default_rng(1).normal(size=(122, ring().flank_dofs))
     assert np.sum(force * compliance.displacement(force)) > 0.0
+
+
+def test_unloaded_flanks_share_the_shapes_of_two_faces(monkeypatch):
+    """Displacements in shared shapes against the sum over all blocks.
+
+    The outer node of a face is fixed.
+    """
+    compliance = ring().compliance
+    size = compliance.element.face_size
+    shared = SharedShapes.of(compliance.offsets, compliance.flank)
+    assert shared.shapes.shape[1] == 2 * 2 * (size - 1)
+    rng = np.random.default_rng(3)
+    force = rng.normal(size=(122, ring().flank_dofs))
+    force[20:100] = 0.0
+    monkeypatch.setenv("SWGJOINT_KERNELS", "numpy")
+    theirs = respond(compliance.offsets, compliance.flank, force)
+    ours = shared.respond(force)
+    assert np.abs(ours - theirs).max() < 1e-14 * np.abs(theirs).max()
 
 
 def test_compliance_between_points_is_that_of_the_fields():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +14,44 @@ LARGE = 200
 """Number of degrees of freedom of a flank from which the matrix products of BLAS are
 faster than the compiled loops. With the 924 of size-25-100 in 3D they take half of the
 time."""
+
+ROUNDING = 1e-14
+"""Singular value, divided by the largest, below which a shape is rounding error [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class SharedShapes:
+    """Response of teeth to flank forces, in shapes that the far teeth share.
+
+    A loaded tooth moves the others only through the faces between their sectors. With
+    a displacement at n_f degrees of freedom of each of the two faces, the flanks of an
+    unloaded tooth take 2 n_f shapes, whichever tooth is loaded. By reciprocity, forces
+    on a flank move other teeth only by their work in these shapes.
+    """
+
+    own: Array
+    """Displacement of a tooth per force on itself (n_b, n_b) [m/N]."""
+    shapes: Array
+    """Orthonormal shapes of the unloaded flanks (n_b, n_s) [-]."""
+    offsets: Index
+    """Offsets of the unloaded teeth from the loaded one (n_far,)."""
+    far: Array
+    """Their blocks in these shapes (n_far, n_s, n_s) [m/N]."""
+
+    @classmethod
+    def of(cls, offsets: Index, blocks: Array) -> SharedShapes:
+        """Split blocks (n_offsets, n_b, n_b) [m/N], the opposite offset of each too."""
+        away = offsets != 0
+        beside = np.concatenate(blocks[away], axis=1)
+        shapes, size, _ = np.linalg.svd(beside, full_matrices=False)
+        shapes = shapes[:, size > ROUNDING * size[0]]
+        far = shapes.T @ blocks[away] @ shapes
+        return cls(blocks[~away].sum(axis=0), shapes, offsets[away], far)
+
+    def respond(self, force: Array) -> Array:
+        """Displacements (N, n_b) [m] under flank forces (N, n_b) [N]."""
+        beside = respond(self.offsets, self.far, force @ self.shapes)
+        return np.asarray(force @ self.own.T + beside @ self.shapes.T)
 
 
 def respond(offsets: Index, blocks: Array, force: Array) -> Array:

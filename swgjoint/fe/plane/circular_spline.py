@@ -15,7 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.common.block_circulant import contact_compliance, respond
+from swgjoint.fe.common.block_circulant import (
+    SharedShapes,
+    contact_compliance,
+    respond,
+)
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.superelement import Superelement
@@ -49,7 +53,11 @@ class Compliance:
 
     def displacement(self, force: Array) -> Array:
         """Flank displacement (N, 2 n_b) [m] under flank forces (N, 2 n_b) [N]."""
-        return respond(self.offsets, self.flank, force)
+        return self._by_shapes.respond(force)
+
+    @cached_property
+    def _by_shapes(self) -> SharedShapes:
+        return SharedShapes.of(self.offsets, self.flank)
 
     def skeleton_displacement(self, force: Array) -> Array:
         """Skeleton displacement (N, 2 n_a) [m] under flank forces (N, 2 n_b) [N]."""
