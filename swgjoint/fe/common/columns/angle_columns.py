@@ -37,11 +37,9 @@ class AngleColumn(Generic[AnyState]):
     """Equilibria by nonzero torque [N·m]."""
     failed: set[float] = field(default_factory=set)
     """Torques whose solve failed [N·m]."""
-    changes: dict[tuple[float, float], ContactChanges | None] = field(
-        default_factory=dict
-    )
-    """Contact changes that an equilibrium predicts, by its torque [N·m] and the sign of
-    the torques of the load curve; None without a prediction."""
+    changes: dict[float, ContactChanges | None] = field(default_factory=dict)
+    """Contact changes that an equilibrium predicts, by its torque [N·m]; None without a
+    prediction."""
     paths: dict[float, tuple[LoadPath, tuple[Array, Array]]] = field(
         default_factory=dict
     )

@@ -98,14 +98,13 @@ class ColumnGrid(SolvedColumns[AnyState]):
         self, column: AngleColumn[AnyState], state: AnyState, sign: float, top: float
     ) -> ContactChanges | None:
         """Contact changes that a state of a column predicts, for :meth:`path`."""
-        key = (state.torque, sign)
-        if key not in column.changes:
+        # the drive at rest serves both signs
+        if state.torque not in column.changes:
             low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
-            changes = self.follow.predicted_changes(state, low, high)
-            if changes is not None and sign < 0.0:
-                changes = changes.mirror()
-            column.changes[key] = changes
-        return column.changes[key]
+            found = self.follow.predicted_changes(state, low, high)
+            column.changes[state.torque] = found
+        changes = column.changes[state.torque]
+        return changes.mirror() if changes is not None and sign < 0.0 else changes
 
     def largest_miss(
         self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
