@@ -123,9 +123,10 @@ class ContactCorners:
         apart, away = samples[:, None] - place, theta[:, None] - place
         error = 0.5 * np.abs(apart) @ of_error
         potential = 0.25 * (apart * np.abs(apart)) @ of_moment
+        spline = CubicSpline(samples, np.column_stack([error, potential]))
         return (
-            CubicSpline(samples, error)(theta) - 0.5 * np.abs(away) @ of_error,
-            CubicSpline(samples, potential)(theta, 1) - 0.5 * np.abs(away) @ of_moment,
+            spline(theta)[:, 0] - 0.5 * np.abs(away) @ of_error,
+            spline(theta, 1)[:, 1] - 0.5 * np.abs(away) @ of_moment,
         )
 
     def places(self, torque: float) -> Array:
