@@ -1,6 +1,6 @@
 #include "model.h"
 
-#include <cstdio>
+#include <charconv>
 #include <sstream>
 
 namespace swgjoint {
@@ -30,10 +30,11 @@ constexpr Bound kBounds[] = {
 constexpr unsigned kRatio = kParameters + 10;
 constexpr double kLeastMetric = 1e-9;  // as in the plugin, where the engine needs it
 
+// All digits, with a decimal point whatever the locale of the simulator.
 std::string Exact(double value) {
   char text[40];
-  std::snprintf(text, sizeof text, "%.17g ", value);
-  return text;
+  char* end = std::to_chars(text, text + sizeof text, value).ptr;
+  return std::string(text, end) + " ";
 }
 
 }  // namespace
