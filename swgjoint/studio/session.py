@@ -162,7 +162,8 @@ class Session:
         )
 
     def choose(self, source: str) -> None:
-        """Choose a scene or an arm and read its joints."""
+        """Choose a scene or an arm and read its joints; a running arm is stopped."""
+        self.stop("arm")
         self.source, self.drives, self.chosen = source, {}, {}
         self.metrics, self.arm_files, self.arm_fault = None, [], ""
         self.start("joints", self._joints, work.list_joints, source)

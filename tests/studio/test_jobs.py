@@ -93,3 +93,12 @@ def test_a_reload_keeps_the_work(sessions):
     one.pages += 1
     one.leave()
     assert all(map(is_there, running))
+
+
+def test_another_scene_ends_the_run(sessions):
+    """The figures of one arm are never shown as those of another one."""
+    one, _ = sessions
+    one.start("arm", one._ran, hold)
+    running = one.jobs["arm"].pid
+    one.choose("bench")
+    assert not is_there(running) and "arm" not in one.jobs
