@@ -169,7 +169,11 @@ class Session:
         self.start("joints", self._joints, work.list_joints, source)
 
     def run(self) -> None:
-        """Run the arm with the chosen drives."""
+        """Run the arm with the chosen drives, once its joints are known."""
+        if "joints" in self.jobs:  # the chosen level would reach none of them
+            self.arm_fault = "the joints are still being read; run again afterwards"
+            self.version += 1
+            return
         own = [j for j, drive in self.chosen.items() if drive == THIS_DESIGN]
         if own and self.current.design is None:
             self.arm_fault = "the design of the page has faults"

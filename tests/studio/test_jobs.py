@@ -102,3 +102,16 @@ def test_another_scene_ends_the_run(sessions):
     running = one.jobs["arm"].pid
     one.choose("bench")
     assert not is_there(running) and "arm" not in one.jobs
+
+
+def test_a_run_waits_for_the_joints(sessions):
+    """A level is never left out because the joints are not known yet."""
+    one, _ = sessions
+    one.level = "rigid"
+    one.start("joints", one._joints, hold)
+    one.run()
+    assert "arm" not in one.jobs and "joints" in one.arm_fault
+    one.stop("joints")
+    one.drives = {"joint": "linear"}
+    one.run()
+    assert "arm" in one.jobs and not one.arm_fault
