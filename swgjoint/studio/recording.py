@@ -6,6 +6,7 @@ import subprocess
 import threading
 from functools import cache
 from urllib.error import HTTPError
+from urllib.parse import quote
 from urllib.request import urlopen
 
 from fastapi import HTTPException
@@ -31,9 +32,10 @@ def viewer_file(name: str = "") -> Response:
     try:
         with _STARTING:
             address = _viewer()[1]
-        with urlopen(f"{address}{name}") as answer:
+        with urlopen(f"{address}{quote(name)}") as answer:
             kind, content = answer.headers["content-type"], answer.read()
     except HTTPError as error:
+        error.close()
         raise HTTPException(status_code=error.code) from None
     except ComputationError as error:  # the viewer is not installed
         raise HTTPException(status_code=503, detail=str(error)) from None
