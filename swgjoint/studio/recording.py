@@ -31,6 +31,7 @@ def viewer_file(name: str = "") -> Response:
     """
     try:
         with _STARTING:
+            end_viewer(ended=True)  # another one starts if it was killed
             address = _viewer()[1]
         with urlopen(f"{address}{quote(name)}") as answer:
             kind, content = answer.headers["content-type"], answer.read()
@@ -44,12 +45,20 @@ def viewer_file(name: str = "") -> Response:
     )
 
 
-def end_viewer() -> None:
-    """End the server of the viewer, if it has been started."""
-    if _viewer.cache_info().currsize:
-        process = _viewer()[0]
-        process.terminate()
-        process.wait()
+def end_viewer(*, ended: bool = False) -> None:
+    """End the server of the viewer, if it has been started.
+
+    Args:
+        ended: Whether to forget a server that has ended, and to leave others alone.
+    """
+    if not _viewer.cache_info().currsize:
+        return
+    process = _viewer()[0]
+    if ended and process.poll() is None:
+        return
+    process.terminate()
+    process.wait()
+    _viewer.cache_clear()
 
 
 @cache
