@@ -35,6 +35,8 @@ SHORTEST_STEP = 1e-7
 STEPS_PER_PERIOD = 5
 """Internal steps per period of the torsional vibration below which a warning is given.
 """
+SMALLEST_INERTIA = 1e-30
+"""Smallest inertia that is accepted, whose reciprocal is a number [kg·m²]."""
 LARGEST = 1e10
 """Largest parameter that the FMU accepts, in SI units."""
 DEVIATIONS = (
@@ -143,14 +145,13 @@ def export_fmu(
         )
     load = source.ratio**2 * rotor if load_inertia is None else load_inertia
     for name, value, unit, low in (
-        ("rotor_inertia", rotor, "kg·m²", 0.0),
-        ("load_inertia", load, "kg·m²", 0.0),
+        ("rotor_inertia", rotor, "kg·m²", SMALLEST_INERTIA),
+        ("load_inertia", load, "kg·m²", SMALLEST_INERTIA),
         ("step", step, "s", SHORTEST_STEP),
     ):
-        if not (low <= value <= LARGEST and value > 0.0):
-            least = f">= {low:g}" if low else "> 0"
+        if not low <= value <= LARGEST:
             raise InputError(
-                f"{name} {value:g} {unit}; accepted: {least} and <= {LARGEST:g}"
+                f"{name} {value:g} {unit}; accepted: {low:g} to {LARGEST:g}"
             )
 
     reflected = source.ratio**2 * rotor

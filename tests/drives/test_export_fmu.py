@@ -296,7 +296,9 @@ def test_equal_drives_give_equal_files(synthetic_map, tmp_path):
     ("options", "parts"),
     [
         ({"version": "1.0"}, ("1.0", "3.0, 2.0")),
-        ({"rotor_inertia": 0.0}, ("rotor_inertia", "kg·m²", "> 0")),
+        ({"rotor_inertia": 0.0}, ("rotor_inertia", "kg·m²", "1e-30")),
+        ({"rotor_inertia": 1e-310}, ("rotor_inertia", "1e-310 kg·m²", "1e-30")),
+        ({"load_inertia": 1e-310}, ("load_inertia", "1e-310 kg·m²", "1e-30")),
         ({"load_inertia": float("nan")}, ("load_inertia", "nan kg·m²")),
         ({"step": -1.0}, ("step", "-1 s")),
     ],
