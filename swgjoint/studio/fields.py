@@ -114,7 +114,10 @@ def text_of(value: Any) -> str:
     """Text of a value for its field."""
     if value is None or isinstance(value, str):
         return value or ""
-    return json_text(value, indent=None)
+    try:
+        return json_text(value, indent=None)
+    except TypeError:  # a date or a time, which no field accepts
+        return str(value)
 
 
 def key_of_message(line: str) -> str:

@@ -164,6 +164,19 @@ def test_a_wrong_file_is_refused(tmp_path, content):
     assert str(tmp_path) not in str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["2026-12-01", "[12:30:00]", "2026-12-01 12:30:00Z"])
+def test_a_date_is_shown_in_its_field(tmp_path, text):
+    """Dates of a file, which no key accepts, are shown with the fault beside them."""
+    content = Design.preset("reference-2d").to_toml()
+    line = next(x for x in content.splitlines() if x.startswith("source = "))
+    content = content.replace(line, f"source = {text}")
+    draft = open_file(content.encode(), tmp_path)
+    fields = {field.key: field for field in list_fields(draft)}
+    assert text_of(value_at(draft, fields["drive.source"].key)) != ""
+    [fault] = judge(draft).faults
+    assert fault.startswith("drive.source")
+
+
 def test_fifty_random_edits_without_an_exception():
     """Any text in any field, one after another, gives a design or its faults."""
     rng = np.random.default_rng(7)
