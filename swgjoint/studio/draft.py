@@ -110,7 +110,9 @@ def with_value(draft: Draft, key: str, value: Any) -> Draft:
     *tables, last = key.split(".")
     table: Any = changed
     for name in tables:
-        table = table.setdefault(name, {})
+        if not isinstance(table.get(name), dict):
+            table[name] = {}  # a file may have a number in the place of the table
+        table = table[name]
     if value is None:
         table.pop(last, None)
         return changed

@@ -177,6 +177,17 @@ def test_a_date_is_shown_in_its_field(tmp_path, text):
     assert fault.startswith("drive.source")
 
 
+def test_a_value_replaces_what_is_no_table():
+    """A number of a file in the place of a table gives way to the value of its key."""
+    draft = open_bundled("reference-2d")
+    profile = draft["flexspline"]["profile"]
+    draft["flexspline"]["profile"] = 4
+    edited = with_value(draft, "flexspline.profile.tip_radius_mm", 0.3)
+    assert edited["flexspline"]["profile"] == {"tip_radius_mm": 0.3}
+    edited = with_value(draft, "flexspline.profile.kind", profile["kind"])
+    assert judge(edited).design is not None
+
+
 def test_fifty_random_edits_without_an_exception():
     """Any text in any field, one after another, gives a design or its faults."""
     rng = np.random.default_rng(7)
