@@ -80,7 +80,7 @@ def read_columns(
             )
         for name, (index, factor) in found.items():
             try:
-                value = float(row[index])
+                value = _number(row[index])
             except ValueError:
                 value = float("nan")
             if not abs(value * factor) <= LARGEST:  # rejects NaN as well
@@ -132,9 +132,16 @@ def read_table(path: str | Path, text: str) -> list[dict[str, str | float | None
 
 def _text_or_number(cell: str) -> str | float | None:
     try:
-        return float(cell)
+        return _number(cell)
     except ValueError:
         return cell.strip() or None
+
+
+def _number(cell: str) -> float:
+    """Convert a cell; ``float`` alone would read ``1_5`` as 15."""
+    if "_" in cell:
+        raise ValueError(f"{cell!r} is not a number")
+    return float(cell)
 
 
 def header_of(path: str | Path) -> list[str]:
@@ -212,7 +219,7 @@ def _is_numeric(line: str) -> bool:
     """Whether all cells of a line are finite numbers."""
     try:
         return all(
-            isfinite(float(cell.strip(' "'))) for cell in line.split(_separator(line))
+            isfinite(_number(cell.strip(' "'))) for cell in line.split(_separator(line))
         )
     except ValueError:
         return False

@@ -45,6 +45,7 @@ def test_separator_and_comments_are_seen(tmp_path, separator, head):
         ("torque_Nm torsion_rad\n1 2\n", ("torque_Nm", "','", "torsion_rad'")),
         ("1,2\n3,4\n", ("torque_Nm", "','", "'1'", "'2'")),
         ("torque_Nm;torsion_rad\n1,5;2\n", ("line 2", "torque_Nm", "'1,5'", "point")),
+        ("torque_Nm,torsion_rad\n1_5,2\n", ("line 2", "torque_Nm", "'1_5'", "finite")),
         ("torque_Nm\ttorsion_rad\n1\n", ("line 2", "1", "2", "a tab")),
         ('torque_Nm,torsion_rad\n1,"2\n3"\n', ("CSV",)),
     ],
@@ -58,10 +59,11 @@ def test_what_was_read_is_said(tmp_path, text, parts):
 def test_a_table_with_text_keeps_empty_cells(tmp_path):
     """Numbers, texts and empty cells by column; the column of text stays text."""
     path = tmp_path / "a.csv"
-    path.write_text("# prices\ndrive;mass;note\n14;0.5;\nb;;new\n")
+    path.write_text("# prices\ndrive;mass;note\n14;0.5;\nb;;new\nc;1;2_5\n")
     assert read_table(path, "drive") == [
         {"drive": "14", "mass": 0.5, "note": None},
         {"drive": "b", "mass": None, "note": "new"},
+        {"drive": "c", "mass": 1.0, "note": "2_5"},
     ]
 
 
