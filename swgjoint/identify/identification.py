@@ -83,6 +83,8 @@ ORDERS: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0), (0, 2), (0, 4), (
 """Orders (p, q), phase p alpha + q beta, that are fitted to a log of a whole turn."""
 ORDERS_OF_PART: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0))
 """Orders for less than an output turn, which cannot separate alpha from beta."""
+LARGEST_ORDER = 1_000_000
+"""Largest accepted P or Q of an order; drives have a few hundred teeth."""
 DEVIATIONS = 1.96
 """Half width of an interval in standard deviations: 95 % of a normal distribution."""
 _TURN = 0.95  # fraction of an output turn that counts as a whole turn
@@ -201,6 +203,7 @@ def identify(
     if rotor_inertia is not None and not 0.0 < rotor_inertia < np.inf:
         raise InputError(f"rotor inertia {rotor_inertia:g} kg·m²; accepted: > 0 kg·m²")
     teeth = (teeth_flexspline, teeth_circular_spline)
+    log.average(window)  # reject gaps in time, which look like jumps of the angles
     check_angles(log)
     check_ratio(log, layout, teeth)
     check_torsion(log, signed_ratio(layout, *teeth))
@@ -304,9 +307,13 @@ def _model_of(
                 f" {turns / (2.0 * np.pi):.2g} turns relative to the circular spline;"
                 f" accepted: at least {_TURN:g} turns, or the orders stated by --orders"
             )
+    shown = ", ".join(f"{p}:{q}" for p, q in orders)
     if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
-        shown = ", ".join(f"{p}:{q}" for p, q in orders)
         raise InputError(f"orders {shown}; accepted: each order once, and not 0:0")
+    if max((abs(n) for pair in orders for n in pair), default=0) > LARGEST_ORDER:
+        raise InputError(
+            f"orders {shown[:200]}; accepted: -{LARGEST_ORDER} to {LARGEST_ORDER}"
+        )
     model = Model.from_log(
         log,
         samples,

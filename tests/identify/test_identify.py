@@ -507,6 +507,7 @@ def test_command(bench, csv_file, tmp_path, capsys):
         ),
         ({"--orders": "2:x"}, ("--orders", "2:x", "P:Q")),
         ({"--orders": "2:0,2:0"}, ("orders", "2:0, 2:0", "0:0")),
+        ({"--orders": f"2:0,{10**20}:0"}, ("orders", f"{10**20}:0", "1000000")),
         ({"--window": "0"}, ("window 0 s", "> 0 s")),
         ({"--window": "1"}, ("bench.csv", "8", "1 s", "200")),
         ({"--window": "1e-300"}, ("window", "1e-300 s", "0.001 s", "bench.csv")),

@@ -115,6 +115,16 @@ def test_angles_of_a_single_turn_encoder_are_refused(channel):
         identify(log, **OPTIONS)
 
 
+def test_a_gap_in_time_is_no_jump_of_an_angle():
+    """A pause of the logger of one second: its duration and its beginning."""
+    log = log_of()
+    there = (log.time < 3.0) | (log.time >= 4.0)
+    keys = ("time", "motor_angle", "link_angle", "output_torque", "motor_torque")
+    cut = replace(log, **{key: getattr(log, key)[there] for key in keys})
+    with pytest.raises(InputError, match=naming("bench.csv", "no sample", "2.999 s")):
+        identify(cut, **OPTIONS)
+
+
 @pytest.mark.parametrize("channel", ["motor_angle", "link_angle"])
 def test_a_lost_reading_of_an_encoder_is_refused(channel):
     """One zero in a channel is named by its time, not as a stiffness without data."""
