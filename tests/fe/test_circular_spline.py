@@ -49,6 +49,14 @@ def test_unloaded_flanks_share_the_shapes_of_two_faces(monkeypatch):
     assert np.abs(ours - theirs).max() < 1e-14 * np.abs(theirs).max()
 
 
+def test_a_tooth_that_moves_no_other_shares_no_shape():
+    """With a rim so stiff that only the loaded tooth moves, its own block is left."""
+    own = np.random.default_rng(5).normal(size=(1, 4, 4))
+    shared = SharedShapes.of(np.zeros(1, dtype=np.int64), own)
+    force = np.arange(12.0).reshape(3, 4)
+    assert np.array_equal(shared.respond(force), force @ own[0].T)
+
+
 def test_compliance_between_points_is_that_of_the_fields():
     """Pair compliances against the displacement field of one force at a time."""
     compliance = ring().compliance

@@ -42,9 +42,9 @@ class SharedShapes:
     def of(cls, offsets: Index, blocks: Array) -> SharedShapes:
         """Split blocks (n_offsets, n_b, n_b) [m/N], the opposite offset of each too."""
         away = offsets != 0
-        beside = np.concatenate(blocks[away], axis=1)
+        beside = np.moveaxis(blocks[away], 0, 1).reshape(blocks.shape[1], -1)
         shapes, size, _ = np.linalg.svd(beside, full_matrices=False)
-        shapes = shapes[:, size > ROUNDING * size[0]]
+        shapes = shapes[:, size > ROUNDING * size.max(initial=0.0)]
         far = shapes.T @ blocks[away] @ shapes
         return cls(blocks[~away].sum(axis=0), shapes, offsets[away], far)
 
