@@ -392,3 +392,13 @@ def test_bundled_sweeps_have_feasible_designs(name):
     for point in points:
         if point.asked.design is not None:
             assert all(check.ok for check in design_checks(point.asked.design))
+
+
+@pytest.mark.parametrize("low", ["nan", "true", '"1"'])
+def test_a_wrong_end_of_a_range_is_one_fault(low):
+    """One line with the key as written in the file, and no type behind the key."""
+    text = GRID + parameter(RIM, f"low = {low}\nhigh = 2\ncount = 2")
+    with pytest.raises(InputError, match=naming("low = ", "number")) as caught:
+        sweep(text)
+    (line,) = str(caught.value).splitlines()
+    assert not names(line, "float")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, WrapValidator, model_validator
 
 from swgjoint.explore.sweep.keys import BASE, find_key, kind_of, unknown
 from swgjoint.explore.sweep.tasks import Listed, Text
@@ -21,6 +22,16 @@ Count = Annotated[int, Field(ge=2, le=MOST)]
 Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
 
 
+def _keep_integer(value: Any, check: Callable[[Any], float]) -> float | int:
+    """A checked number; integers stay integers, for keys that take only those."""
+    number = check(value)
+    return value if isinstance(value, int) else number
+
+
+# not float | int, of which a fault would be reported for each type
+Number = Annotated[float, WrapValidator(_keep_integer)]
+
+
 class Parameter(Section):
     """Keys that share one value, and the values that they take in turn."""
 
@@ -28,9 +39,9 @@ class Parameter(Section):
     """Dotted keys of the design or the scene, all of which take the same value."""
     values: Annotated[tuple[Any, ...], Listed] | None = None
     """Values of these keys, as an alternative to ``low`` and ``high``."""
-    low: float | int | None = None
+    low: Number | None = None
     """Smallest value, in the unit of the keys."""
-    high: float | int | None = None
+    high: Number | None = None
     """Largest value, in the unit of the keys."""
     count: Count | None = None
     """Number of equally spaced values in a grid."""
