@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,6 +137,11 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
             "design new writes a file and needs its name; accepted: with -o FILE.toml"
         )
     path = check_output_file(args.output, ".toml")
+    template = args.designs[0]
+    if path.exists() and os.path.exists(template) and path.samefile(template):
+        raise InputError(
+            f"output file {str(path)!r} is the design itself; accepted: another file"
+        )
     teeth = _teeth(args.teeth) if args.teeth else None
     from swgjoint.gear.design.design import Design
     from swgjoint.gear.design.scaling import scaled_design

@@ -132,6 +132,17 @@ def test_new_writes_a_feasible_design(tmp_path, capsys):
     assert status == 0 and lines == [] and result["defaults"] == {}
 
 
+def test_new_keeps_its_template(tmp_path, capsys, monkeypatch):
+    """A design is not scaled in place, which would lose its comments and old values."""
+    text = "# mine\n" + Design.preset("reference-2d").to_toml()
+    (tmp_path / "a.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    scaled = ("new", str(tmp_path / "a.toml"), "--module", "2", "-o", "a.toml")
+    assert main(["design", *scaled]) == 2
+    assert names(capsys.readouterr().err, "'a.toml'", "another file")
+    assert (tmp_path / "a.toml").read_text() == text
+
+
 def test_infeasible_design_is_status_2_with_one_line_per_fault(tmp_path, capsys):
     """Two faults, two lines with key, value and what is accepted."""
     changes = {"wave_generator": ROLLERS, "circular_spline.dedendum_coefficient": 0.55}
