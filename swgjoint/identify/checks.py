@@ -335,11 +335,16 @@ def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> li
         )
     phase = model.phase_step
     if phase > PHASE_STEP:
+        window = model.step * PHASE_STEP / phase
+        samples = model.samples
+        apart = model.step * samples.time.size / samples.window.size
+        advice = f"use --window {window:.2g}"
+        if window < apart:  # a window needs a sample
+            advice = f"use a log with a sample every {window:.2g} s or a slower motion"
         notes.append(
             f"the phase of the kinematic error changes by up to {phase:.2g} rad in a"
             f" window of {model.step:.3g} s, and the intervals do not include the"
-            f" resulting error; use --window {model.step * PHASE_STEP / phase:.2g} for"
-            f" at most {PHASE_STEP:g} rad"
+            f" resulting error; {advice} for at most {PHASE_STEP:g} rad"
         )
     rated = drive.ratings.rated_torque
     low, high = TORSION_AT_RATED

@@ -315,6 +315,10 @@ def test_windows_too_long_for_the_kinematic_error_are_doubted(bench):
     fastest = np.abs(np.gradient(rows[:, 1], rows[:, 0])).max()
     assert found.model.phase_step == pytest.approx(12.0 * WINDOW * fastest, rel=0.1)
     assert "in a window of 0.015 s" in note and "--window 0.00" in note
+    # with samples 0.015 s apart, no window is shorter
+    found = identify(log_of(rows[::15]), **{**options, "window": 3.0 * WINDOW})
+    (note,) = (line for line in found.notes if "phase" in line)
+    assert "sample every 0.00" in note and "--window" not in note
 
 
 def test_the_map_moves_as_the_drive(bench):
