@@ -23,6 +23,21 @@ from swgjoint.sim.controller import Measured, Task
 from swgjoint.typing import Array
 
 
+def _seeds_of(seed: Any, count: int) -> list[Any]:
+    """Seed of each episode; None continues a random generator."""
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + k for k in range(count)]
+    if seed is None:
+        return [None] * count
+    if not isinstance(seed, list | tuple | np.ndarray):
+        raise InputError(
+            f"seed {format_value(seed)}; accepted: an integer, or one per episode"
+        )
+    if len(seed) != count:
+        raise InputError(f"{len(seed)} seeds; accepted: {count}, one per episode")
+    return [int(one) if isinstance(one, np.integer) else one for one in seed]
+
+
 def _check_began(began: bool) -> None:
     """Reject a call that needs an episode before the first reset."""
     if not began:
@@ -243,11 +258,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         options, n = dict(options or {}), self.num_envs
         _check_options(options, ("reset_mask",))
         chosen = self._chosen(options.get("reset_mask"))
-        if isinstance(seed, int):
-            seed = [seed + k for k in range(n)]
-        seeds: list[int | None] = [None] * n if seed is None else list(seed)
-        if len(seeds) != n:
-            raise InputError(f"{len(seeds)} seeds; accepted: {n}, one per episode")
+        seeds = _seeds_of(seed, n)
         old = self._rngs
         self._rngs = [
             old[k] if old and (one is None or not mine) else seeding.np_random(one)[0]

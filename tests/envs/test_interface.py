@@ -296,6 +296,17 @@ def test_seeds_of_a_batch(name):
     assert np.abs(others - first).max() > 0.0
 
 
+def test_seeds_of_numpy_are_integers():
+    """One of them or an array is accepted like Python's; anything else is named."""
+    env = gymnasium.make_vec("swgjoint.envs:swgjoint/JointTracking-v0", num_envs=2)
+    wanted, _ = env.reset(seed=5)
+    for seed in (np.int64(5), np.array([5, 6]), [np.uint32(5), 6]):
+        np.testing.assert_array_equal(env.reset(seed=seed)[0], wanted)
+    for seed in (5.0, "ab"):
+        with pytest.raises(InputError, match="an integer"):
+            env.reset(seed=seed)
+
+
 @NAMES
 def test_normalised_observations_lose_no_bit(name):
     """They lie between -1 and 1, are SI values over their units, and pay the same."""
