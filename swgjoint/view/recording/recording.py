@@ -140,7 +140,10 @@ def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, s
 
     stream = rr.RecordingStream(stream_name(scenes))
     joints = joints_shown(scenes)
-    stream.save(path, default_blueprint=blueprint_of(scenes, joints))
+    # with a blueprint, save waits forever for a writer that a full disk has ended
+    stream.save(path)
+    blueprint = blueprint_of(scenes, joints)
+    rr.send_blueprint(blueprint, make_active=False, recording=stream)
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)
     return stream, drives
