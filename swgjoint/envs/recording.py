@@ -20,7 +20,11 @@ from swgjoint.errors import InputError
 from swgjoint.typing import Array
 from swgjoint.view.recording.columns import Column
 from swgjoint.view.recording.geometry import quaternion_xyzw, shape_of
-from swgjoint.view.recording.recording import end_stream, recording_file
+from swgjoint.view.recording.recording import (
+    begin_stream,
+    end_stream,
+    recording_file,
+)
 
 SHOWN = (
     "reward",
@@ -145,9 +149,7 @@ def write_episode(
     )
     with recording_file(path) as beside:
         stream = rr.RecordingStream("swgjoint episode")
-        stream.save(
-            beside, default_blueprint=rrb.Blueprint(layout, collapse_panels=True)
-        )
+        begin_stream(stream, beside, rrb.Blueprint(layout, collapse_panels=True))
         _log_arm(stream, model, time, positions)
         at = rr.TimeColumn("time", duration=time)
         for key, values in figures.items():

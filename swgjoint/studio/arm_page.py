@@ -63,7 +63,7 @@ class ArmPage:
                     {"": "level of the scene", **{one: one for one in get_args(Level)}},
                     label="level of the joints",
                     value=session.level,
-                    on_change=lambda e: setattr(session, "level", e.value),
+                    on_change=lambda e: session.choose_level(e.value),
                 ).props("dense outlined").classes("w-full")
                 ui.label("drives").classes("text-weight-medium")
                 self._joints = ui.column().classes("w-full gap-1")
@@ -118,7 +118,8 @@ class ArmPage:
             self._drives = session.drives
             self._build_joints()
         show_progress(self._bar, session.jobs, ("arm", "joints"))
-        self._fault.text = session.arm_fault
+        old = "run before the last change of drives, level or design"
+        self._fault.text = session.arm_fault or old * session.run_is_old
         self._card.visible = self._play.visible = session.metrics is not None
         if session.metrics is not self._metrics:
             self._metrics = session.metrics
@@ -126,6 +127,8 @@ class ArmPage:
             if self._metrics is not None:
                 self._show(self._metrics)
         self._files.show(session.arm_files, session.version)
+        self._files.dim(session.run_is_old)
+        self._card.style(f"opacity: {0.35 if session.run_is_old else 1.0}")
 
     def _build_joints(self) -> None:
         self._joints.clear()
@@ -146,7 +149,7 @@ class ArmPage:
 
     def _chosen(self, joint: str, event: Any) -> None:
         if event.value:
-            self._session.chosen[joint] = event.value
+            self._session.choose_drive(joint, event.value)
 
     def _show_viewer(self) -> None:
         """Show the recording of the last run in the rerun viewer."""

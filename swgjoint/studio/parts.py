@@ -96,3 +96,7 @@ class Downloads:
                     )
             address = f"/files/{self._tab}/{files[0]}?v={version}"
             show_frame(address)
+
+    def dim(self, out_of_date: bool) -> None:
+        """Draw files that belong to an earlier state in grey."""
+        self._box.style(f"opacity: {0.35 if out_of_date else 1.0}")

@@ -65,6 +65,8 @@ class Session:
     """Files of the last requested computation, the page first."""
     fault: str = ""
     """Reason why the requested computation has failed; empty if it has not."""
+    requested: Draft | None = None
+    """Draft for which it was requested; None before the first one."""
     source: str = "bench"
     """Scene or arm."""
     drives: dict[str, str] = field(default_factory=dict)
@@ -79,6 +81,8 @@ class Session:
     """Files of the last run of the arm, the report first."""
     arm_fault: str = ""
     """Reason why the run has failed; empty if it has not."""
+    ran: tuple[Any, ...] = ()
+    """Scene, level, drives and design of the last run, see :attr:`to_run`."""
     page: str = "Drive"
     """Page that is shown, ``Drive`` or ``Arm``."""
     jobs: dict[str, Job] = field(default_factory=dict)
@@ -152,6 +156,7 @@ class Session:
         kind, model = self.request.split()
         function = {"sheet": work.make_sheet, "meshing": work.make_meshing}[kind]
         self.files, self.fault = [], ""
+        self.requested = self.current.draft
         self.start(
             "request",
             self._requested,
@@ -160,6 +165,33 @@ class Session:
             model,
             self.folder,
         )
+
+    @property
+    def files_are_old(self) -> bool:
+        """Whether the design was changed after its results were requested."""
+        return bool(self.files) and self.requested != self.current.draft
+
+    @property
+    def to_run(self) -> tuple[Any, ...]:
+        """Scene, level, drives by joint, and the design if it is one of them."""
+        drives = {**self.drives, **self.chosen}
+        design = self.current.draft if THIS_DESIGN in drives.values() else None
+        return self.source, self.level, drives, design
+
+    @property
+    def run_is_old(self) -> bool:
+        """Whether the last run of the arm was made with other settings."""
+        return self.metrics is not None and self.ran != self.to_run
+
+    def choose_drive(self, joint: str, drive: str) -> None:
+        """Choose the drive of a joint for the next run."""
+        self.chosen[joint] = drive
+        self.version += 1
+
+    def choose_level(self, level: str) -> None:
+        """Choose the level of all joints for the next run; empty for the scene's."""
+        self.level = level
+        self.version += 1
 
     def choose(self, source: str) -> None:
         """Choose a scene or an arm and read its joints; a running arm is stopped."""
@@ -187,6 +219,7 @@ class Session:
         if self.level:
             changes |= {f"joints.{joint}.level": self.level for joint in self.drives}
         self.metrics, self.arm_files, self.arm_fault = None, [], ""
+        self.ran = self.to_run
         self.start(
             "arm",
             self._ran,

@@ -9,7 +9,7 @@ import pytest
 from job_functions import add, die, err, fail, hold
 
 from swgjoint.studio.jobs import Job
-from swgjoint.studio.session import Session
+from swgjoint.studio.session import THIS_DESIGN, Session
 
 
 def end(job, limit=60.0):
@@ -115,3 +115,32 @@ def test_a_run_waits_for_the_joints(sessions):
     one.drives = {"joint": "linear"}
     one.run()
     assert "arm" in one.jobs and not one.arm_fault
+
+
+def test_results_of_an_earlier_design_are_marked(sessions):
+    """A data sheet is old once a key changes, and no longer after the key returns."""
+    session = sessions[0]
+    key, before = "drive.face_width_mm", session.current.draft["drive"]["face_width_mm"]
+    session.files, session.requested = ["sheet.html"], session.current.draft
+    assert not session.files_are_old
+    session.edit(key, before + 1.0)
+    assert session.files_are_old
+    session.edit(key, before)
+    assert not session.files_are_old
+
+
+def test_a_run_with_other_drives_is_marked(sessions):
+    """A run is old once a drive or level changes, or a design that it contains."""
+    session = sessions[0]
+    session.drives = {"joint1": "CSG-25-100"}
+    session.metrics, session.ran = {}, session.to_run
+    session.edit("drive.face_width_mm", 11.0)
+    assert not session.run_is_old
+    session.choose_drive("joint1", THIS_DESIGN)
+    assert session.run_is_old
+    session.ran = session.to_run
+    session.edit("drive.face_width_mm", 12.0)
+    assert session.run_is_old
+    session.ran = session.to_run
+    session.choose_level("rigid")
+    assert session.run_is_old

@@ -110,6 +110,15 @@ def recording_file(path: Path) -> Iterator[Path]:
         yield beside
 
 
+def begin_stream(stream: Any, path: Path, blueprint: Any) -> None:
+    """Write a stream to a file, with its default blueprint."""
+    import rerun as rr
+
+    # with a blueprint, save waits forever for a writer that a full disk has ended
+    stream.save(path)
+    rr.send_blueprint(blueprint, make_active=False, recording=stream)
+
+
 def end_stream(stream: Any, path: str | Path) -> None:
     """Wait until a recording is written completely, and close it.
 
@@ -140,10 +149,7 @@ def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, s
 
     stream = rr.RecordingStream(stream_name(scenes))
     joints = joints_shown(scenes)
-    # with a blueprint, save waits forever for a writer that a full disk has ended
-    stream.save(path)
-    blueprint = blueprint_of(scenes, joints)
-    rr.send_blueprint(blueprint, make_active=False, recording=stream)
+    begin_stream(stream, path, blueprint_of(scenes, joints))
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)
     return stream, drives
