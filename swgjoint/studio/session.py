@@ -184,7 +184,12 @@ class Session:
         return self.metrics is not None and self.ran != self.to_run
 
     def choose_drive(self, joint: str, drive: str) -> None:
-        """Choose the drive of a joint for the next run."""
+        """Choose the drive of a joint for the next run.
+
+        Args:
+            joint: Name of the joint.
+            drive: Reference of the drive.
+        """
         self.chosen[joint] = drive
         self.version += 1
 

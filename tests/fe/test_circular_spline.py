@@ -38,7 +38,7 @@ def test_unloaded_flanks_share_the_shapes_of_two_faces(monkeypatch):
     """
     compliance = ring().compliance
     size = compliance.element.face_size
-    shared = SharedShapes.of(compliance.offsets, compliance.flank)
+    shared = SharedShapes.from_blocks(compliance.offsets, compliance.flank)
     assert shared.shapes.shape[1] == 2 * 2 * (size - 1)
     rng = np.random.default_rng(3)
     force = rng.normal(size=(122, ring().flank_dofs))
@@ -52,7 +52,7 @@ def test_unloaded_flanks_share_the_shapes_of_two_faces(monkeypatch):
 def test_a_tooth_that_moves_no_other_shares_no_shape():
     """With a rim so stiff that only the loaded tooth moves, its own block is left."""
     own = np.random.default_rng(5).normal(size=(1, 4, 4))
-    shared = SharedShapes.of(np.zeros(1, dtype=np.int64), own)
+    shared = SharedShapes.from_blocks(np.zeros(1, dtype=np.int64), own)
     force = np.arange(12.0).reshape(3, 4)
     assert np.array_equal(shared.respond(force), force @ own[0].T)
 

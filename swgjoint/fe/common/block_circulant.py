@@ -39,8 +39,15 @@ class SharedShapes:
     """Their blocks in these shapes (n_far, n_s, n_s) [m/N]."""
 
     @classmethod
-    def of(cls, offsets: Index, blocks: Array) -> SharedShapes:
-        """Split blocks (n_offsets, n_b, n_b) [m/N], the opposite offset of each too."""
+    def from_blocks(cls, offsets: Index, blocks: Array) -> SharedShapes:
+        """Find the shapes that the blocks of a ring share.
+
+        Args:
+            offsets: Offsets as in :func:`respond`, each with the opposite one
+                (n_offsets,).
+            blocks: Displacements of one flank per force on another (n_offsets, n_b,
+                n_b) [m/N].
+        """
         away = offsets != 0
         beside = np.moveaxis(blocks[away], 0, 1).reshape(blocks.shape[1], -1)
         shapes, size, _ = np.linalg.svd(beside, full_matrices=False)
@@ -49,7 +56,14 @@ class SharedShapes:
         return cls(blocks[~away].sum(axis=0), shapes, offsets[away], far)
 
     def respond(self, force: Array) -> Array:
-        """Displacements (N, n_b) [m] under flank forces (N, n_b) [N]."""
+        """Displacements of all teeth, as :func:`respond` of all blocks.
+
+        Args:
+            force: Flank forces (N, n_b) [N].
+
+        Returns:
+            Displacements (N, n_b) [m].
+        """
         beside = respond(self.offsets, self.far, force @ self.shapes)
         return np.asarray(force @ self.own.T + beside @ self.shapes.T)
 

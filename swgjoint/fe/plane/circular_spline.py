@@ -57,7 +57,7 @@ class Compliance:
 
     @cached_property
     def _by_shapes(self) -> SharedShapes:
-        return SharedShapes.of(self.offsets, self.flank)
+        return SharedShapes.from_blocks(self.offsets, self.flank)
 
     def skeleton_displacement(self, force: Array) -> Array:
         """Skeleton displacement (N, 2 n_a) [m] under flank forces (N, 2 n_b) [N]."""

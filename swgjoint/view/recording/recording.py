@@ -111,7 +111,13 @@ def recording_file(path: Path) -> Iterator[Path]:
 
 
 def begin_stream(stream: Any, path: Path, blueprint: Any) -> None:
-    """Write a stream to a file, with its default blueprint."""
+    """Write a stream to a file, with its default blueprint.
+
+    Args:
+        stream: The stream of the recording.
+        path: File to write.
+        blueprint: Layout of the viewer.
+    """
     import rerun as rr
 
     # with a blueprint, save waits forever for a writer that a full disk has ended
