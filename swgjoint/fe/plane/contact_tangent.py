@@ -90,7 +90,8 @@ def add_contact_tangents(
     slope = np.einsum("ki,ki->k", tangent, along)
     height = np.einsum("ki,ki->k", normal, point)
     lever = -np.einsum("ki,ki->k", tangent, point)
-    curved = seen.feet.curvature / (1.0 + seen.feet.curvature * seen.feet.gap)
+    with np.errstate(invalid="ignore"):  # a search that diverges has infinite gaps
+        curved = seen.feet.curvature / (1.0 + seen.feet.curvature * seen.feet.gap)
     # weights of a a^T, of a theta^T and its transpose, and of theta theta^T
     relative = own + curved * slope**2
     held = (relative < CONFORMING) | seen.feet.corner
