@@ -30,6 +30,7 @@ def test_lot_writes_rows_and_picture(tmp_path, capsys):
     assert "without micro_geometry" not in text
     found["validity"]["left_out"] = "micro_geometry"
     assert "level 2d, errors superposed, without micro_geometry" in report(found)
+    assert "0.95 times that of all angles in trials" in text
     assert found["yield"]["part"] == 1.0
     assert sorted(path.name for path in out.iterdir()) == [
         "lot.csv",

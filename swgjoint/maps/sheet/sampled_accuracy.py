@@ -21,9 +21,11 @@ REST = 2.0
 """Assumed contribution of the rest to each peak, in multiples of its rms [-].
 
 In trials the rest had 30 orders and was as strong as in thin-ring computations. The
-middle of the bracket was 0.95 times the peak to peak of a dense evaluation, with a
-standard deviation of 0.07; the peak to peak of the samples was 0.77 times it.
+peak to peak of the samples was 0.77 times that of a dense evaluation.
 """
+MIDDLE, SPREAD = 0.95, 0.07
+"""Mean and standard deviation of the middle of the bracket in these trials, divided by
+the peak to peak of a dense evaluation [-]."""
 
 
 def fit_orders(theta: Array, error: Array, design: Design) -> dict[float, float]:
