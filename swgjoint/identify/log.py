@@ -113,7 +113,7 @@ class BenchLog:
                 there are too few windows.
         """
         _, place, counts = np.unique(
-            self._windows(window), return_inverse=True, return_counts=True
+            self.number_windows(window), return_inverse=True, return_counts=True
         )
 
         def mean(values: Array | None) -> Array | None:
@@ -148,7 +148,7 @@ class BenchLog:
         Raises:
             InputError: As :meth:`average`.
         """
-        self._windows(window)
+        self.number_windows(window)
         number = np.arange(len(self.time))
         step, first = np.polyfit(number, self.time - self.time[0], 1)
         even = self.time[0] + first + step * number
@@ -166,8 +166,11 @@ class BenchLog:
         filled = {key: CubicSpline(even, x)(time) for key, x in known.items()}
         return replace(self, time=time, **filled)
 
-    def _windows(self, window: float) -> NDArray[np.intp]:
+    def number_windows(self, window: float) -> NDArray[np.intp]:
         """Number of the window of every sample. Shape (n,).
+
+        Args:
+            window: Duration of a window [s].
 
         Raises:
             InputError: As :meth:`average`.

@@ -119,7 +119,7 @@ class ArmPage:
             self._build_joints()
         show_progress(self._bar, session.jobs, ("arm", "joints"))
         old = "run before the last change of drives, level or design"
-        self._fault.text = session.arm_fault or old * session.run_is_old
+        self._fault.text = session.arm_fault or (old if session.run_is_old else "")
         self._card.visible = self._play.visible = session.metrics is not None
         if session.metrics is not self._metrics:
             self._metrics = session.metrics

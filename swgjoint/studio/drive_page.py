@@ -167,8 +167,10 @@ class DrivePage:
         self._checks.rows = [{"check": a, "value": b} for a, b in rows]
         show_progress(self._bar, session.jobs, ("show", "look", "draw"))
         show_progress(self._request_bar, session.jobs, ("request",))
-        old = "computed before the last change of the design" * session.files_are_old
-        self._request_fault.text = session.fault or old
+        old = "computed before the last change of the design"
+        self._request_fault.text = session.fault or (
+            old if session.files_are_old else ""
+        )
         self._files.show(session.files, session.version)
         self._files.dim(session.files_are_old)
 
