@@ -9,7 +9,9 @@ from solved import few_teeth
 from strips import open_gaps
 
 from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe.common.sampling import follower_in_plane
 from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.fe.plane.newton_step import Load
 from swgjoint.gear.design.design import Design
 
 
@@ -97,3 +99,28 @@ def test_a_load_out_of_reach_ends_with_advice(torque, shown, times):
         simulate_meshing(design, torque=torque, steps=1, half=True)
     advice = {outcome.value for outcome in Outcome if not outcome.ok}
     assert any(each in str(found.value) for each in advice)
+
+
+@pytest.mark.fe
+def test_a_rim_that_would_snap_off_its_outline_rests_on_it():
+    """Where the usual start diverges, too: the energy converges with the mesh."""
+    changes = {**teeth(80, 1.6), "wave_generator.kind": "simplified"}
+    changes["wave_generator.minor_axis_coefficient"] = 0.97
+    energy = []
+    for refinement in (0.5, 1.0, 2.0):
+        design = Design.load("reference-2d").with_changes(
+            {**changes, "mesh.refinement": refinement}
+        )
+        follow = follower_in_plane(design)
+        usual = follow.solver(
+            follow.model,
+            follow.model.initial_guess(),
+            Load(rotation=0.0, teeth=False),
+        )
+        assert usual.outcome.ok == (refinement == 2.0)
+        state = follow.deflect()
+        assert state.outcome.ok
+        assert (state.pressure >= 0.0).all()
+        energy.append(state.energy)
+    assert energy[0] - energy[1] > 1.5 * (energy[1] - energy[2]) > 0.0
+    assert energy[0] < 1.05 * energy[2]
