@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from swgjoint.drives.fidelity import default_model
 from swgjoint.errors import InputError
+from swgjoint.flags import check_flags
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design, check_design
 from swgjoint.gear.design.tolerances import has_errors, without_errors
@@ -54,6 +55,7 @@ def build_map(
         ComputationError: If the solver converges at none of the torques.
     """
     check_design(design)
+    check_flags(cache=cache)
     if angles is not None and not angles >= 1:
         raise InputError(f"angles {angles}; accepted: >= 1, or None")
     model = model or default_model(design)

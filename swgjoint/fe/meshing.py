@@ -21,6 +21,7 @@ from swgjoint.fe.plane.drive2d import (
 from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima
+from swgjoint.flags import check_flags
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design, check_design
 from swgjoint.gear.mounting import series_compliance
@@ -87,6 +88,14 @@ def simulate_meshing(
             position can be solved without them.
     """
     _check_arguments(design, torque, steps, turn)
+    check_flags(
+        nonlinear=nonlinear,
+        elastic_circular_spline=elastic_circular_spline,
+        throw=throw,
+        resume=resume,
+    )
+    if half not in (True, False, "auto"):
+        raise InputError(f"half = {half!r}; accepted: True, False, 'auto'")
     if steps is None:
         steps = default_steps(design, turn)
     if half == "auto":

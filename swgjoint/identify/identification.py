@@ -48,6 +48,7 @@ from pathlib import Path
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.flags import check_flags
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.gear.ratings import Ratings
@@ -193,6 +194,7 @@ def identify(
         InputError: If an option is invalid or the log does not determine a parameter.
         ComputationError: If the least-squares fit diverges.
     """
+    check_flags(hysteresis=hysteresis)
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
     if not 0 < teeth_flexspline < teeth_circular_spline:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 import mujoco
 import numpy as np
 
+from swgjoint.flags import check_flags
 from swgjoint.joint import plugin
 from swgjoint.joint.callers import depth_of_caller
 from swgjoint.joint.drive import JointDrive
@@ -169,6 +170,7 @@ def attach_all(
             its metric.
     """
     check_spec(spec)
+    check_flags(watch=watch)
     for name, fitting in fittings.items():
         fitting.check(name)
     if not fittings:

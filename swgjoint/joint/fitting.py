@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.flags import check_flags
 from swgjoint.joint.drive import (
     CONTACT_DAMPING_RATIO,
     LEAST_DAMPING_RATIO,
@@ -75,6 +76,7 @@ class Fitting:
             raise InputError(
                 f"rotor {self.rotor!r} unknown; accepted: {', '.join(ROTORS)}"
             )
+        check_flags(friction=self.friction, variable=self.variable)
         ratio = self.damping_ratio
         if ratio is not None and not (np.isfinite(ratio) and 0.0 <= ratio < 1.0):
             raise InputError(f"damping_ratio {ratio} of {joint!r}; accepted: >= 0, < 1")

@@ -27,6 +27,7 @@ from scipy.linalg import eigh
 
 from swgjoint.drives.references import check_joint_names
 from swgjoint.errors import ComputationError, InputError
+from swgjoint.flags import check_flags
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs
@@ -138,6 +139,7 @@ def linearise(
         ComputationError: If the motors cannot hold the posture, because bodies touch or
             because of their torque limits.
     """
+    check_flags(friction=friction)
     if not isinstance(scene, Scene):
         scene = Scene.load_file(scene, overrides)
     elif overrides:

@@ -14,6 +14,7 @@ from swgjoint import __version__
 from swgjoint.drives.attach import DriveSource, attach
 from swgjoint.errors import InputError
 from swgjoint.files import check_output_file, write_whole
+from swgjoint.flags import check_flags
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native_error import NativeError, native_error, notes_of
 from swgjoint.joint.patterns import with_whole_names
@@ -88,6 +89,7 @@ def export_mjcf(
         InputError: If the arm, a joint, a drive or a value cannot be used, or a file
             cannot be read or written. Nothing is written then.
     """
+    check_flags(motors=motors)
     path = check_output_file(path, ".xml")
     source = find(arm, "arms", ".xml", what="arm")
     if path.exists() and path.samefile(source):

@@ -42,6 +42,7 @@ from swgjoint.explore.tune.search import (
     write_journal,
 )
 from swgjoint.explore.tune.tunable import GainParameter, Tunable
+from swgjoint.flags import check_flags
 from swgjoint.json_text import json_text, plain
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
@@ -80,6 +81,7 @@ def tune(
         MissingExtraError: If gymnasium or the optimiser is not installed.
     """
     began = time.perf_counter()
+    check_flags(resume=resume)
     environment = environment_named(settings.environment)
     named = controller_named(settings.controller)
     arguments = arguments_for(

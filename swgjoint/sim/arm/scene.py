@@ -11,6 +11,7 @@ from typing import Any
 
 from swgjoint.drives.rotors import rotor_inertia_of
 from swgjoint.errors import InputError
+from swgjoint.flags import check_flags
 from swgjoint.models_path import bundled_names, is_file
 from swgjoint.sim.arm.drive_choice import DriveChoice, choose_drives
 from swgjoint.sim.arm.gentle_sweep import (
@@ -140,6 +141,7 @@ def arm_scene(
     Raises:
         InputError: If the arm cannot be used.
     """
+    check_flags(balance_inertia=balance_inertia)
     changes = _as_mapping(overrides)
     drives = {ALL: drive} if isinstance(drive, str) else drive or {}
     common = changes.get("defaults.drive", drives.get(ALL))

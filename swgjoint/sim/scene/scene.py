@@ -12,6 +12,7 @@ from swgjoint.drives.references import may_be_built
 from swgjoint.drives.sections import DRIVE_KEYS, JointSection, Level
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, validate
+from swgjoint.flags import check_flags
 from swgjoint.models_path import find
 from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.scene.anchoring import anchor_paths
@@ -323,6 +324,7 @@ class Scene(Section):
 
     def with_friction(self, friction: bool) -> Self:
         """A copy in which all joints have the friction of their drives, or none has."""
+        check_flags(friction=friction)
         return self._with_all(friction=friction)
 
     def with_kinematic_error(self, arcmin: float | None) -> Self:
