@@ -100,6 +100,37 @@ def test_whole_numbers_are_numbers(reference):
     assert Design.from_toml(text).content_hash() == reference.content_hash()
 
 
+@pytest.mark.parametrize(
+    ("key", "zero"),
+    [
+        ("tolerances.random_pitch_um", 0.0),
+        ("micro_geometry.wave_generator_slope_um", 0.0),
+        ("friction.tooth_coefficient", 0.0),
+    ],
+)
+def test_the_sign_of_zero_is_no_content(reference, key, zero):
+    """A design with -0.0 has the hash, and so the cached results, of one with 0.0."""
+    negative = reference.with_changes({key: -zero})
+    assert negative.content_hash() == reference.with_changes({key: zero}).content_hash()
+
+
+def test_the_sign_of_zero_in_a_list_is_no_content(reference):
+    """The same for the angles of a tabulated wave generator, of which one may be 0."""
+    tables = [
+        {
+            "kind": "table",
+            "angle_deg": [zero, *range(45, 360, 45)],
+            "radius_mm": [59.2, 58.2, 57.2, 58.2] * 2,
+        }
+        for zero in (0.0, -0.0)
+    ]
+    plain, negative = (
+        reference.with_changes({"wave_generator": table}).content_hash()
+        for table in tables
+    )
+    assert plain == negative
+
+
 def test_hash_tells_content_apart(reference):
     """The hash ignores name and source and sees every other key."""
     assert (

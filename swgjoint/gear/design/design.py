@@ -253,9 +253,10 @@ class Design(Section):
 
         Three keys are omitted if they have the values that applied before the keys were
         introduced, so that older cached results remain valid: an absent coupling, an
-        absent table of losses and the stress state ``plane_stress``.
+        absent table of losses and the stress state ``plane_stress``. A negative zero
+        counts as zero.
         """
-        data = self.model_dump(exclude={"drive": {"name", "source"}})
+        data = _plain_zeros(self.model_dump(exclude={"drive": {"name", "source"}}))
         if self.coupling is None:
             del data["coupling"]
         if self.losses is None:
@@ -331,6 +332,15 @@ class Design(Section):
         )
         assert math.isfinite(material.youngs_modulus)
         return material
+
+
+def _plain_zeros(value: Any) -> Any:
+    """The value with 0.0 for every -0.0, also in tables and lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain_zeros(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain_zeros(one) for one in value]
+    return value + 0.0 if isinstance(value, float) else value
 
 
 def check_design(design: object) -> None:
