@@ -107,13 +107,25 @@ def _write(folder: Path, result: dict[str, Any], accepted: Acceptance) -> None:
         lambda path: write_tables(
             path,
             title=f"Acceptance of {result['drive']}",
-            description="passed" if result["passed"] else "not passed",
+            description=_verdict(result),
             tables=[acceptance_table(accepted)],
             pictures=pictures,
             settings={name: scene_toml(one) for name, one in accepted.scenes.items()},
         ),
     )
     outputs.write_json("accept.json", result)
+
+
+def _verdict(result: dict[str, Any]) -> str:
+    """The verdict, and how many limits it leaves open because a value is missing."""
+    rows = result["rows"]
+    open_limits = sum(
+        row["limit"] is not None and row["passed"] is None for row in rows
+    )
+    text = "passed" if result["passed"] else "not passed"
+    if open_limits:
+        text += f"; limits not judged because their figure has no value: {open_limits}"
+    return text
 
 
 def status(result: dict[str, Any]) -> int:
@@ -149,5 +161,5 @@ def report(result: dict[str, Any]) -> str:
             f"MISSED: {row['test']}: {row['figure']}{at} {shown}; limit"
             f" {row['limit']:g}"
         )
-    lines.append("passed" if result["passed"] else "not passed")
+    lines.append(_verdict(result))
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

@@ -283,10 +283,26 @@ def test_measured_logs_are_judged_instead(good, tmp_path, capsys):
     assert np.array_equal(back.link_angle, log.link_angle)
 
 
-def measured_loop(sign: float) -> BenchLog:
-    """A torque loop of 3e4 N·m/rad with a locked input; sign 1 is that of a bench."""
-    torque = 120.0 * np.sin(2 * pi * np.arange(4001) / 2000)
-    return log_of(0.0 * torque, -sign * torque / 3e4, output=torque)
+def test_limits_that_nothing_judges_are_counted(tmp_path, capsys):
+    """A drive without friction passes a limit of friction, which the verdict says."""
+    path = tmp_path / "plain.swg"
+    DriveMap.from_numbers(**SLOPES).save(path)
+    argv = ["accept", str(path), "--quiet", "--only"]
+    for test, open_limits in (("starting", ": 1"), ("resonance", "")):
+        assert main([*argv, test]) == 0
+        last = capsys.readouterr().out.splitlines()[-1]
+        reason = "; limits not judged because their figure has no value"
+        assert last == "passed" + (open_limits and reason + open_limits)
+
+
+def measured_loop(sign: float, lag: float = 0.0) -> BenchLog:
+    """A torque loop of 3e4 N·m/rad with a locked input; sign 1 is that of a bench.
+
+    The torsion lags behind the torque by an angle of the sine [rad].
+    """
+    phase = 2 * pi * np.arange(4001) / 2000
+    torsion = sign * 120.0 * np.sin(phase - lag) / 3e4
+    return log_of(0.0 * phase, -torsion, output=120.0 * np.sin(phase))
 
 
 def measured_efficiency(percent: float) -> BenchLog:
@@ -301,6 +317,12 @@ def measured_efficiency(percent: float) -> BenchLog:
     ("test", "right", "wrong", "message"),
     [
         ("stiffness", measured_loop(1.0), measured_loop(-1.0), ("K1_Nm_rad", "-3e+04")),
+        (
+            "stiffness",
+            measured_loop(1.0, lag=0.05),
+            measured_loop(1.0, lag=-0.05),
+            ("hysteresis_loss_arcmin", "-1.", "lags"),
+        ),
         (
             "efficiency",
             measured_efficiency(-80.0),

@@ -42,6 +42,8 @@ RATIO = 100.0
 ACCURACY = "transmission_accuracy_arcmin"
 EFFICIENCY = ("efficiency_percent", 100.0)
 """Figure that has a largest possible value, and this value [%]."""
+BACKWARDS = 0.1
+"""Part of the lost motion by which noise may make a hysteresis loss negative [-]."""
 WITH_FRICTION = ("no_load", "starting", "efficiency", "back_driving")
 """Tests of the friction of a drive."""
 
@@ -304,7 +306,8 @@ def _evaluate_measured(
 
     Raises:
         InputError: If they are not, or if the log cannot be evaluated. A negative lost
-            motion would meet any limit, and so would an efficiency above 100 %.
+            motion or hysteresis loss would meet any limit, and so would an efficiency
+            above 100 %.
     """
     check_angles(log)
     check_ratio(
@@ -322,6 +325,14 @@ def _evaluate_measured(
                     + ", from torques and angles with the signs, units and zeros of"
                     " the bench"
                 )
+    loss = found.get("hysteresis_loss_arcmin", {}).get("") or 0.0
+    lost_motion = found.get("lost_motion_arcmin", {}).get("") or 0.0
+    if loss < -BACKWARDS * abs(lost_motion):
+        raise InputError(
+            f"{log.where}: hysteresis_loss_arcmin = {loss:.4g}; accepted: a loop in"
+            " which the torsion lags behind the torque, from torques and angles at the"
+            " same instants"
+        )
     return found
 
 
