@@ -334,6 +334,21 @@ def test_all_faults_are_listed_at_once():
             ("plan.parameters[0].count", "integer", ">= 2"),
         ),
         (
+            GRID + parameter('"tolerances.seed"', "low = 1.4\nhigh = 3\ncount = 2"),
+            HEAD,
+            ("plan.parameters[0].low", "1.4", "integer"),
+        ),
+        (
+            GRID + parameter('"tolerances.seed"', "low = 1\nhigh = 3.6\ncount = 2"),
+            HEAD,
+            ("plan.parameters[0].high", "3.6", "integer"),
+        ),
+        (
+            GRID + parameter(RIM, "low = -1e308\nhigh = 1e308\ncount = 2"),
+            HEAD,
+            ("plan.parameters[0].high", "1e+308 mm", "finite length"),
+        ),
+        (
             LIST + parameter(RIM, "values=[1]") + parameter(MODULE, "values=[1, 2]"),
             HEAD,
             ("plan.parameters", "1, 2 values"),

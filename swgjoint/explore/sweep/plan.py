@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, WrapValidator, model_validator
@@ -77,6 +78,10 @@ class Parameter(Section):
                     "high",
                     f"{self.high:g}{unit}; accepted: above {self.low:g}{unit}",
                 )
+            )
+        if not isfinite(float(self.high) - float(self.low)):
+            raise Fault(
+                ("high", f"{self.high:g}{unit}; accepted: a range of finite length")
             )
         return self
 
@@ -190,6 +195,13 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
             and parameter.count is not None
         ):
             faults.append((f"{where}.count", "unused; see plan.designs"))
+        if ranged and takes_whole_numbers(parameter, kinds):
+            # rounded, they would admit values outside the range
+            faults += [
+                (f"{where}.{end}", f"{value:g}; accepted: an integer")
+                for end in ("low", "high")
+                if (value := getattr(parameter, end)) != round(value)
+            ]
         if ranged and BASE in parameter.keys:
             faults.append((f"{where}.values", "missing; accepted: names of designs"))
     lengths = [len(p.values) for p in plan.parameters if p.values is not None]
