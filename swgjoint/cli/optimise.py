@@ -37,8 +37,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``front`` (Pareto-optimal designs, sorted by the first objective: values of the
-        parameters, figures, ``confirmed`` figures or null, and ``not_worse_than``, the
-        names of compared designs that are not better in any objective),
+        parameters, figures, ``missed`` (figures whose limit they miss), ``confirmed``
+        figures or null, and ``not_worse_than``, the names of compared designs that are
+        not better in any objective),
         ``evaluations``, ``failed``, ``generations``, ``reused``, ``computed``,
         ``workers``, ``work_s``, ``wall_s``, ``objectives``, ``parameters``,
         ``figures``, ``validity``, ``start``, ``beside`` (compared designs), ``rows``
@@ -117,7 +118,8 @@ def report(result: dict[str, Any]) -> str:
         if (record := row["confirmed"] or row)["outcome"] != "ok"
     ]
     lines += [
-        f"{name}: its confirmed values miss the limit of {', '.join(row['missed'])}"
+        f"{name}: its {'confirmed ' * _is_confirmed(row)}values miss the limit of"
+        f" {', '.join(row['missed'])}"
         for name, row in named
         if row["missed"]
     ]
@@ -146,7 +148,10 @@ def report(result: dict[str, Any]) -> str:
 
 def _best(row: dict[str, Any], figures: list[str]) -> list[str]:
     """Figures of a design as text, with a star if they are confirmed."""
-    confirmed = row["confirmed"]
-    ok = confirmed is not None and confirmed["outcome"] == "ok"
-    best, mark = (confirmed, "*") if ok else (row, "")
+    best, mark = (row["confirmed"], "*") if _is_confirmed(row) else (row, "")
     return ["" if (v := best[name]) is None else f"{v:.5g}{mark}" for name in figures]
+
+
+def _is_confirmed(row: dict[str, Any]) -> bool:
+    """Whether the figures of a design come from the confirmation."""
+    return row["confirmed"] is not None and row["confirmed"]["outcome"] == "ok"

@@ -136,3 +136,13 @@ def test_figures_that_nobody_can_tell_stay_empty():
     assert _best(row, ["a", "b"]) == ["", "3*"]
     assert _best({**row, "confirmed": None}, ["a", "b"]) == ["2", ""]
     assert _best({**row, "confirmed": {"outcome": "failed"}}, ["a", "b"]) == ["2", ""]
+
+
+def test_the_start_beyond_a_limit_is_named(file, capsys):
+    """The front is better than a start that the limits exclude."""
+    limit = '[[limits]]\nfigure = "volume_cm3"\nmost = 120.0\n[plan]'
+    file.write_text(TEXT.replace("[plan]", limit).partition("[confirm]")[0])
+    assert main(["optimise", str(file), "--jobs", "1", "--quiet"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "reference-2d: its values miss the limit of volume_cm3" in lines
+    assert not any(line.startswith("front") and "limit" in line for line in lines)

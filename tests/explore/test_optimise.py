@@ -263,6 +263,17 @@ def test_the_front_is_confirmed_with_more_care(monkeypatch):
     assert optimum_picture(found).startswith(b"\x89PNG")
 
 
+def test_designs_beyond_a_limit_say_so():
+    """The start and every design that was tried, also without a confirmation."""
+    limit = '[[limits]]\nfigure = "volume_cm3"\nmost = 120.0\n'
+    result = optimise(sizes(20, more=limit), executor=LocalPool(1)).to_json()
+    assert result["start"]["volume_cm3"] > 120.0
+    rows = [result["start"], *result["rows"], *result["front"]]
+    assert {bool(row["missed"]) for row in rows} == {True, False}
+    for row in rows:
+        assert row["missed"] == ["volume_cm3"] * (row["volume_cm3"] > 120.0)
+
+
 def test_care_changes_the_tasks_it_is_for():
     """Positions of the meshing, model of meshing and map; the figures stay."""
     text = """

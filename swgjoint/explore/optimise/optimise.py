@@ -112,14 +112,16 @@ class Optimum:
 
     def _row(self, candidate: Candidate) -> dict[str, Any]:
         record, confirmed = candidate.record, candidate.confirmed
+        # figures that decide: those of the more accurate computation, if there are any
+        best = confirmed if confirmed is not None and confirmed.ok else record
         row: dict[str, Any] = {
             **{name: flat(value) for name, value in candidate.values.items()},
             "outcome": record.outcome,
             **{name: record.figures.get(name) for name in self.file.figures},
             "reason": record.reason,
-            "missed": []
-            if confirmed is None or not confirmed.ok
-            else [k for k, v in self.file.violations(confirmed.figures).items() if v],
+            "missed": [k for k, v in self.file.violations(best.figures).items() if v]
+            if best.ok
+            else [],
             "confirmed": None
             if confirmed is None
             else {
