@@ -38,8 +38,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         ``front`` (Pareto-optimal designs, sorted by the first objective: values of the
         parameters, figures, ``missed`` (figures whose limit they miss), ``confirmed``
-        figures or null, and ``not_worse_than``, the names of compared designs that are
-        not better in any objective),
+        figures or null, ``not_worse_than``, the names of compared designs that are not
+        better in any objective, and ``beaten_by``, the names of designs within the
+        limits that are not worse in any objective and better in one),
         ``evaluations``, ``failed``, ``generations``, ``reused``, ``computed``,
         ``workers``, ``work_s``, ``wall_s``, ``objectives``, ``parameters``,
         ``figures``, ``validity``, ``start``, ``beside`` (compared designs), ``rows``
@@ -129,6 +130,9 @@ def report(result: dict[str, Any]) -> str:
             lines.append(
                 f"front {k + 1} is at least as good in all objectives as {others}"
             )
+        if row["beaten_by"]:
+            others = ", ".join(row["beaten_by"])
+            lines.append(f"front {k + 1} is not Pareto-optimal; better: {others}")
     for task, label in result["validity"].items():
         absent = [
             f"not modelled, {part}: {why}"

@@ -10,9 +10,10 @@ from messages import naming
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.optimise import optimise as optimise_module
-from swgjoint.explore.optimise.file import OptimisationFile
+from swgjoint.explore.optimise.file import Limit, OptimisationFile
 from swgjoint.explore.optimise.front import (
     Candidate,
+    beats,
     front_of,
     not_worse,
     objectives_of,
@@ -322,6 +323,26 @@ def test_confirmed_figures_decide_where_both_have_them():
     assert not_worse(file, one((1.0, 5.0), (2.0, 5.0)), rival)
     assert not not_worse(file, one((1.0, 5.0), (2.1, 5.0)), rival)
     assert not not_worse(file, one((1.0, 4.9), None), rival)
+
+
+def test_a_front_that_the_confirmation_refutes_says_so():
+    """A design that another one beats with confirmed figures is called beaten."""
+    file = sizes(20, more="[confirm]\ndesigns = 2\n")
+    found = optimise(file, executor=LocalPool(1))
+    first, last = (replace(found.front[k]) for k in (0, -1))
+    assert not any(row["beaten_by"] for row in found.to_json()["front"])
+    worse = {**last.confirmed.figures, "length_mm": first.record.figures["length_mm"]}
+    record = replace(last.confirmed, figures=worse)  # heavier, and no longer
+    front = (*found.front[:-1], replace(last, confirmed=record))
+    rows = replace(found, front=front).to_json()["front"]
+    assert [row["beaten_by"] for row in rows[:-1]] == [[]] * (len(rows) - 1)
+    assert rows[-1]["beaten_by"] == ["reference-2d", "front 1"]
+    # nothing beyond a limit beats a design
+    most = first.confirmed.figures["volume_cm3"] - 1.0
+    strict = file.model_copy(
+        update={"limits": (Limit(figure="volume_cm3", most=most),)}
+    )
+    assert not beats(strict, front[0], front[-1]) and beats(file, front[0], front[-1])
 
 
 def test_files_that_it_names_lie_relative_to_it(tmp_path, monkeypatch):

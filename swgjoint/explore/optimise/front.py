@@ -124,3 +124,20 @@ def not_worse(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
         if objective.sign * mine > objective.sign * theirs:
             return False
     return True
+
+
+def beats(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
+    """Whether a design within the limits is better than another one.
+
+    It is not worse in any objective, and better in at least one, see :func:`not_worse`.
+
+    Args:
+        file: File with objectives and limits.
+        one: The design.
+        other: Design to compare with.
+    """
+    confirmed = one.confirmed is not None and one.confirmed.ok
+    record = one.confirmed if confirmed and one.confirmed is not None else one.record
+    if any(file.violations(record.figures).values()):
+        return False
+    return not_worse(file, one, other) and not not_worse(file, other, one)

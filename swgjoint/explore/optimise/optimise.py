@@ -17,6 +17,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.explore.optimise.file import OptimisationFile
 from swgjoint.explore.optimise.front import (
     Candidate,
+    beats,
     front_of,
     not_worse,
     objectives_of,
@@ -61,6 +62,8 @@ class Optimum:
         file, ok = self.file, sum(c.record.ok for c in self.tried)
         rivals = (self.start, *self.beside)
         names = [self._name(c) for c in rivals]
+        known = dict(zip(names, rivals, strict=True))
+        known |= {f"front {k + 1}": c for k, c in enumerate(self.front)}
         return {
             "evaluations": len(self.tried),
             "failed": len(self.tried) - ok,
@@ -83,6 +86,9 @@ class Optimum:
                         name
                         for name, rival in zip(names, rivals, strict=True)
                         if not_worse(file, c, rival)
+                    ],
+                    "beaten_by": [
+                        name for name, one in known.items() if beats(file, one, c)
                     ],
                 }
                 for c in self.front
