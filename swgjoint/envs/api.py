@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
-from gymnasium.utils import seeding
+from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -59,8 +59,12 @@ def _spaces(core: Core) -> tuple[Any, Any]:
     return Box(*observation, dtype=np.float64), Box(*action, dtype=np.float64)
 
 
-class SingleEnv(gymnasium.Env[Array, Array]):
-    """One episode at a time."""
+class SingleEnv(gymnasium.Env[Array, Array], EzPickle):
+    """One episode at a time.
+
+    A copy, also one by ``pickle`` or ``deepcopy``, has the same arguments and begins
+    with ``reset``.
+    """
 
     metadata = {  # noqa: RUF012  (gymnasium's own declaration)
         "render_modes": ["rgb_array"],
@@ -90,6 +94,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
                 f"render_mode {render_mode!r}; accepted: None, 'rgb_array' (for the"
                 " rerun viewer use swgjoint.envs.recording.EpisodeRecorder)"
             )
+        EzPickle.__init__(self, render_mode, **arguments)
         settings = settings_of(self.settings_type, arguments)
         core = self.core_of(1, 1, settings)
         self.core: Core = core
@@ -182,14 +187,15 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         return self.core.read_measurements(observation)
 
 
-class BatchEnv(VectorEnv[Array, Array, Array]):
+class BatchEnv(VectorEnv[Array, Array, Array], EzPickle):
     """Many episodes on the threads of the engine.
 
     ``autoreset_mode`` determines when an ended episode restarts. With ``NextStep`` it
     restarts in the next step, whose action is ignored. With ``SameStep`` it restarts
     immediately, and ``info["final_obs"]`` contains its last observation. With
     ``Disabled`` it restarts when ``reset`` is called with a ``reset_mask``. The results
-    are bit-identical to those of gymnasium's own vector environments.
+    are bit-identical to those of gymnasium's own vector environments. A copy, also one
+    by ``pickle`` or ``deepcopy``, has the same arguments and begins with ``reset``.
     """
 
     single: ClassVar[type[SingleEnv]]
@@ -213,6 +219,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         Raises:
             InputError: If an argument is unknown or outside its range.
         """
+        EzPickle.__init__(self, num_envs, threads, autoreset_mode, **arguments)
         modes = tuple(AutoresetMode)
         if autoreset_mode not in (*modes, *(mode.value for mode in modes)):
             raise InputError(
