@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -47,6 +48,16 @@ from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.thermal import reserve_friction
 from swgjoint.typing import Array
+
+
+class _PluginFirst:
+    """Part of a pickle; reading it registers the plugin.
+
+    MuJoCo crashes if it steps an unpickled model whose plugin is not registered.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return plugin.load, ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,6 +120,14 @@ class Assembly:
     """Addresses of the tilt angles in qpos, two for each bearing. Shape (n_tilts,)."""
     tilt_velocity: NDArray[np.intp]
     """Addresses of the tilt speeds in qvel. Shape (n_tilts,)."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for pickle, which registers the plugin before it reads the model."""
+        return {"": _PluginFirst(), **vars(self)} if self.model.nplugin else vars(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the attributes, see :meth:`__getstate__`."""
+        vars(self).update({key: value for key, value in state.items() if key})
 
     @property
     def step(self) -> float:

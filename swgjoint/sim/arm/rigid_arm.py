@@ -6,6 +6,7 @@ import warnings
 from copy import copy
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,6 +22,9 @@ from swgjoint.typing import Array
 
 class RigidArm:
     """An MJCF or URDF arm with ideal joints, the reference for control and errors.
+
+    Arms can be pickled. As MuJoCo's editable models cannot, :meth:`spec` of an
+    unpickled arm reads the file again.
 
     Attributes:
         reference: Path or bundled name of the arm, as passed.
@@ -60,7 +64,7 @@ class RigidArm:
         file = read_arm(self.path, self.reading)
         self.held, self.effort = file.held, file.effort
         self.keyframes = file.keyframes
-        self._spec = file.spec
+        self._spec, self._tool_site = file.spec, tool_site
         self._mark_tool(tool_site)
         if not self._spec.joints:
             others = ", ".join(f"{name} is a {why}" for name, why in self.held.items())
@@ -77,7 +81,15 @@ class RigidArm:
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh editable copy of the arm."""
+        if "_spec" not in vars(self):
+            self._spec = read_arm(self.path, self.reading).spec
+            self._mark_tool(self._tool_site)
         return self._spec.copy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the editable model and what is made on first use."""
+        left_out = ("_spec", "_probe", "_probe_data")
+        return {key: one for key, one in vars(self).items() if key not in left_out}
 
     @property
     def ends(self) -> list[str]:
@@ -110,6 +122,7 @@ class RigidArm:
     def without_tool(self) -> RigidArm:
         """This arm, whose tool positions are not computed."""
         bare = copy(self)
+        vars(bare).update(vars(self))  # the editable model, which copies leave out
         bare.tool = -1
         return bare
 
