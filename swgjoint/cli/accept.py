@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.shared.common_options import add_drive, add_model
 from swgjoint.cli.shared.limits import add_limits, limits_of
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
@@ -18,17 +19,8 @@ if TYPE_CHECKING:
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: drive, fidelity, tests, limits, measured logs, output."""
-    parser.add_argument(
-        "drive",
-        metavar="FILE|DESIGN|NAME",
-        help="map (.swg), design file, bundled name, or catalogue name (CSG-25-100)",
-    )
-    parser.add_argument(
-        "--model",
-        choices=("ring", "2d", "3d"),
-        help="fidelity of a design: ring (thin ring, fastest), 2d or 3d (finite"
-        " elements); default: 3d for a design with a cup, else 2d",
-    )
+    add_drive(parser)
+    add_model(parser, "a design")
     parser.add_argument(
         "--only",
         metavar="TEST,...",

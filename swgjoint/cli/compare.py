@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.cli.shared.arm_arguments import add_overrides
+from swgjoint.cli.shared.common_options import add_model
 from swgjoint.cli.shared.limits import add_limits, limits_of
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
@@ -42,12 +43,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " 'wrist_*'; the other joints keep the drives of the scene; repeatable",
     )
     add_overrides(parser)
-    parser.add_argument(
-        "--model",
-        choices=("ring", "2d", "3d"),
-        help="fidelity of designs: ring (thin ring, fastest), 2d or 3d (finite"
-        " elements); default: 3d for a design with a cup, else 2d",
-    )
+    add_model(parser, "designs")
     parser.add_argument(
         "--sort", metavar="KEY", help="sort by this quantity, best first"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from swgjoint.cli.shared.common_options import add_model
 from swgjoint.cli.shared.drive_option import add_drive_option, drives_of
 from swgjoint.cli.shared.model_text import rotor_lines
 from swgjoint.cli.shared.text import table
@@ -37,12 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="file to write (.xml or .fmu)",
     )
-    parser.add_argument(
-        "--model",
-        choices=("ring", "2d", "3d"),
-        help="fidelity of designs: ring (thin ring, fastest), 2d or 3d (finite"
-        " elements); default: 3d for a design with a cup, else 2d",
-    )
+    add_model(parser, "designs")
     parser.add_argument(
         "--rotor-inertia",
         type=float,

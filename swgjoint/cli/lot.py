@@ -6,13 +6,13 @@ import argparse
 from functools import partial
 from typing import Any
 
+from swgjoint.cli.shared.common_options import MAX_JOBS, add_jobs
 from swgjoint.cli.shared.text import table
 from swgjoint.csv_text import csv_text
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
 MAX_DRIVES = 100_000
-MAX_JOBS = 256
 MAX_CLEARANCE_UM = 2000.0
 
 
@@ -66,13 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " with --model ring: transmission_accuracy_arcmin, lost_motion_arcmin,"
         " K1_Nm_rad",
     )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=2,
-        metavar="N",
-        help="number of processes; default: 2",
-    )
+    add_jobs(parser)
     parser.add_argument(
         "--out",
         metavar="DIR",

@@ -12,6 +12,7 @@ from swgjoint.cli.shared.arm_arguments import (
     choice_lines,
     scene_of,
 )
+from swgjoint.cli.shared.common_options import add_model
 from swgjoint.cli.shared.drive_option import add_drive_option
 from swgjoint.cli.shared.life_text import (
     bearing_lines,
@@ -72,12 +73,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="write run.rrd, the picture run.png (and scene.toml for an arm) to this"
         " folder; default: write no files",
     )
-    parser.add_argument(
-        "--model",
-        choices=("ring", "2d", "3d"),
-        help="fidelity of designs: ring (thin ring, fastest), 2d or 3d (finite"
-        " elements); default: 3d for a design with a cup, else 2d",
-    )
+    add_model(parser, "designs")
     parser.add_argument(
         "--strict",
         action="store_true",

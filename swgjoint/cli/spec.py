@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.shared.common_options import add_drive, add_model
 from swgjoint.cli.shared.map_validity_text import doubts, mark_figure
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
@@ -21,17 +22,8 @@ _SHOWN_ORDERS = 6
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments: drive, fidelity, keys, measured loop, output folder."""
-    parser.add_argument(
-        "drive",
-        metavar="FILE|DESIGN|NAME",
-        help="map (.swg), design file, bundled name, or catalogue name (CSG-25-100)",
-    )
-    parser.add_argument(
-        "--model",
-        choices=("ring", "2d", "3d"),
-        help="fidelity of a design: ring (thin ring, fastest), 2d or 3d (finite"
-        " elements); default: 3d for a design with a cup, else 2d",
-    )
+    add_drive(parser)
+    add_model(parser, "a design")
     parser.add_argument(
         "--only",
         metavar="KEY,...",

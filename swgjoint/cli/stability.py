@@ -5,11 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from swgjoint.cli.shared.common_options import add_jobs, check_jobs
 from swgjoint.cli.shared.text import table
-from swgjoint.errors import InputError
 from swgjoint.files import output_folder
-
-MAX_JOBS = 256
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -19,13 +17,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="run the whole grid of stiffnesses, inertias and steps instead of a part",
     )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=2,
-        metavar="N",
-        help="number of processes; default: 2",
-    )
+    add_jobs(parser)
     parser.add_argument(
         "--out", metavar="DIR", help="write the table and the plot to this folder"
     )
@@ -40,8 +32,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Raises:
         InputError: If ``--jobs`` is out of range.
     """
-    if not 1 <= args.jobs <= MAX_JOBS:
-        raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
+    check_jobs(args.jobs)
     folder = output_folder(args.out) if args.out else None
     from swgjoint.bench.stability.stability import run_stability
 

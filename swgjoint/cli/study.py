@@ -6,12 +6,12 @@ import argparse
 import time
 from typing import Any
 
+from swgjoint.cli.shared.common_options import add_jobs, check_jobs
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 from swgjoint.validation.runner import STUDIES, run_study
 
-MAX_JOBS = 256
 LEAST_INERTIA, MOST_INERTIA = 1e-9, 1e6
 """Bounds on the inertia of a rotor or a load [kg·m²]."""
 MAX_SEEDS = 10_000
@@ -37,13 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         choices=("2d", "3d"),
         help="fidelity; the default depends on the study",
     )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=2,
-        metavar="N",
-        help="number of processes; default: 2",
-    )
+    add_jobs(parser)
     parser.add_argument(
         "--load-inertia",
         type=float,
@@ -89,8 +83,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         InputError: If an option is out of range or does not apply to the study.
     """
     start = time.perf_counter()
-    if not 1 <= args.jobs <= MAX_JOBS:
-        raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
+    check_jobs(args.jobs)
     _check_response_options(args)
     if args.seeds is not None and args.name != "control":
         raise InputError(
