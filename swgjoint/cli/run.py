@@ -14,12 +14,7 @@ from swgjoint.cli.shared.arm_arguments import (
 )
 from swgjoint.cli.shared.common_options import add_model
 from swgjoint.cli.shared.drive_option import add_drive_option
-from swgjoint.cli.shared.life_text import (
-    bearing_lines,
-    gauge_lines,
-    life_lines,
-    thermal_lines,
-)
+from swgjoint.cli.shared.life_text import joint_lines, life_lines
 from swgjoint.cli.shared.load_text import design_line, load_line, loss_line
 from swgjoint.cli.shared.model_text import (
     assumed_lines,
@@ -198,9 +193,7 @@ def report(result: dict[str, Any]) -> str:
         ripple_line(result),
         tool_line(result["tool"], random="sensors" in contains),
         *life_lines(result),
-        *bearing_lines(result),
-        *gauge_lines(result),
-        *thermal_lines(result),
+        *joint_lines(result),
         *(
             [*choice_lines(choice), design_line(choice)]
             if (choice := result.get("drive_choice"))

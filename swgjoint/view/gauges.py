@@ -9,7 +9,7 @@ import numpy as np
 
 from swgjoint.pictures import png
 from swgjoint.sim.gauges import COMPARED, with_bridges
-from swgjoint.view.report.tables import Cell, Table
+from swgjoint.view.report.tables import Table, cells_of
 from swgjoint.view.words import format_figure, short
 
 if TYPE_CHECKING:
@@ -94,10 +94,7 @@ def gauge_tables(runs: Mapping[str, Run]) -> list[Table]:
         Table(
             title=f"Strain gauges of {label}",
             header=GAUGE_COLUMNS,
-            rows=[
-                [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                for cells in gauge_grid(run.figures["joints"])
-            ],
+            rows=cells_of(gauge_grid(run.figures["joints"])),
             notes=gauge_notes(run.figures["joints"]),
         )
         for label, run in runs.items()

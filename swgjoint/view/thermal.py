@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.pictures import png
-from swgjoint.view.report.tables import Cell, Table
+from swgjoint.view.report.tables import Table, cells_of
 from swgjoint.view.words import short
 
 if TYPE_CHECKING:
@@ -59,10 +59,7 @@ def thermal_tables(runs: Mapping[str, Run]) -> list[Table]:
         Table(
             title=f"Temperatures of {label}",
             header=THERMAL_COLUMNS,
-            rows=[
-                [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                for cells in thermal_grid(run.figures["joints"])
-            ],
+            rows=cells_of(thermal_grid(run.figures["joints"])),
         )
         for label, run in runs.items()
         if run.heat

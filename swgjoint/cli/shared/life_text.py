@@ -8,46 +8,28 @@ from typing import Any
 from swgjoint.cli.shared.text import table
 
 
-def bearing_lines(result: dict[str, Any]) -> list[str]:
-    """Format the tilt and the life of all output bearings; empty without any.
+def joint_lines(result: dict[str, Any]) -> list[str]:
+    """Format the output bearings, strain gauges and temperatures that the run has.
 
     Args:
         result: Figures of a run.
     """
     joints = result["joints"]
-    if not any("output_bearing" in joint for joint in joints.values()):
-        return []
-    from swgjoint.view.life.rows import BEARING_COLUMNS, bearing_grid, bearing_notes
+    present = {key for joint in joints.values() for key in joint}
+    lines = []
+    if "output_bearing" in present:
+        from swgjoint.view.life.rows import BEARING_COLUMNS, bearing_grid, bearing_notes
 
-    return [_grid(BEARING_COLUMNS, bearing_grid(joints)), *bearing_notes(joints)]
+        lines += [_grid(BEARING_COLUMNS, bearing_grid(joints)), *bearing_notes(joints)]
+    if "gauges" in present:
+        from swgjoint.view.gauges import GAUGE_COLUMNS, gauge_grid, gauge_notes
 
+        lines += [_grid(GAUGE_COLUMNS, gauge_grid(joints)), *gauge_notes(joints)]
+    if "thermal" in present:
+        from swgjoint.view.thermal import THERMAL_COLUMNS, thermal_grid
 
-def gauge_lines(result: dict[str, Any]) -> list[str]:
-    """Format the readings of all strain gauges; empty without any.
-
-    Args:
-        result: Figures of a run.
-    """
-    joints = result["joints"]
-    if not any("gauges" in joint for joint in joints.values()):
-        return []
-    from swgjoint.view.gauges import GAUGE_COLUMNS, gauge_grid, gauge_notes
-
-    return [_grid(GAUGE_COLUMNS, gauge_grid(joints)), *gauge_notes(joints)]
-
-
-def thermal_lines(result: dict[str, Any]) -> list[str]:
-    """Format the temperatures of drives that warm; empty without any.
-
-    Args:
-        result: Figures of a run.
-    """
-    joints = result["joints"]
-    if not any("thermal" in joint for joint in joints.values()):
-        return []
-    from swgjoint.view.thermal import THERMAL_COLUMNS, thermal_grid
-
-    return [_grid(THERMAL_COLUMNS, thermal_grid(joints))]
+        lines.append(_grid(THERMAL_COLUMNS, thermal_grid(joints)))
+    return lines
 
 
 def life_lines(result: dict[str, Any]) -> list[str]:

@@ -13,7 +13,7 @@ from swgjoint.view.life.rows import (
     life_grid,
     missing_lines,
 )
-from swgjoint.view.report.tables import Cell, Table
+from swgjoint.view.report.tables import Table, cells_of
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -34,10 +34,7 @@ def bearing_tables(runs: Mapping[str, Run]) -> list[Table]:
             Table(
                 title=f"Output bearings of {label}",
                 header=BEARING_COLUMNS,
-                rows=[
-                    [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                    for cells in bearing_grid(joints)
-                ],
+                rows=cells_of(bearing_grid(joints)),
                 notes=bearing_notes(joints),
             )
         )
@@ -61,10 +58,7 @@ def life_tables(runs: Mapping[str, Run]) -> list[Table]:
             Table(
                 title=f"Life of {label}",
                 header=columns,
-                rows=[
-                    [Cell(text, "" if k else "text") for k, text in enumerate(cells)]
-                    for cells in rows
-                ],
+                rows=cells_of(rows),
                 notes=[
                     f"{describe_cycle(metrics['cycle'])}.",
                     *missing_lines(lives),

@@ -58,6 +58,17 @@ class Table:
     """Remarks below the table."""
 
 
+def cells_of(rows: Sequence[Sequence[str]]) -> list[list[Cell]]:
+    """Cells of rows of text; the first column is left-aligned.
+
+    Args:
+        rows: Text of every cell.
+    """
+    return [
+        [Cell(text, "" if k else "text") for k, text in enumerate(row)] for row in rows
+    ]
+
+
 WINDOWS = {
     "constant speed": "the constant-speed part of the motion",
     "motion": "the whole motion",
