@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 import unicodedata
@@ -48,6 +49,11 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
     # figures have an opaque background, so all pixels are opaque
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.save(out, format="png", dpi=(dpi, dpi), compress_level=_EFFORT)
+
+
+def inline_picture(data: bytes) -> str:
+    """Picture as base64 text, for embedding in a page."""
+    return base64.b64encode(data).decode("ascii")
 
 
 def _texts(artist: Any) -> Iterator[Any]:

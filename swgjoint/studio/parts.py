@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
+from swgjoint.pictures import inline_picture
 from swgjoint.studio.jobs import Job
-from swgjoint.view.report.tables import inline_picture
 
 
 class PlacedPicture:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint import __version__
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
+from swgjoint.pictures import inline_picture
 from swgjoint.progress import Progress, silent
 from swgjoint.toml_text import toml_text
 from swgjoint.view.gauges import gauge_picture, gauge_tables
@@ -21,7 +22,6 @@ from swgjoint.view.report.tables import (
     Table,
     _joint_table,
     alerts,
-    inline_picture,
     label_table,
     provenance_table,
     sheet_table,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from swgjoint.maps.sheet.validity_marks import (
     mark_legend,
     worst,
 )
+from swgjoint.pictures import inline_picture
 from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.view.plots.spec import spec_picture
 from swgjoint.view.ratings_text import sheet_words
@@ -59,11 +59,7 @@ class Table:
 
 
 def cells_of(rows: Sequence[Sequence[str]]) -> list[list[Cell]]:
-    """Cells of rows of text; the first column is left-aligned.
-
-    Args:
-        rows: Text of every cell.
-    """
+    """Cells of rows of text; the first column is left-aligned."""
     return [
         [Cell(text, "" if k else "text") for k, text in enumerate(row)] for row in rows
     ]
@@ -401,8 +397,3 @@ def versions_table() -> Table:
 
 def _cells(*values: Any) -> list[Cell]:
     return [Cell(format_figure(plain(value))) for value in values]
-
-
-def inline_picture(data: bytes) -> str:
-    """Picture as base64 text, for embedding in the page."""
-    return base64.b64encode(data).decode("ascii")
