@@ -187,13 +187,7 @@ def assemble(
             outside its stability region even with the sub-steps that the scene accepts.
             The message then names the exceeded bound and a step that meets it.
     """
-    arm, known_arm = arms_of(
-        scene.arm,
-        tool_site=scene.tool_site,
-        payload=scene.payload,
-        where=scene.where,
-        reading=scene.reading,
-    )
+    arm, known_arm = arms_of(scene)
     sections = _checked_sections(scene, arm, external=controlled_by is not None)
     require_run_memory(scene, len(arm.joints))
     trajectory = trajectory_of(scene, arm)

@@ -201,7 +201,7 @@ def test_the_recorded_motor_torque_is_the_engines(bench, motor, kind):
 def test_a_payload_weighs_on_the_shoulder():
     """Its weight times lever arm more than the bare UR5e; its inertia adds m r²."""
     payload = Payload(mass_kg=3.0, centre_mm=[0.0, 0.0, 100.0], known=False)
-    loaded, bare = arms_of("ur5e", tool_site="tool", payload=payload, where="test")
+    loaded, bare = arms_of(Scene.load_file("ur5e-sweep").with_payload(payload))
     q = np.deg2rad([[0.0, -90.0, 90.0, 20.0, -60.0, 0.0]])
     # centre of mass: 100 mm along the z axis of the tool site
     data = mujoco.MjData(bare.model)

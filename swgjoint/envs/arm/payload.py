@@ -34,13 +34,7 @@ class DrawnPayloads:
         scene = assembly.scene
         self._assembly, self._bounds = assembly, bounds
         # a second arm, whose payload can change without that of the assembly
-        self._arm, _ = arms_of(
-            scene.arm,
-            tool_site=scene.tool_site,
-            payload=scene.payload,
-            where=scene.where,
-            reading=scene.reading,
-        )
+        self._arm, _ = arms_of(scene)
         self._body = int(self._arm.model.body(BODY).id)
 
     def link_inertia_missing(self) -> Array:

@@ -13,9 +13,8 @@ from swgjoint.envs.specimen import load_drive_once
 from swgjoint.errors import InputError
 from swgjoint.faults import validate
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.arm.scene import is_arm, scene_of_arm
+from swgjoint.sim.arm.scene import is_arm, rigid_arm_of, scene_of_arm
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.control import feedforward
 from swgjoint.sim.motion.commanded import trajectory_of
@@ -65,13 +64,7 @@ def drives_of(scene: Scene) -> dict[str, DriveMap]:
     names = {s.drive for s in sections if s.drive is not None and s.model is None}
     slow = sorted(name for name in names if not names_catalogue(name))
     if slow:
-        arm, _ = arms_of(
-            scene.arm,
-            tool_site=scene.tool_site,
-            payload=scene.payload,
-            where=scene.where,
-            reading=scene.reading,
-        )
+        arm = rigid_arm_of(scene)
         _check_motion(scene, arm, trajectory_of(scene, arm).velocity[0])
     return {name: load_drive_once(name) for name in slow}
 

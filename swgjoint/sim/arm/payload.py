@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.scene.feature_sections import Payload
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
 
 BODY = "payload"
@@ -20,23 +20,12 @@ engine rejects bodies without inertia."""
 class LoadedArm(RigidArm):
     """A rigid arm that carries a payload at its tool site."""
 
-    def __init__(
-        self,
-        reference: str,
-        *,
-        tool_site: str,
-        payload: Payload,
-        where: str,
-        reading: ArmReading | None = None,
-    ) -> None:
-        """Load an arm with a payload.
+    def __init__(self, scene: Scene, payload: Payload) -> None:
+        """Load the arm of a scene with a payload.
 
         Args:
-            reference: Path or bundled name.
-            tool_site: Site at which the payload is fixed.
-            payload: The payload.
-            where: Start of messages about the payload.
-            reading: Hinges that move, and pose of held joints; None moves every hinge.
+            scene: The scene.
+            payload: The payload at its tool site.
 
         Raises:
             InputError: If the arm has no such site, or already has a body with the name
@@ -44,15 +33,16 @@ class LoadedArm(RigidArm):
         """
         # load the arm without the payload first, to check for the site
         self._payload: Payload | None = None
-        self._site, self._where = tool_site, where
-        super().__init__(reference, tool_site=tool_site, reading=reading)
+        self._site, self._where = scene.tool_site, scene.where
+        arm, reading = scene.arm, scene.reading
+        super().__init__(arm, tool_site=self._site, reading=reading)
         if self.tool < 0:
             raise InputError(
-                f"{where}: payload: arm {reference!r} has no site {tool_site!r};"
+                f"{self._where}: payload: arm {arm!r} has no site {self._site!r};"
                 " accepted: the name of a site or body in tool_site"
             )
         self._payload = payload
-        super().__init__(reference, tool_site=tool_site, reading=reading)
+        super().__init__(arm, tool_site=self._site, reading=reading)
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh editable copy of the arm with its payload."""
@@ -79,33 +69,19 @@ class LoadedArm(RigidArm):
         body.inertia = np.array(payload.inertia_kgm2) + POINT * payload.mass_kg
 
 
-def arms_of(
-    reference: str,
-    *,
-    tool_site: str,
-    payload: Payload | None,
-    where: str,
-    reading: ArmReading | None = None,
-) -> tuple[RigidArm, RigidArm]:
+def arms_of(scene: Scene) -> tuple[RigidArm, RigidArm]:
     """The arm of a scene, and the controller's model of the arm.
-
-    Args:
-        reference: Path or bundled name.
-        tool_site: Name of the tool site.
-        payload: Payload at the tool site; None without a payload.
-        where: Start of messages about the payload.
-        reading: Hinges that move, and pose of held joints; None moves every hinge.
 
     Returns:
         The arm with its payload, and the controller's model, which is the arm without
         the payload if the payload is not known.
     """
-    if payload is None:
-        arm = RigidArm(reference, tool_site=tool_site, reading=reading)
+
+    def bare() -> RigidArm:
+        return RigidArm(scene.arm, tool_site=scene.tool_site, reading=scene.reading)
+
+    if scene.payload is None:
+        arm = bare()
         return arm, arm
-    loaded = LoadedArm(
-        reference, tool_site=tool_site, payload=payload, where=where, reading=reading
-    )
-    if payload.known:
-        return loaded, loaded
-    return loaded, RigidArm(reference, tool_site=tool_site, reading=reading)
+    loaded = LoadedArm(scene, scene.payload)
+    return loaded, loaded if scene.payload.known else bare()

@@ -282,13 +282,7 @@ def _read_anew(scene: Scene, arm: RigidArm) -> bool:
 
 def rigid_arm_of(scene: Scene) -> RigidArm:
     """The arm of a scene with its payload."""
-    arm, _ = arms_of(
-        scene.arm,
-        tool_site=scene.tool_site,
-        payload=scene.payload,
-        where=scene.where,
-        reading=scene.reading,
-    )
+    arm, _ = arms_of(scene)
     return arm
 
 
