@@ -14,7 +14,7 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import GPa, mm, um
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 
-STUDY = CatalogueFile.load()
+STUDY = CatalogueFile.load("catalogue")
 CLEARANCE_UM = {14: 12.5, 17: 13.0, 20: 13.0, 25: 14.5, 32: 18.0}
 """Middle of the normal class of ISO 5753-1: 5-20, 6-20, 6-20, 6-23 and 8-28 um."""
 

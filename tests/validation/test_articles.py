@@ -103,7 +103,7 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     assert theory["converged"] == pytest.approx(79.36, abs=0.01)
     stiffness = by["xb1-100-80", "radial stiffness, loads at mid-face"]
     assert stiffness["source_value"] is None
-    longest = max(len(v.name) for v in ArticlesFile.load().force.variations)
+    longest = max(len(v.name) for v in ArticlesFile.load("articles").force.variations)
     assert stiffness["high"] == pytest.approx(50.0 + 0.1 * (longest + len("force, ")))
     assert stiffness["low"] < stiffness["high"]
     lobe = {key[1]: row for key, row in by.items() if key[0] == "xb1-100-80"}
@@ -191,7 +191,7 @@ def test_bad_input(capsys, arguments, message):
 
 def test_file_of_the_study(tmp_path):
     """Every variation is a design; series of unequal length are refused."""
-    file = ArticlesFile.load()
+    file = ArticlesFile.load("articles")
     for variation in file.force.variations:
         changed = Design.preset(file.force.base).with_changes(variation.changes)
         assert changed != Design.preset(file.force.base)

@@ -143,7 +143,7 @@ def test_catalogue_values_are_those_of_the_tables():
 
 def test_rows_hold_brackets_and_failures(computed):
     """Every case is there, the failed one with its reason; middles are middles."""
-    found, study_file = study.run_catalogue(options()), CatalogueFile.load()
+    found, study_file = study.run_catalogue(options()), CatalogueFile.load("catalogue")
     rows = {(row.case, row.quantity): row for row in found.rows}
     assert len(rows) == 15 * 7 + 3 * 4
     one = rows["size 25, ratio 100", "K2"]
@@ -152,7 +152,7 @@ def test_rows_hold_brackets_and_failures(computed):
     assert one.more["low"] < one.ours < one.more["high"]
     series = [
         series_compliance(variant_design(25, 100, v), cup=True)
-        for v in CatalogueFile.load().variants
+        for v in CatalogueFile.load("catalogue").variants
     ]
     assert one.more["high"] == pytest.approx(1.0 / (1 / 1.25e5 + min(series)), rel=1e-9)
     assert one.more["low"] == pytest.approx(1.0 / (1e-5 + max(series)), rel=1e-9)
@@ -284,7 +284,7 @@ def test_results_are_kept(monkeypatch, tmp_path):
 
 def test_individual_gears_differ_by_their_seed():
     """Same seed, same gear; the clearance stays inside its class."""
-    file = CatalogueFile.load()
+    file = CatalogueFile.load("catalogue")
     one, again, other = (file.individual(seed) for seed in (1, 1, 2))
     assert one.content_hash() == again.content_hash() != other.content_hash()
     # bore of 45 mm: 6 to 23 µm of ISO 5753-1
@@ -308,7 +308,7 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
     """One size at the smallest ratio by the real rings: K1 to K3 rise; it is kept."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     row = catalogue_row(25, 50)
-    design = variant_design(25, 50, CatalogueFile.load().variants[0])
+    design = variant_design(25, 50, CatalogueFile.load("catalogue").variants[0])
     task = CatalogueTask(name="p", kind="path", design=design, torques=torques_of(row))
     found = run_task(task)
     K = stiffnesses(friction_of_path(found, design), row)
@@ -320,7 +320,7 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
 def test_losses_of_the_smallest_size(monkeypatch, tmp_path):
     """Real rings: run in below, flooded around the table; the start far below it."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
-    file = CatalogueFile.load()
+    file = CatalogueFile.load("catalogue")
     tasks = {task.name: task for task in study.tasks_of(file, "losses")}
     assert len(tasks) == 8
     task = tasks["running 14 100 20"]

@@ -50,7 +50,7 @@ def computed(monkeypatch):
 
 def test_cases_are_the_same_drive_in_other_models():
     """Straight cases lack all relief, others keep that of the family; kinds exist."""
-    tasks = coning.coning_tasks(CatalogueFile.load())
+    tasks = coning.coning_tasks(CatalogueFile.load("catalogue"))
     assert len(tasks) == 12
     for task in tasks:
         assert task.kind in runs.KINDS
@@ -126,7 +126,7 @@ def test_a_coning_task_is_the_torsion_in_space(monkeypatch):
         )
 
     monkeypatch.setattr(torsion, "solid_torsion", solved)
-    tasks = coning.coning_tasks(CatalogueFile.load())
+    tasks = coning.coning_tasks(CatalogueFile.load("catalogue"))
     for task in tasks[1:6]:
         found = runs.KINDS[task.kind](task)
         assert found["torsion_rad"] == pytest.approx(1e-5 * np.array(task.torques))
@@ -137,7 +137,7 @@ def test_a_coning_task_is_the_torsion_in_space(monkeypatch):
 @pytest.mark.fe
 def test_rings_of_coning_have_their_cup_in_series_once():
     """Torsion above half the play, in the middle of its tangents; a longer cup adds."""
-    task = coning.coning_tasks(CatalogueFile.load())[0]
+    task = coning.coning_tasks(CatalogueFile.load("catalogue"))[0]
     task = replace(task, torques=task.torques[:2])
     cup = {"cup.length_mm": 1.5 * task.design.cup.length_mm}
     long = replace(task, design=task.design.with_changes(cup))

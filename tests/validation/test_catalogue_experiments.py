@@ -13,7 +13,7 @@ from swgjoint.validation.catalogue.file import CatalogueFile
 from swgjoint.validation.catalogue.printed import catalogue_row
 from swgjoint.validation.rows import StudyOptions
 
-FILE = CatalogueFile.load()
+FILE = CatalogueFile.load("catalogue")
 
 
 def straight(task):

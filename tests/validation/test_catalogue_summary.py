@@ -61,7 +61,7 @@ def test_similar_gears_scale_by_the_cube(monkeypatch):
     found = run(monkeypatch)
     rows = found.more["scaling"]["rows"]
     assert len(rows) == 12
-    variant = CatalogueFile.load().variants[0]
+    variant = CatalogueFile.load("catalogue").variants[0]
     for row in rows:
         scale = (row["size"] / 25) ** 3
         cups = [
@@ -159,7 +159,7 @@ def test_a_flank_without_a_limit_leaves_a_lower_bound():
     """The bracket has a lower end alone, and the ratio is in no ranking."""
     limits = {(50, 20): 1800, (50, 28): 1900, (80, 20): 1300, (80, 28): -1200}
     found = teeth(limits | {(100, 20): 1400, (100, 28): 1100})
-    file = CatalogueFile.load()
+    file = CatalogueFile.load("catalogue")
     (open_end,) = ratcheting_rows(file, catalogue_row(25, 80), found, 25)
     assert open_end.ours is None
     assert (open_end.more["low"], open_end.more["high"]) == (1200.0, None)
@@ -193,7 +193,7 @@ def test_what_is_scaled_stands_over_what_is_computed():
         "accuracy 25 80": error | {"error_rad": (1.4e-4 * np.cos(2 * theta)).tolist()},
         "accuracy 14 80": error | {"error_rad": (2e-4 * np.cos(2 * theta)).tolist()},
     }
-    file = CatalogueFile.load()
+    file = CatalogueFile.load("catalogue")
     lines = compare_scaling(file, found, 25, (14, 80))
     # 1000 x 0.56^3 = 175.616; 1.4 / 0.56 / 2 = 1.25
     assert [line.split(": ")[-1] for line in lines] == ["1.250", "1.250"]
@@ -283,7 +283,7 @@ def test_individual_gears_alone(monkeypatch, tmp_path):
     written = json.loads((tmp_path / "catalogue.json").read_text())
     assert written["rows"] == []
     assert "from gear to gear" in written["summary"][0]
-    own = CatalogueFile.load().individual(1)
+    own = CatalogueFile.load("catalogue").individual(1)
     one = found.more["computations"]["individual 1"]
     row = catalogue_row(25, 100)
     K = single_stiffnesses(one, own, row)

@@ -42,7 +42,7 @@ def run_articles(options: StudyOptions) -> StudyResult:
     parts = options.chosen(PARTS)
     from swgjoint.view.plots.articles import articles_picture
 
-    study = ArticlesFile.load()
+    study = ArticlesFile.load("articles")
     tasks = [task for part in parts for task in tasks_of(study, part)]
     found = compute_all(run_task, tasks, options)
     rows = [row for part in parts for row in rows_of(study, part, found)]

@@ -7,12 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from swgjoint.errors import InputError
-from swgjoint.faults import Fault, Section, validate
+from swgjoint.faults import Fault, Section
 from swgjoint.gear.design.design import Design
-from swgjoint.models_path import find
-from swgjoint.toml_file import read_toml
 from swgjoint.validation.row_entry import RowEntry
+from swgjoint.validation.study_tables import StudyTables
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Text = Annotated[str, Field(min_length=1, max_length=200)]
@@ -105,24 +103,13 @@ class StressAndFatigue(Section):
         return self
 
 
-class ArticlesFile(Section):
+class ArticlesFile(StudyTables):
     """Content of the study file."""
 
     source: Text
     deflection: Deflection
     force: Force
     stress: StressAndFatigue
-
-    @classmethod
-    def load(cls, reference: str = "articles") -> ArticlesFile:
-        """Read a study file, given as a path or as the name of a bundled one.
-
-        Raises:
-            InputError: If the file is missing or invalid, with one line per fault.
-        """
-        path = find(reference, "studies", ".toml", what="study")
-        data = read_toml(path, what="study", error=InputError)
-        return validate(cls, data, where=str(path), error=InputError)
 
 
 def changed_design(base: str, changes: Mapping[str, Any] | None = None) -> Design:

@@ -76,7 +76,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     from swgjoint.view.plots.catalogue import catalogue_picture
 
     parts = options.chosen((*PARTS, *EXTRA) if options.only else PARTS)
-    study = CatalogueFile.load()
+    study = CatalogueFile.load("catalogue")
     tasks = [task for part in parts for task in tasks_of(study, part)]
     found = compute_all(run_task, tasks, options)
     rows = [row for part in parts for row in rows_of(study, part, found)]

@@ -9,15 +9,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from swgjoint.errors import InputError
-from swgjoint.faults import Section, validate
+from swgjoint.faults import Section
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.family import BEARING_BORE, CLEARANCE
 from swgjoint.gear.torsional_buckling import wall_for_buckling_torque
-from swgjoint.models_path import find
-from swgjoint.toml_file import read_toml
 from swgjoint.units import mm
 from swgjoint.validation.catalogue.printed import catalogue_buckling_torque
+from swgjoint.validation.study_tables import StudyTables
 
 Whole = Annotated[int, Field(gt=0, le=1000)]
 Numbers = Annotated[tuple[Whole, ...], Field(strict=False)]
@@ -181,7 +179,7 @@ class ConingSection(Section):
     assumptions: Annotated[tuple[Text, ...], Field(strict=False)]
 
 
-class CatalogueFile(Section):
+class CatalogueFile(StudyTables):
     """Content of the study file."""
 
     source: Text
@@ -203,17 +201,6 @@ class CatalogueFile(Section):
     individuals: Individuals
     experiments: Annotated[tuple[Experiment, ...], Field(strict=False)]
     coning: ConingSection
-
-    @classmethod
-    def load(cls, reference: str = "catalogue") -> CatalogueFile:
-        """Read a study file, given as a path or as the name of a bundled one.
-
-        Raises:
-            InputError: If the file is missing or invalid, with one line per fault.
-        """
-        path = find(reference, "studies", ".toml", what="study")
-        data = read_toml(path, what="study", error=InputError)
-        return validate(cls, data, where=str(path), error=InputError)
 
     @property
     def variants(self) -> tuple[Variant, ...]:

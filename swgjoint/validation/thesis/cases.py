@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from swgjoint.errors import DesignError, InputError
-from swgjoint.faults import Fault, Section, validate
+from swgjoint.faults import Fault, Section
 from swgjoint.gear.design.design import Design
-from swgjoint.models_path import find
-from swgjoint.toml_file import read_toml
+from swgjoint.validation.study_tables import StudyTables
 
 Kind = Literal["tensile", "compressive", "von_mises"]
 KINDS: tuple[Kind, ...] = ("tensile", "compressive", "von_mises")
@@ -147,7 +145,7 @@ class GroupEntry(Section):
         return text if case.name is None else f"{text}, {case.name}"
 
 
-class StudyFile(Section):
+class StudyFile(StudyTables):
     """A file of ``models/studies``."""
 
     source: Text
@@ -185,16 +183,6 @@ class StudyFile(Section):
         if faults:
             raise Fault(*faults)
         return self
-
-    @classmethod
-    def load(cls, reference: str | Path) -> StudyFile:
-        """Read a study file, given as a path or as the name of a bundled one.
-
-        Raises:
-            InputError: If the file is missing or invalid, with one line per fault.
-        """
-        path = find(reference, "studies", ".toml", what="study")
-        return validate(cls, read_toml(path, what="study"), where=str(path))
 
     @property
     def by_tenth(self) -> bool:
