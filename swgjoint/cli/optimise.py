@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.shared.places import configure_places, places_of
 from swgjoint.cli.shared.text import short_headers, table
+from swgjoint.cli.shared.validity_text import validity_lines
 from swgjoint.csv_text import csv_text
 from swgjoint.json_text import json_text
 
@@ -133,13 +134,7 @@ def report(result: dict[str, Any]) -> str:
         if row["beaten_by"]:
             others = ", ".join(row["beaten_by"])
             lines.append(f"front {k + 1} is not Pareto-optimal; better: {others}")
-    for task, label in result["validity"].items():
-        absent = [
-            f"not modelled, {part}: {why}"
-            for part, why in label["not_modelled"].items()
-        ]
-        text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
-        lines.append(f"validity of {task}: {text}")
+    lines += validity_lines(result["validity"])
     lines.append(
         f"{result['evaluations']} designs tried in {result['generations']} generations,"
         f" {result['failed']} failed; {result['computed']} computed,"

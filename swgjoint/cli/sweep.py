@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.shared.places import configure_places, places_of
 from swgjoint.cli.shared.text import short_headers, table
+from swgjoint.cli.shared.validity_text import validity_lines
 from swgjoint.csv_text import csv_text
 from swgjoint.json_text import json_text
 
@@ -121,13 +122,7 @@ def report(result: dict[str, Any]) -> str:
     for reason, numbers in list(reasons.items())[:SHOWN]:
         more = ", ..." if len(numbers) > 8 else ""
         lines.append(f"{', '.join(map(str, numbers[:8]))}{more}: {reason}")
-    for task, label in result["validity"].items():
-        absent = [
-            f"not modelled, {part}: {why}"
-            for part, why in label["not_modelled"].items()
-        ]
-        text = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
-        lines.append(f"validity of {task}: {text}")
+    lines += validity_lines(result["validity"])
     share = result["efficiency"]
     busy = ""
     if share is not None:
