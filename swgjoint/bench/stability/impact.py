@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.bench.stability.joint import RATIO, SAMPLES, Course, Joint
-from swgjoint.joint.attach import attach
+from swgjoint.bench.stability.joint import RATIO, SAMPLES, Course, Joint, compile_joint
 from swgjoint.maps.drive_map import DriveMap
 
 LENGTH = 0.3
@@ -61,25 +60,7 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
         mass=(link - own) / LENGTH**2,
         own=own,
     )
-    spec = mujoco.MjSpec.from_string(text)
-    attached = attach(
-        spec,
-        joint="joint",
-        drive=drive,
-        rotor_inertia=rotor,
-        damping_ratio=0.0,
-        friction=False,
-    )
-    model = spec.compile()
-    joints = [model.joint(name) for name in (attached.rotor, "joint")]
-    return Joint(
-        model=model,
-        attached=attached,
-        law=attached.drive,
-        q=np.array([int(j.qposadr[0]) for j in joints], dtype=np.intp),
-        v=np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
-        midpoint=True,
-    )
+    return compile_joint(text, drive, rotor=rotor, level="full", midpoint=True)
 
 
 def impact_speed() -> float:

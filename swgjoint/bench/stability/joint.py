@@ -357,6 +357,22 @@ def make_joint(
         integrator: Name of the integrator in MJCF.
     """
     text = _XML.format(step=step, integrator=integrator, link=link)
+    midpoint = level == "full" and integrator == "discrete"
+    return compile_joint(text, drive, rotor=rotor, level=level, midpoint=midpoint)
+
+
+def compile_joint(
+    text: str, drive: DriveMap, *, rotor: float, level: str, midpoint: bool
+) -> Joint:
+    """Attach a drive without damping to the hinge of a model.
+
+    Args:
+        text: Model in MJCF whose only hinge is called ``joint``.
+        drive: Map of the drive.
+        rotor: Inertia of rotor and wave generator [kg·m²].
+        level: Level of the joint.
+        midpoint: See :class:`Joint`.
+    """
     spec = mujoco.MjSpec.from_string(text)
     attached = attach(
         spec,
@@ -376,5 +392,5 @@ def make_joint(
         law=attached.drive if native is None else native_map(drive, native),
         q=np.array([int(j.qposadr[0]) for j in joints], dtype=np.intp),
         v=np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
-        midpoint=level == "full" and integrator == "discrete",
+        midpoint=midpoint,
     )
