@@ -298,14 +298,9 @@ def _signed(sign: str, text: str) -> str:
     return text if not sign or text == "-" else f"{sign} {text}"
 
 
-def format_fixed(value: float, digits: int = 3) -> str:
-    """Format a number with fixed decimals, without a sign on zero.
-
-    Args:
-        value: Number in any unit.
-        digits: Number of decimals.
-    """
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+def format_fixed(value: float) -> str:
+    """Format a number in any unit with three decimals, without a sign on zero."""
+    return f"{round(value, 3) + 0.0:.3f}"
 
 
 def notes(joints: dict[str, Any]) -> list[str]:

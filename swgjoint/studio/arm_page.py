@@ -41,7 +41,6 @@ class ArmPage:
     def __init__(self, session: Session, tab: str, address: str) -> None:
         self._session = session
         self._recording = f"{address}files/{tab}/run.rrd"
-        self._choice: dict[str, str] = dict(session.chosen)
         self._drives: dict[str, str] | None = None
         self._metrics: dict[str, Any] | None = None
         names = [*bundled_names("scenes", ".toml"), *bundled_names("arms", ".xml")]

@@ -19,7 +19,6 @@ import numpy as np
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.attach import attach
-from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array, Complex
 
@@ -66,8 +65,6 @@ class Chirp:
     """Highest frequency [Hz]."""
     period: float = 16.0
     """Duration of one sweep [s]; the spectral lines are 1/period apart."""
-    settling: int = 1
-    """Number of periods that are simulated before the evaluated one."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.low < self.high or self.period * self.low < 1.0:
@@ -145,12 +142,11 @@ def frequency_response(
     amplitude: float,
     bias: float = 0.0,
     step: float = 1e-4,
-    integrator: str = "RK4",
-    damping_ratio: float | None = None,
 ) -> FrequencyResponse:
     """Excite the rotor of a joint that is free at both ends and record both speeds.
 
-    The model has no gravity, and the friction of the drive is left out.
+    The model has no gravity, and the friction of the drive is left out. The integrator
+    is RK4, which has almost no numerical damping at such steps.
 
     Args:
         drive: Map of the drive.
@@ -161,10 +157,6 @@ def frequency_response(
         bias: Constant torque on the drive in addition, reduced to the output [N·m]. The
             motor exerts it, and a load on the link balances it.
         step: Time step of the simulation [s].
-        integrator: Integrator of the engine. RK4 has almost no numerical damping at
-            such steps; scenes use ``discrete`` by default.
-        damping_ratio: Damping ratio of the torsional vibration; None uses that of the
-            map.
 
     Returns:
         Response over the band of the chirp, from its last period.
@@ -180,19 +172,16 @@ def frequency_response(
             f"chirp up to {chirp.high:g} Hz at a step of {1e3 * step:g} ms; accepted:"
             f" up to {0.1 / step:g} Hz"
         )
-    spec = _bench(masses, step, integrator)
+    spec = _bench(masses, step)
     attached = attach(
         spec,
         joint=JOINT,
         drive=drive,
         level=level,
         rotor_inertia=masses.rotor_inertia,
-        damping_ratio=damping_ratio,
         friction=False,
     )
     assert attached.rotor is not None
-    if is_implicit(spec):
-        damp_as_asked(spec, {JOINT: attached})
     for name in (attached.rotor, JOINT):
         motor = spec.add_actuator(name=name, target=name)
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
@@ -202,7 +191,7 @@ def frequency_response(
     torque = (amplitude * wave + bias) / attached.ratio
     # the load balances the bias, so that only the chirp accelerates the joint
     control = np.stack([torque, np.full_like(torque, -bias)], axis=-1)
-    x, speed = _last_period(model, attached.rotor, control, chirp.settling + 1)
+    x, speed = _second_period(model, attached.rotor, control)
     bins = np.asarray(np.fft.rfftfreq(len(wave), step), dtype=np.float64)
     band = (bins >= chirp.low) & (bins <= chirp.high)
     spectrum = np.fft.rfft(speed, axis=0)[band] / np.fft.rfft(torque)[band, None]
@@ -216,14 +205,12 @@ def frequency_response(
     )
 
 
-def _bench(masses: TwoMass, step: float, integrator: str) -> mujoco.MjSpec:
+def _bench(masses: TwoMass, step: float) -> mujoco.MjSpec:
     """Model of a link on a hinge without gravity."""
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.gravity = [0.0, 0.0, 0.0]
-    spec.option.integrator = getattr(
-        mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"
-    )
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     link = spec.worldbody.add_body(name="link")
     link.add_joint(name=JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
     link.mass, link.inertia = 1.0, [masses.link_inertia] * 3
@@ -231,10 +218,10 @@ def _bench(masses: TwoMass, step: float, integrator: str) -> mujoco.MjSpec:
     return spec
 
 
-def _last_period(
-    model: mujoco.MjModel, rotor: str, control: Array, periods: int
+def _second_period(
+    model: mujoco.MjModel, rotor: str, control: Array
 ) -> tuple[Array, Array]:
-    """Angles and speeds of rotor and link in the last period. Shapes (n, 2)."""
+    """Angles and speeds of rotor and link in the second period. Shapes (n, 2)."""
     data = mujoco.MjData(model)
     full = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.empty(mujoco.mj_stateSize(model, full))
@@ -243,7 +230,7 @@ def _last_period(
     # the state vector begins with the time
     q = [1 + int(joint.qposadr[0]) for joint in joints]
     v = [1 + model.nq + int(joint.dofadr[0]) for joint in joints]
-    for _ in range(periods):
+    for _ in range(2):
         states, _ = mujoco.rollout.rollout(model, data, state[None], control[None])
         state = states[0, -1]
     if not np.isfinite(states).all():

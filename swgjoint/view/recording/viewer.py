@@ -16,23 +16,20 @@ STARTED: list[subprocess.Popen[bytes]] = []
 """Started processes; Python would warn if a running one were garbage-collected."""
 
 
-def start_viewer(
-    *options: str, port: int | None = None
-) -> tuple[subprocess.Popen[bytes], str]:
+def start_viewer(*options: str) -> tuple[subprocess.Popen[bytes], str]:
     """Start a viewer or its server; it continues to run after this process ends.
 
     Args:
         *options: Command-line arguments of the viewer, such as files,
             ``--serve-web`` or ``--serve-grpc``.
-        port: Port that receives streams; None selects a free one.
 
     Returns:
-        The process and the address to which streams are sent.
+        The process and the address to which streams are sent, on a free port.
 
     Raises:
         ComputationError: If the viewer is not installed.
     """
-    port = free_port() if port is None else port
+    port = free_port()
     # without --bind it would listen on all network interfaces
     command = [str(viewer_program()), "--bind", LOOPBACK, "--port", str(port)]
     return _start([*command, *options]), f"rerun+http://{LOOPBACK}:{port}/proxy"
