@@ -12,15 +12,16 @@ from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.contact_prediction import predicted_changes
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.newton_step import Load
-from swgjoint.fe.plane.sector_model import AT_LOBE, SectorModel
+from swgjoint.fe.plane.sector_model import SectorModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.tolerances.influence import influence
 from swgjoint.gear.kinematics import Layout
 from swgjoint.typing import Array
 
-CLOSE_BELOW = 1e-6
-"""Applied increment below which a rim that is held by its lobes may come into contact
-elsewhere [m]."""
+SETTLE = 10
+"""Number of updates per linearisation that settle the contact of a bore. With them and
+whole steps, all of 358 random designs found an equilibrium, but some take three times
+as long."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,14 +80,15 @@ class Continuation(Follower[State]):
             angle: Input angle [rad].
         """
         alpha, rotation, circular_spline_rotation = self._ideal(angle)
-        load = Load(rotation=rotation, teeth=False)
         start = self.model.initial_guess(alpha, rotation)
+        load = Load(rotation=rotation, teeth=False)
         state = self.solver(self.model, start, load)
         if not state.outcome.ok:
-            # A rim that sticks where it will lift off may snap away. Held by its lobes
-            # alone, it comes to rest first.
-            careful = replace(self.solver, close_below=CLOSE_BELOW)
-            state = careful(self.model, _held_by_lobes(self.model, start), load)
+            # a rim that sticks where it will lift off may snap away in the next step
+            settling = replace(
+                self.solver, exchanges=SETTLE, exchange_below=np.inf, stride=1.0
+            )
+            state = settling(self.model, start, load)
         return replace(state, circular_spline_rotation=circular_spline_rotation)
 
     def load(self, start: State, torque: float, angle: float) -> State:
@@ -214,12 +216,3 @@ class Continuation(Follower[State]):
         if self.layout == "flexspline_fixed":
             return theta, 0.0, output
         return 0.0, theta, output
-
-
-def _held_by_lobes(model: SectorModel, start: State) -> State:
-    """Start of a search whose bore touches at the lobes only; a race does already."""
-    if model.race is not None:
-        return start
-    points = model.bore_points(start)
-    angle = np.arctan2(-points[..., 0], points[..., 1]) - start.wave_generator_angle
-    return replace(start, touching=np.cos(model.lobes * angle) > AT_LOBE)

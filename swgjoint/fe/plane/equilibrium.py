@@ -73,8 +73,6 @@ class NewtonSolver:
     """Increment below which the next iteration keeps the tangent and its factor, unless
     the contact of the bore changes [m]; zero computes every tangent. The remaining
     error is the last increment times the relative change of the tangent."""
-    close_below: float = np.inf
-    """Applied increment below which stations of the bore may come into contact [m]."""
     stride: float = 0.1
     """Largest increment that is applied in one iteration, in lobe heights [-]; the
     contacts would change within a larger one."""
@@ -165,7 +163,6 @@ class NewtonSolver:
                     step,
                     damping,
                     one_at_a_time=repeats,
-                    may_close=damping * step.largest < self.close_below,
                 )
                 tolerance = self.step_tolerance
                 if state.contacts is not None and touch_twice(state.contacts):
@@ -224,7 +221,6 @@ def _advance(
     damping: float,
     *,
     one_at_a_time: bool,
-    may_close: bool,
 ) -> tuple[State, bool]:
     """State after a step: moved nodes, new tooth forces, updated bore contact.
 
@@ -233,8 +229,6 @@ def _advance(
     """
     after = linear.gap + damping * (step.gap - linear.gap)
     bad = _wrong_stations(state, after)
-    if not may_close:
-        bad &= state.touching
     # if all stations opened, the rim would spring back: release the worst one only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
         wrong = np.where(state.touching, after, -after)

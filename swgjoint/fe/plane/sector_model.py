@@ -28,7 +28,7 @@ from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
 from swgjoint.typing import Array, Index
 
 AT_LOBE = 0.9
-"""Cosine of the lobes times the angle from the major axis above which the bore is held
+"""Cosine of twice the angle from the major axis above which bore nodes touch the race
 at the start of a search [-]."""
 
 
