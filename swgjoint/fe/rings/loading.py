@@ -34,6 +34,9 @@ the rim [-]."""
 TURNS = 3
 """Largest number of rotations to the teeth: the rim deforms while it turns, so that the
 first one may end before them."""
+SHORT_STEPS = ThinRingSolver(stride=0.02, max_iterations=400)
+"""Solver where Newton's method at a prescribed rotation fails: with longer steps, which
+no potential limits, the contacts of balls and bore can change forever."""
 HALVINGS = 5
 """Largest number of times that failing torque steps are halved."""
 
@@ -64,8 +67,11 @@ def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> ThinRin
     """
     start = initial_state(model, alpha, phase)
     solver, psi = ThinRingSolver(), start.rotation
-    state = solver(model, start, rotation=psi, teeth=False)
-    return solver(model, state, rotation=psi) if state.outcome.ok else state
+    apart = solver(model, start, rotation=psi, teeth=False)
+    if not apart.outcome.ok:
+        return apart
+    state = solver(model, apart, rotation=psi)
+    return state if state.outcome.ok else SHORT_STEPS(model, apart, rotation=psi)
 
 
 def without_torque(model: ThinRing, alpha: float) -> ThinRingState:

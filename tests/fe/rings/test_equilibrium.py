@@ -15,6 +15,7 @@ from swgjoint.fe.rings.equilibrium import ThinRingSolver, rim_rotation
 from swgjoint.fe.rings.friction import friction_path
 from swgjoint.fe.rings.loading import positions, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
+from swgjoint.fe.rings.passage import ball_passage
 from swgjoint.fe.rings.state import initial_state
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.neutral_line import NeutralLine
@@ -399,3 +400,22 @@ def test_what_the_model_lacks_is_refused(changes, message):
     design = Design.load("size-25-100").with_changes(changes)
     with pytest.raises(DesignError, match=naming("size-25-100", *message)):
         thin_ring(design)
+
+
+@pytest.mark.parametrize("clearance", [8.8, 8.9])
+def test_a_held_output_is_reached_in_short_steps_too(clearance):
+    """Whole steps change contacts forever; the equilibrium is that of another way."""
+    changes = {"wave_generator.bearing.clearance_um": clearance}
+    design = Design.preset("size-25-100-bought").with_changes(changes)
+    model, alpha = thin_ring(design), 102.49066567190943
+    passage = ball_passage(design, model)
+    cage = -passage.carried_as / passage.per_cage_turn
+    found = solve_unloaded(model, alpha, (cage - model.cage_lag) * alpha)
+    assert found.outcome.ok
+    solver = ThinRingSolver()
+    free = solver(model, found, torque=0.0)
+    again = solver(model, free, rotation=found.rotation)
+    assert free.outcome.ok and again.outcome.ok
+    assert abs(free.rotation - found.rotation) > 1e-6
+    np.testing.assert_allclose(again.q, found.q, rtol=0.0, atol=1e-12)
+    assert again.torque == pytest.approx(found.torque, rel=1e-6)
