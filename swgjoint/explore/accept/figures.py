@@ -138,6 +138,11 @@ def stiffness(log: BenchLog, bench: Bench) -> Figures:
     K1, K2, K3 = (loop.stiffness(low, high) for low, high in pairwise(limits))
     light = LIGHT * r.rated_torque
     width = _branch(loop, light, rising=False) - _branch(loop, -light, rising=True)
+    if np.isnan(width):
+        raise InputError(
+            f"{log.where}: the torque does not come to zero from both sides; accepted:"
+            " a loop that ends at least where it began"
+        )
     return {
         "K1_Nm_rad": {"": K1},
         "K2_Nm_rad": {"": K2},
