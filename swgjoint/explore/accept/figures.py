@@ -117,8 +117,8 @@ def efficiency(log: BenchLog, bench: Bench) -> Figures:
         work = float(bench.ratio * motor[part].mean())
         if work == 0.0:
             raise InputError(
-                f"{log.where}: motor_torque_Nm is 0 N·m at {speed}; accepted: the torque"
-                " that drives the load"
+                f"{log.where}: motor_torque_Nm is 0 N·m at {speed}; accepted: the"
+                " torque that drives the load"
             )
         found[speed] = 100.0 * float(output[part].mean()) / work
     return {"efficiency_percent": found}
