@@ -7,6 +7,7 @@ import warnings
 import zipfile
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from fmi3 import Fmu
@@ -100,6 +101,38 @@ def follow(fmu, torques, h):
         assert fmu.step(k * h, h), fmu.said
         found.append(fmu.get(*STATES))
     return np.array(found)
+
+
+BENCH = """<mujoco><option timestep="{h}" gravity="0 0 0"/><worldbody><body>
+<joint name="link" axis="0 0 1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="{load} {load} {load}"/>
+</body></worldbody></mujoco>"""
+
+
+def test_angles_of_mujoco_are_half_a_step_ahead(synthetic_map, tmp_path):
+    """The angles of an FMU are those of its times, and the speeds of both agree."""
+    h, n, torque = 2e-4, 1000, 0.015
+    spec = mujoco.MjSpec.from_string(BENCH.format(h=h, load=LOAD))
+    options = {"joint": "link", "drive": synthetic_map, "rotor_inertia": ROTOR}
+    rotor = swgjoint.attach(spec, **options, rotor="lumped").rotor
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    names_of = (rotor, "link")
+    data.joint(rotor).qfrc_applied[:] = torque
+    theirs = []
+    for _ in range(n):
+        mujoco.mj_step(model, data)
+        theirs.append([getattr(data.joint(j), k)[0] for k in ("qpos", "qvel")
+                       for j in names_of])  # fmt: skip
+    fmu = fmu_of(synthetic_map, tmp_path, by_steps=True, step=h)
+    assert fmu.start()
+    ours = follow(fmu, [(torque, 0.0)] * n, h)
+    angle, speed = np.hsplit(np.array(theirs), 2)
+    size = np.abs(angle).max(axis=0)
+    apart = np.abs(ours[:, :2] - angle).max(axis=0) / size
+    shifted = np.abs(ours[:, :2] - (angle - 0.5 * h * speed)).max(axis=0) / size
+    assert (apart > 5e-4).all() and (shifted < 1e-11).all()
+    np.testing.assert_allclose(ours[:, 2:], speed, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("varies", [True, False])
