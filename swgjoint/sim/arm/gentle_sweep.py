@@ -127,15 +127,12 @@ def _poses(
     poses.setdefault(MIDDLE, (None, angles(middle)))
     if chosen is None:
         names = [*first, REFERENCE, MIDDLE]
+    elif chosen == HOME and HOME not in poses:
+        names = first or [REFERENCE]
+    elif chosen in poses:
+        names = [chosen]
     else:
-        if chosen == HOME and HOME not in poses:
-            names = first or [REFERENCE]
-        elif chosen in poses:
-            names = [chosen]
-        else:
-            raise InputError(
-                f"{arm.path}: pose {chosen!r}; accepted: {', '.join(poses)}"
-            )
+        raise InputError(f"{arm.path}: pose {chosen!r}; accepted: {', '.join(poses)}")
     return [(name, *poses[name]) for name in dict.fromkeys(names)]
 
 

@@ -8,7 +8,6 @@ from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
 
-Positive = Annotated[float, Field(gt=0)]
 Seconds = Annotated[float, Field(ge=0, le=10_000)]
 Degrees = Annotated[float, Field(ge=-3_600, le=3_600)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]

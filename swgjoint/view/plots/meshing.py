@@ -74,8 +74,7 @@ def quick_look_picture(looks: Mapping[str, QuickLook]) -> bytes:
     figure = Figure(figsize=(8.4, 6.4))
     figure.set_layout_engine("constrained", hspace=0.06)
     (torsion, error), (orders, stress) = figure.subplots(2, 2)
-    shares = zip(looks.items(), _COLOURS, strict=False)
-    for k, ((label, look), colour) in enumerate(shares):
+    for (label, look), colour in zip(looks.items(), _COLOURS, strict=False):
         prefix = f"{label}, " if label else ""
         torsion.plot(
             look.torque, look.torsion / arcmin, ".-", color=colour, label=label or None
@@ -96,7 +95,7 @@ def quick_look_picture(looks: Mapping[str, QuickLook]) -> bytes:
                 error.plot(
                     x, values, style, marker=".", color=colour, label=f"{prefix}{text}"
                 )
-        _orders(orders, look, k, len(looks), colour, prefix)
+        _orders(orders, look, colour, prefix)
         values = look.stress["von_mises"] / 1e6
         stress.plot(
             look.stress_angle / deg, values, ".-", color=colour, label=label or None
@@ -123,9 +122,7 @@ def quick_look_picture(looks: Mapping[str, QuickLook]) -> bytes:
     return png(figure, dpi=110)
 
 
-def _orders(
-    ax: Any, look: QuickLook, k: int, count: int, colour: str, prefix: str
-) -> None:
+def _orders(ax: Any, look: QuickLook, colour: str, prefix: str) -> None:
     """Draw the strongest orders as stems beside each other, rated load filled."""
     label: str | None = prefix.removesuffix(", ") or None
     for key, face in (("rated", colour), ("no_load", "white")):
