@@ -25,6 +25,7 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.control import feedforward
+from swgjoint.sim.controller import Task
 from swgjoint.sim.scene.task import task_of
 from swgjoint.typing import Array
 from swgjoint.units import arcmin, mm
@@ -94,40 +95,17 @@ class ArmCore(Core):
             ]
         ).T
         check_strength(assembly, self.payloads, np.minimum(momentary, ratcheting))
-        ratio, start = np.abs(task.joints.ratio), task.position[0]
-        one = np.ones(len(drives))
+        ratio = np.abs(task.joints.ratio)
         self.authority = s.authority_of_rated * rated / ratio
         """Largest added motor torques [N·m]. Shape (n_joints,)."""
         self._paths: ArmPaths | None = None
         if s.kinds:
-            self._instants = Instants(task.period * np.arange(steps + 1.0))
-            self._paths = ArmPaths(
-                assembly.arm,
-                start,
-                self._instants,
-                kinds=s.kinds,
-                max_speed=s.max_speed_rad_s,
-                max_angle=s.max_angle_rad,
-                max_acceleration=s.max_acceleration,
-                max_distance=s.max_distance_mm * mm,
-            )
-            low, high = start - s.max_angle_rad, start + s.max_angle_rad
-            self._tops = s.max_speed_rad_s * one, s.max_acceleration * one
+            low, high = self._prepare_drawn_paths(task, steps)
             # an episode ends before a drive carries more
             self._top_torque = float(momentary.max())
         else:
             steps = min(steps, len(task.position) - 1)
-            part = slice(0, steps + 1)
-            motion = task.position[part], task.velocity[part], task.acceleration[part]
-            self._path = self._rows(
-                motion,
-                task.link_torque[part],
-                assembly.feedforward[:: assembly.sub_steps][part],
-            )
-            path = self._path
-            low, high = path[:, 0].min(axis=0), path[:, 0].max(axis=0)
-            self._tops = np.abs(path[:, 1]).max(axis=0), np.abs(path[:, 2]).max(axis=0)
-            self._top_torque = float(np.abs(path[:, 4]).max())
+            low, high = self._prepare_path(task, steps)
         super().__init__(
             plant,
             joints=task.joints,
@@ -156,6 +134,37 @@ class ArmCore(Core):
             shared=self._paths is None,
             plan_rows=ROWS,
         )
+
+    def _prepare_drawn_paths(self, task: Task, steps: int) -> tuple[Array, Array]:
+        """Prepare to draw paths, and return the bounds of their link angles [rad]."""
+        s, start = self.settings, task.position[0]
+        self._instants = Instants(task.period * np.arange(steps + 1.0))
+        self._paths = ArmPaths(
+            self._assembly.arm,
+            start,
+            self._instants,
+            kinds=s.kinds,
+            max_speed=s.max_speed_rad_s,
+            max_angle=s.max_angle_rad,
+            max_acceleration=s.max_acceleration,
+            max_distance=s.max_distance_mm * mm,
+        )
+        one = np.ones(len(start))
+        self._tops = s.max_speed_rad_s * one, s.max_acceleration * one
+        return start - s.max_angle_rad, start + s.max_angle_rad
+
+    def _prepare_path(self, task: Task, steps: int) -> tuple[Array, Array]:
+        """Plan the path of the scene, and return the bounds of its angles [rad]."""
+        assembly, part = self._assembly, slice(0, steps + 1)
+        motion = task.position[part], task.velocity[part], task.acceleration[part]
+        self._path = path = self._rows(
+            motion,
+            task.link_torque[part],
+            assembly.feedforward[:: assembly.sub_steps][part],
+        )
+        self._tops = np.abs(path[:, 1]).max(axis=0), np.abs(path[:, 2]).max(axis=0)
+        self._top_torque = float(np.abs(path[:, 4]).max())
+        return path[:, 0].min(axis=0), path[:, 0].max(axis=0)
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
         """Entries of observation and action."""
