@@ -21,7 +21,8 @@ from swgjoint.bench.fe.setting import (
     rim_shape,
 )
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.common.following import AnyState, Follower
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.layout_angles import AnyState
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import can_halve, sector_model
 from swgjoint.fe.plane.sector_model import SectorModel

@@ -5,23 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from math import pi
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.increments import HALVINGS, follow
 from swgjoint.fe.common.influence import Influence
+from swgjoint.fe.common.layout_angles import AnyState, LayoutAngles
 from swgjoint.typing import Array
-
-if TYPE_CHECKING:
-    from swgjoint.fe.plane.state import State
-    from swgjoint.fe.solid.state import SolidState
-
 
 TAKE_UP = 150
 """Largest rotation of the output in search of contact, in hundredths of a pitch [-]."""
-
-AnyState = TypeVar("AnyState", "State", "SolidState")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,11 +38,9 @@ _FREE_OR_ALTERNATING = (
 """Outcomes of an unloaded drive whose output may be free in a clearance."""
 
 
-class Follower(ABC, Generic[AnyState]):
+class Follower(ABC, LayoutAngles[AnyState]):
     """Continuation of equilibria, with halved steps where a solve fails."""
 
-    ratio: float
-    """Signed gear ratio i [-]."""
     loads_free_output: ClassVar[bool] = False
     """Whether :meth:`load` turns a free output until its teeth resist."""
 
@@ -56,18 +48,6 @@ class Follower(ABC, Generic[AnyState]):
     @abstractmethod
     def teeth(self) -> int:
         """Number of teeth of the flexspline."""
-
-    @abstractmethod
-    def input_angle(self, state: AnyState) -> float:
-        """Input angle theta [rad]."""
-
-    @abstractmethod
-    def input_torque(self, state: AnyState) -> float:
-        """External torque on the input [N·m]."""
-
-    @abstractmethod
-    def output_angle(self, state: AnyState) -> float:
-        """Output angle psi [rad]."""
 
     @abstractmethod
     def deflect(self, angle: float = 0.0) -> AnyState:
@@ -102,6 +82,22 @@ class Follower(ABC, Generic[AnyState]):
         """Equilibrium with the output held in place; the torque is a result."""
 
     @abstractmethod
+    def move(
+        self,
+        state: AnyState,
+        alpha: float,
+        rotation: float,
+        circular_spline_rotation: float,
+    ) -> AnyState:
+        """State at other angles; its displacement field stays on the wave generator.
+
+        Args:
+            state: State to start from.
+            alpha: New angle of the wave generator [rad].
+            rotation: New rotation of the flexspline [rad].
+            circular_spline_rotation: New rotation of the circular spline [rad].
+        """
+
     def predict(self, state: AnyState, angle: float) -> AnyState:
         """Predicted state after input and output have turned by the ideal ratio.
 
@@ -109,6 +105,16 @@ class Follower(ABC, Generic[AnyState]):
             state: State to start from.
             angle: New input angle [rad].
         """
+        was, now = self.ideal_angles(self.input_angle(state)), self.ideal_angles(angle)
+        alpha, rotation, circular_spline_rotation = (
+            y - x for x, y in zip(was, now, strict=True)
+        )
+        return self.move(
+            state,
+            state.wave_generator_angle + alpha,
+            state.rotation + rotation,
+            state.circular_spline_rotation + circular_spline_rotation,
+        )
 
     def extrapolate(self, state: AnyState, earlier: AnyState, angle: float) -> AnyState:
         """Start of a search at another input angle, from the trend up to a state.
@@ -135,7 +141,6 @@ class Follower(ABC, Generic[AnyState]):
         """
         return self
 
-    @abstractmethod
     def rotate_output(self, state: AnyState, output: float) -> AnyState:
         """Predicted state after the output has turned at a fixed input.
 
@@ -143,6 +148,10 @@ class Follower(ABC, Generic[AnyState]):
             state: State to start from.
             output: New output angle [rad].
         """
+        alpha = state.wave_generator_angle
+        if self.circular_spline_is_output:
+            return self.move(state, alpha, state.rotation, output)
+        return self.move(state, alpha, output, state.circular_spline_rotation)
 
     def predicted_changes(
         self, state: AnyState, low: float, high: float

@@ -15,7 +15,8 @@ from swgjoint.fe.common.clearance import FAINT
 from swgjoint.fe.common.columns.angle_columns import AngleColumn, SolvedColumns
 from swgjoint.fe.common.columns.torque_choice import Ripple, no_ripple, unseen_places
 from swgjoint.fe.common.columns.torque_columns import ColumnGrid
-from swgjoint.fe.common.following import AnyState, Follower
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.layout_angles import AnyState
 from swgjoint.maps.fit.between_angles import even_steps, with_mirrored_torques
 from swgjoint.maps.fit.contact_corners import ContactCorners
 from swgjoint.maps.samples import FullSolves

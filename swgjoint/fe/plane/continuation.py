@@ -44,34 +44,9 @@ class Continuation(Follower[State]):
     """Solver of the equilibria."""
 
     @property
-    def circular_spline_is_output(self) -> bool:
-        """Whether the circular spline is the output."""
-        return self.layout != "circular_spline_fixed"
-
-    @property
     def teeth(self) -> int:
         """Number of teeth of the flexspline."""
         return self.model.element.sectors
-
-    def input_angle(self, state: State) -> float:
-        """Input angle theta [rad]."""
-        if self.layout == "wave_generator_fixed":
-            return state.rotation
-        return state.wave_generator_angle
-
-    def input_torque(self, state: State) -> float:
-        """External torque on the input [N·m]."""
-        if self.layout == "wave_generator_fixed":
-            return state.holding_torque
-        return state.wave_generator_torque
-
-    def output_angle(self, state: State) -> float:
-        """Output angle psi [rad]."""
-        return (
-            state.circular_spline_rotation
-            if self.circular_spline_is_output
-            else state.rotation
-        )
 
     def deflect(self, angle: float = 0.0) -> State:
         """Rim deflected at the ideal member angles, without tooth contact.
@@ -79,7 +54,7 @@ class Continuation(Follower[State]):
         Args:
             angle: Input angle [rad].
         """
-        alpha, rotation, circular_spline_rotation = self._ideal(angle)
+        alpha, rotation, circular_spline_rotation = self.ideal_angles(angle)
         start = self.model.initial_guess(alpha, rotation)
         load = Load(rotation=rotation, teeth=False)
         state = self.solver(self.model, start, load)
@@ -126,36 +101,23 @@ class Continuation(Follower[State]):
             return replace(held, torque=-held.tooth_moment)
         return held
 
-    def rotate_output(self, state: State, output: float) -> State:
-        """Predicted state after the output has turned at a fixed input.
+    def move(
+        self,
+        state: State,
+        alpha: float,
+        rotation: float,
+        circular_spline_rotation: float,
+    ) -> State:
+        """State at other angles; its displacement field stays on the wave generator.
 
         Args:
             state: State to start from.
-            output: New output angle [rad].
+            alpha: New angle of the wave generator [rad].
+            rotation: New rotation of the flexspline [rad].
+            circular_spline_rotation: New rotation of the circular spline [rad].
         """
-        alpha = state.wave_generator_angle
-        if self.circular_spline_is_output:
-            return self.model.predict_field(state, alpha, state.rotation, output)
         return self.model.predict_field(
-            state, alpha, output, state.circular_spline_rotation
-        )
-
-    def predict(self, state: State, angle: float) -> State:
-        """Predicted state after input and output have turned by the ideal ratio.
-
-        Args:
-            state: State to start from.
-            angle: New input angle [rad].
-        """
-        was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
-        alpha, rotation, circular_spline_rotation = (
-            y - x for x, y in zip(was, now, strict=True)
-        )
-        return self.model.predict_field(
-            state,
-            state.wave_generator_angle + alpha,
-            state.rotation + rotation,
-            state.circular_spline_rotation + circular_spline_rotation,
+            state, alpha, rotation, circular_spline_rotation
         )
 
     def predicted_changes(
@@ -207,12 +169,3 @@ class Continuation(Follower[State]):
             circular_spline_tooth_shift=circular_spline,
         )
         return replace(self, model=model)
-
-    def _ideal(self, theta: float) -> tuple[float, float, float]:
-        """Ideal angles of wave generator, flexspline and circular spline [rad]."""
-        output = theta / self.ratio
-        if self.layout == "circular_spline_fixed":
-            return theta, output, 0.0
-        if self.layout == "flexspline_fixed":
-            return theta, 0.0, output
-        return 0.0, theta, output

@@ -19,7 +19,7 @@ from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tangent import SolidTangent
 from swgjoint.fe.solid.tolerance_influence import influence
-from swgjoint.gear.kinematics import Layout, member_angles
+from swgjoint.gear.kinematics import Layout
 from swgjoint.typing import Array
 
 
@@ -47,38 +47,13 @@ class SolidContinuation(Follower[SolidState]):
         """Number of teeth of the flexspline."""
         return self.model.strip.sectors
 
-    @property
-    def circular_spline_is_output(self) -> bool:
-        """Whether the circular spline is the output."""
-        return self.layout != "circular_spline_fixed"
-
-    def input_angle(self, state: SolidState) -> float:
-        """Input angle theta [rad]."""
-        if self.layout == "wave_generator_fixed":
-            return state.rotation
-        return state.wave_generator_angle
-
-    def input_torque(self, state: SolidState) -> float:
-        """External torque on the input [N·m]."""
-        if self.layout == "wave_generator_fixed":
-            return state.holding_torque
-        return state.wave_generator_torque
-
-    def output_angle(self, state: SolidState) -> float:
-        """Output angle psi [rad]."""
-        return (
-            state.circular_spline_rotation
-            if self.circular_spline_is_output
-            else state.rotation
-        )
-
     def deflect(self, angle: float = 0.0) -> SolidState:
         """Equilibrium of the flexspline on the wave generator, without tooth contact.
 
         Args:
             angle: Input angle [rad]; all members are at the angles of the ideal ratio.
         """
-        alpha, rotation, circular_spline_rotation = self._ideal(angle)
+        alpha, rotation, circular_spline_rotation = self.ideal_angles(angle)
         start = self.model.initial_guess(alpha, rotation)
         load = SolidLoad(rotation=rotation, teeth=False)
         state = self.solver(self.model, start, load)
@@ -104,41 +79,6 @@ class SolidContinuation(Follower[SolidState]):
         if self.circular_spline_is_output:
             return replace(fixed, torque=-fixed.tooth_moment)
         return fixed
-
-    def rotate_output(self, state: SolidState, output: float) -> SolidState:
-        """Predict a state with a rotated output.
-
-        The input does not move, and the displacement field stays on the wave generator.
-
-        Args:
-            state: Equilibrium from which the prediction starts.
-            output: New output angle [rad].
-        """
-        alpha = state.wave_generator_angle
-        if self.circular_spline_is_output:
-            return self._moved(state, alpha, state.rotation, output)
-        return self._moved(state, alpha, output, state.circular_spline_rotation)
-
-    def predict(self, state: SolidState, angle: float) -> SolidState:
-        """Predict the state at another input angle.
-
-        The displacement field moves with the wave generator, and the members rotate at
-        the ideal ratio.
-
-        Args:
-            state: Equilibrium from which the prediction starts.
-            angle: New input angle [rad].
-        """
-        was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
-        alpha, rotation, circular_spline_rotation = (
-            y - x for x, y in zip(was, now, strict=True)
-        )
-        return self._moved(
-            state,
-            state.wave_generator_angle + alpha,
-            state.rotation + rotation,
-            state.circular_spline_rotation + circular_spline_rotation,
-        )
 
     def near(self, state: SolidState) -> SolidContinuation:
         """Solver for equilibria close to a given one, from whose tangent they start."""
@@ -195,18 +135,21 @@ class SolidContinuation(Follower[SolidState]):
         )
         return replace(self, model=replace(self.model, teeth=teeth))
 
-    def _ideal(self, theta: float) -> tuple[float, float, float]:
-        """Ideal angles of wave generator, flexspline and circular spline [rad]."""
-        return member_angles(self.layout, theta, theta / self.ratio)
-
-    def _moved(
+    def move(
         self,
         state: SolidState,
         alpha: float,
         rotation: float,
         circular_spline_rotation: float,
     ) -> SolidState:
-        """State at other angles; its displacement field stays on the wave generator."""
+        """State at other angles; its displacement field stays on the wave generator.
+
+        Args:
+            state: State to start from.
+            alpha: New angle of the wave generator [rad].
+            rotation: New rotation of the flexspline [rad].
+            circular_spline_rotation: New rotation of the circular spline [rad].
+        """
         # motion of the wave generator relative to the flexspline, in sectors
         model, strip = self.model, self.model.strip
         d_alpha = alpha - state.wave_generator_angle

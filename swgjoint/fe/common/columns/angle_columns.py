@@ -15,7 +15,8 @@ import numpy as np
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.columns.turning import Turning
 from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.common.following import AnyState, Follower, Unloaded
+from swgjoint.fe.common.following import Follower, Unloaded
+from swgjoint.fe.common.layout_angles import AnyState
 from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.fe.common.state_arrays import copy_contiguous, pack_solve, unpack_solve
 from swgjoint.maps.samples import FullSolves

@@ -19,7 +19,7 @@ from swgjoint.fe.common.columns.torque_choice import (
     unseen_parts,
 )
 from swgjoint.fe.common.contact_changes import ContactChanges
-from swgjoint.fe.common.following import AnyState
+from swgjoint.fe.common.layout_angles import AnyState
 from swgjoint.fe.common.load_path import LoadPath, least_certain
 from swgjoint.maps.fit.between_angles import (
     doubt_between,

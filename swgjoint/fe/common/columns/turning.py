@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic
 
-from swgjoint.fe.common.following import AnyState, Follower
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.layout_angles import AnyState
 
 SHARED = 4
 """Number of angles after an equilibrium at which searches under the same torque start

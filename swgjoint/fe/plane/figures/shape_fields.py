@@ -14,7 +14,7 @@ from math import gcd, pi
 
 import numpy as np
 
-from swgjoint.fe.common.following import AnyState
+from swgjoint.fe.common.layout_angles import AnyState
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.elasticity import stress_maxima
 from swgjoint.fe.plane.sector_mesh import SectorMesh
