@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.meshing_phases import default_steps, overload
+from swgjoint.fe.meshing_phases import overload
 from swgjoint.fe.meshing_run import Position, Positions
 from swgjoint.fe.plane.stress import KINDS
 from swgjoint.fe.solid.checkpoint import Checkpoint
@@ -27,7 +27,7 @@ from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import series_compliance, springs_of
-from swgjoint.progress import Progress, silent
+from swgjoint.progress import Progress
 from swgjoint.units import deg
 
 
@@ -145,23 +145,23 @@ def simulate_solid_meshing(
     design: Design,
     *,
     torque: float,
-    steps: int | None = None,
-    turn: float = 0.5,
-    nonlinear: bool = True,
-    half: bool = False,
-    elastic_circular_spline: bool = True,
-    throw: bool = True,
-    progress: Progress = silent,
-    keep: Path | None = None,
-    resume: bool = False,
+    steps: int,
+    turn: float,
+    nonlinear: bool,
+    half: bool,
+    elastic_circular_spline: bool,
+    throw: bool,
+    progress: Progress,
+    keep: Path | None,
+    resume: bool,
 ) -> SolidRun:
-    """Simulate meshing in 3D, as :func:`swgjoint.fe.meshing.simulate_meshing` in 2D.
+    """Simulate meshing in 3D, see :func:`swgjoint.fe.meshing.simulate_meshing`.
 
     Args:
         design: The drive, with a ``[cup]``.
         torque: Torque T of the output on its load [N·m].
         steps: Number of positions of the input, at k turn/steps with k = 0 to
-            steps - 1; None for :func:`swgjoint.fe.meshing_phases.default_steps`.
+            steps - 1.
         turn: Rotation of the input that the positions divide [turns].
         nonlinear: Whether segments may rotate by large angles.
         half: Whether to use the half model, which requires a drive that is symmetric
@@ -185,8 +185,6 @@ def simulate_solid_meshing(
     """
     begin = time.perf_counter()
     check_modelled(design)
-    if steps is None:
-        steps = default_steps(design, turn)
     kept = None
     if keep is not None:
         settings = {

@@ -137,7 +137,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
             )
     # below the rated torque, tooth errors turn the output as far as the load does
     least = 0.0 if toleranced is None else samples.ratings.rated_torque
-    stiffness = _stiffness(drive, solved, offset, wrong, least)
+    stiffness = _stiffness(drive, solved, wrong, least)
     if stiffness is not None:
         record[STIFFNESS] = stiffness
     if samples.shortfall and toleranced is None:
@@ -183,7 +183,7 @@ def _at_torque(torques: Array, heights: Array, torque: float) -> list[float]:
 
 
 def _stiffness(
-    drive: Potential, solved: FullSolves, offset: float, wrong: Array, least: float
+    drive: Potential, solved: FullSolves, wrong: Array, least: float
 ) -> dict[str, float] | None:
     """Largest relative difference of the secant stiffness.
 
