@@ -73,21 +73,3 @@ def _at_end() -> tuple[Array, Array]:
             )
         condition[row, 2] = fall[4]
     return known, condition
-
-
-def evaluate(breaks: Array, pieces: Array, at: Array) -> Array:
-    """Value and two derivatives of a chain of quartics at points inside it.
-
-    Args:
-        breaks: Breakpoints from :func:`quartic_chain`. Shape (m + 1,).
-        pieces: Coefficients from :func:`quartic_chain`. Shape (m, 5).
-        at: Points. Shape (n,).
-
-    Returns:
-        Value, slope and second derivative. Shape (3, n).
-    """
-    k = np.clip(np.searchsorted(breaks, at, side="right") - 1, 0, len(pieces) - 1)
-    a, x = pieces[k].T, at - breaks[k]
-    value = a[0] + x * (a[1] + x * (a[2] + x * (a[3] + x * a[4])))
-    slope = a[1] + x * (2 * a[2] + x * (3 * a[3] + x * 4 * a[4]))
-    return np.stack([value, slope, 2 * a[2] + x * (6 * a[3] + x * 12 * a[4])])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fe_tooth_motion import conjugate_by_fe, deflected_rim
 
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
-from swgjoint.fe.plane.figures.tooth_motion import conjugate_by_fe, deflected_rim
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.neutral_line import neutral_line

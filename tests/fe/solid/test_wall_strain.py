@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harmonic_response import HarmonicResponse, finite_element_strain
 
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.figures.deflected_wall import deflected_strain, wall_orders
-from swgjoint.fe.solid.figures.wall_strain import (
-    HarmonicResponse,
-    finite_element_strain,
-)
 from swgjoint.fe.solid.strip.mesh import flexspline_strip
 from swgjoint.fe.solid.strip.smooth_strip import smooth_strip
 from swgjoint.fe.solid.strip.strip import flexspline

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.drive3d import solid_sector_model
-from swgjoint.fe.solid.figures.wall_strain import FIRST, cylindrical_strain
 from swgjoint.fe.solid.sector_model import SolidSectorModel
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
+from swgjoint.fe.solid.strip.elasticity import COLUMNS, ROWS
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.material import Material
 from swgjoint.gear.gauges import FlexsplineWall, WallStrain
@@ -24,6 +25,8 @@ from swgjoint.maps.cache import recall
 from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array, Complex
 
+FIRST = 1e-9
+"""Tolerance on positions of nodes [m]."""
 HIGHEST = 36
 """Highest order around the flexspline [-]; contact makes higher orders than the outline
 of the wave generator has."""
@@ -124,3 +127,29 @@ def wall_orders(
             found[float(x)] = np.where(np.asarray(orders) > 0, 2.0, 1.0)[:, None] * mean
     x = np.array(sorted(found))
     return x, np.array([found[one] for one in x.tolist()])
+
+
+def cylindrical_strain(stress: Complex, phi: Array, material: Material) -> Complex:
+    """Circumferential, axial and shear strain from stress (n, 3) [-].
+
+    The shear is positive for a circumferential displacement that grows towards the
+    open end, which is against z.
+
+    Args:
+        stress: Stress xx, yy, zz, xy, yz, zx in the frame of a tooth (n, 6) [Pa].
+        phi: Angles around the flexspline in this frame (n,) [rad].
+        material: Material of the flexspline.
+
+    Returns:
+        Circumferential, axial and shear strain (n, 3) [-].
+    """
+    tensor = np.empty((len(stress), 3, 3), complex)
+    for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
+        tensor[:, i, j] = tensor[:, j, i] = stress[:, k]
+    local = about_z(-phi) @ tensor @ about_z(phi)
+    # at angle zero, x is against the circumferential direction and y points outwards
+    around, out, along = local[:, 0, 0], local[:, 1, 1], local[:, 2, 2]
+    modulus, poisson = material.youngs_modulus, material.poisson_ratio
+    shear = 2.0 * (1.0 + poisson) / modulus * local[:, 0, 2]
+    hoop = (around - poisson * (out + along)) / modulus
+    return np.stack([hoop, (along - poisson * (out + around)) / modulus, shear], -1)

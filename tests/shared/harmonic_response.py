@@ -19,15 +19,12 @@ import numpy as np
 
 from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.strip.elasticity import COLUMNS, ROWS
+from swgjoint.fe.solid.figures.deflected_wall import FIRST, cylindrical_strain
 from swgjoint.fe.solid.strip.segment import StripSegment
 from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.gear.design.material import Material
 from swgjoint.gear.gauges import WallStrain
 from swgjoint.typing import Array, Complex, Index
-
-FIRST = 1e-9
-"""Tolerance on positions of nodes [m]."""
 
 
 def finite_element_strain(
@@ -203,29 +200,3 @@ def _outside_strains(
     return [
         (float(z), strain[np.abs(points[:, 2] - z) < FIRST].mean(axis=0)) for z in rows
     ]
-
-
-def cylindrical_strain(stress: Complex, phi: Array, material: Material) -> Complex:
-    """Circumferential, axial and shear strain from stress (n, 3) [-].
-
-    The shear is positive for a circumferential displacement that grows towards the
-    open end, which is against z.
-
-    Args:
-        stress: Stress xx, yy, zz, xy, yz, zx in the frame of a tooth (n, 6) [Pa].
-        phi: Angles around the flexspline in this frame (n,) [rad].
-        material: Material of the flexspline.
-
-    Returns:
-        Circumferential, axial and shear strain (n, 3) [-].
-    """
-    tensor = np.empty((len(stress), 3, 3), complex)
-    for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
-        tensor[:, i, j] = tensor[:, j, i] = stress[:, k]
-    local = about_z(-phi) @ tensor @ about_z(phi)
-    # at angle zero, x is against the circumferential direction and y points outwards
-    around, out, along = local[:, 0, 0], local[:, 1, 1], local[:, 2, 2]
-    modulus, poisson = material.youngs_modulus, material.poisson_ratio
-    shear = 2.0 * (1.0 + poisson) / modulus * local[:, 0, 2]
-    hoop = (around - poisson * (out + along)) / modulus
-    return np.stack([hoop, (along - poisson * (out + around)) / modulus, shear], -1)
