@@ -17,7 +17,7 @@ from swgjoint.fe.common.mesh_cycle import Effort, Pattern, solve_mesh_cycle
 from swgjoint.fe.label import label_of
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import in_plane, sector_model
-from swgjoint.fe.plane.equilibrium import MAP_SOLVER
+from swgjoint.fe.plane.equilibrium import map_solver
 from swgjoint.fe.plane.figures.shape_fields import (
     SectorFields,
     ShapeSurface,
@@ -359,13 +359,14 @@ def effort_of(
 
 def follower_in_plane(design: Design) -> Continuation:
     """Solver of the 2D drive that maps sample, without errors and friction."""
+    model = sector_model(
+        without_errors(design), half="auto", friction=False, cage_held=True
+    )
     return Continuation(
-        model=sector_model(
-            without_errors(design), half="auto", friction=False, cage_held=True
-        ),
+        model=model,
         ratio=design.ratio,
         layout=design.drive.layout,
-        solver=MAP_SOLVER,
+        solver=map_solver(model.lobe_height),
     )
 
 

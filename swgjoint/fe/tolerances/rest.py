@@ -12,7 +12,7 @@ from swgjoint.fe.common.following import Follower, Unloaded
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
-from swgjoint.fe.plane.equilibrium import MAP_SOLVER
+from swgjoint.fe.plane.equilibrium import map_solver
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_sector_model
 from swgjoint.fe.solid.sector_model import SolidSectorModel
@@ -51,9 +51,8 @@ def perfect_drive(
         solid = solid_sector_model(perfect, like=like)
         return SolidContinuation(model=solid, ratio=design.ratio, layout=layout)
     plane = sector_model(perfect, friction=False, bearing=bearing, cage_held=True)
-    return Continuation(
-        model=plane, ratio=design.ratio, layout=layout, solver=MAP_SOLVER
-    )
+    solver = map_solver(plane.lobe_height)
+    return Continuation(model=plane, ratio=design.ratio, layout=layout, solver=solver)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
