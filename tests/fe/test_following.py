@@ -9,6 +9,7 @@ import pytest
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.increments import HALVINGS
+from swgjoint.fe.common.sampling import follower_in_plane
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import sector_model
 from swgjoint.gear.design.design import Design
@@ -55,3 +56,18 @@ def test_a_reversed_torque_finds_the_flanks_of_the_other_side():
     follow = Continuation(model=model, ratio=design.ratio)
     loaded = follow.to_torque(follow.engage(follow.deflect()), 60.0)
     assert follow.load(loaded, -10.0, 0.0).outcome.ok
+
+
+@pytest.mark.fe
+def test_a_small_torque_finds_the_flanks_through_the_clearance_of_the_bearing():
+    """Balls change over from one side to the other within a hundredth of a pitch."""
+    design = Design.load("size-20-50").with_changes(
+        {"mesh.refinement": 0.5, "wave_generator.bearing.clearance_um": 7.6}
+    )
+    follow = follower_in_plane(design)
+    free = follow.engage(follow.deflect(1.3350411956776347))
+    against, along = (follow.to_torque(free, torque) for torque in (-0.3, 0.3))
+    for state, torque in ((against, -0.3), (along, 0.3)):
+        assert state.outcome.ok and state.torque == torque
+        assert len(state.tooth_force) > 0
+    assert follow.output_angle(along) < follow.output_angle(against)

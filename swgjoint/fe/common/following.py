@@ -353,9 +353,7 @@ class Follower(ABC, LayoutAngles[AnyState]):
         apart = 0.0
         resisted = state
         for k in range(1, TAKE_UP + 1):
-            resisted = self.hold_output(
-                self.rotate_output(resisted, first + direction * k * pitch / 100)
-            )
+            resisted = self._turned_to(resisted, first + direction * k * pitch / 100)
             if not resisted.outcome.ok:
                 return resisted
             if not is_free(resisted) and resisted.torque * torque > 0.0:
@@ -369,15 +367,23 @@ class Follower(ABC, LayoutAngles[AnyState]):
             if abs(resisted.torque) <= abs(torque):
                 break
             middle = 0.5 * (apart + reached)
-            nearer = self.hold_output(
-                self.rotate_output(resisted, first + direction * middle)
-            )
+            nearer = self._turned_to(resisted, first + direction * middle)
             held = nearer.outcome.ok and not is_free(nearer)
             if held and nearer.torque * torque > 0.0:
                 resisted, reached = nearer, middle
             else:
                 apart = middle
         return resisted
+
+    def _turned_to(self, state: AnyState, output: float) -> AnyState:
+        """Equilibrium with the output held at another angle, reached gradually."""
+        first = self.output_angle(state)
+
+        def step(s: AnyState, part: float) -> AnyState:
+            angle = first + part * (output - first)
+            return self.hold_output(self.rotate_output(s, angle))
+
+        return follow(state, step)
 
 
 def is_free(state: AnyState) -> bool:
