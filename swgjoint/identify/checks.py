@@ -56,6 +56,8 @@ note instead of a doubt [-].
 Encoder noise delays the hysteresis element, which the fit balances by negative damping
 of 0.05 to 0.2 % of the torque on simulated benches.
 """
+HIDDEN = 0.002
+"""Part of the rotor inertia that noise may hide in a recommended window [-]."""
 OVERLOAD = 20.0
 """Largest torque of a log relative to the rated torque [-]; the ratcheting torque of
 catalogue drives is at most 16 times the rated torque (``models/catalogue``)."""
@@ -283,6 +285,31 @@ def doubts_of(
             f" window of {1e3 * window:g} ms"
         )
     return lines
+
+
+def noise_doubts(
+    estimates: Mapping[str, Estimate], attenuation: float, window: float
+) -> list[str]:
+    """A doubt if noise of the motor angle moves the rotor inertia off its interval.
+
+    Args:
+        estimates: Estimates of all parameters by name.
+        attenuation: Part of the inertia that the noise hides [-].
+        window: Duration of an averaging window [s].
+    """
+    inertia = estimates.get("rotor_inertia")
+    if inertia is None:
+        return []
+    hidden = attenuation / max(1.0 - attenuation, 1e-3) * inertia.value
+    if hidden <= inertia.high - inertia.value:
+        return []
+    # the variance of noise in the accelerations falls with the fifth power
+    longer = window * (attenuation / HIDDEN) ** 0.2
+    share = min(attenuation, 1.0)
+    return [
+        f"noise of motor_angle lowers rotor_inertia by about {share:.0%}, which its"
+        f" interval does not include; use --window {longer:.2g} or longer"
+    ]
 
 
 def negative(

@@ -52,6 +52,7 @@ from swgjoint.flags import check_flags
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.gear.ratings import Ratings
+from swgjoint.identify.angle_noise import inertia_attenuation
 from swgjoint.identify.checks import (
     SMALL,
     SURE,
@@ -61,6 +62,7 @@ from swgjoint.identify.checks import (
     check_torsion,
     doubts_of,
     negative,
+    noise_doubts,
     remarks,
     without_skew,
 )
@@ -129,6 +131,8 @@ class Identified:
     """Effect of each parameter on the torques, relative to their rms [-]."""
     correlation: float
     """Correlation factor kappa of the covariance [-]."""
+    attenuation: float = 0.0
+    """Part of the rotor inertia that noise of the motor angle hides [-]."""
     skew: float = 0.0
     """Delay by which the link angles were corrected before this fit [s]; ``samples``
     contain the corrected angles."""
@@ -252,7 +256,8 @@ def _doubts_of(
     measured = result.model.measured_torques()
     left = {key: rms(r) / rms(measured[key]) for key, r in result.residuals.items()}
     units = [note for note in result.notes if "plausible: " in note]
-    return (*doubts_of(estimates, left, result.effects, result.model), *units)
+    noise = noise_doubts(estimates, result.attenuation, result.model.step)
+    return (*doubts_of(estimates, left, result.effects, result.model), *noise, *units)
 
 
 def _identified(log: BenchLog, options: _Options) -> Identified:
@@ -273,6 +278,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         return _without_element(why, log, options)
     drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
     effects = effects_of(model, values, residuals, jacobian)
+    motor = residuals.get("motor_torque")
     small = [line for line, size in negative(estimates, effects) if size <= SMALL]
     result = Identified(
         estimates=estimates,
@@ -282,6 +288,9 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         residuals=residuals,
         effects=effects,
         correlation=kappa,
+        attenuation=0.0
+        if motor is None
+        else inertia_attenuation(model, information, motor),
         notes=(*notes, *no_orders, *small, *remarks(model, drive, residuals)),
     )
     return replace(result, doubts=_doubts_of(result, estimates))

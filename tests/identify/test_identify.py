@@ -17,7 +17,13 @@ from swgjoint.cli.main import main
 from swgjoint.errors import InputError
 from swgjoint.identify.identification import identify
 from swgjoint.identify.least_squares import correlation_factor, rms
-from swgjoint.identify.log import BenchLog, mean_acceleration, mean_rate, read_log
+from swgjoint.identify.log import (
+    ACCELERATION_STENCIL,
+    BenchLog,
+    mean_acceleration,
+    mean_rate,
+    read_log,
+)
 from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
@@ -303,6 +309,37 @@ def test_angles_in_a_wrong_unit_are_doubted(bench, factor):
         "arcmin; plausible: 0.3 to 60 arcmin" in note and "check the units" in note
         for note in found.notes
     )
+
+
+@pytest.mark.parametrize("noise", [1.0, 5.0])
+def test_noise_that_lowers_the_inertia_is_doubted(bench, noise, monkeypatch):
+    """In short windows, by about as much as it does; not in the recommended window."""
+    drive, rows, _ = bench
+    options = settings(drive)
+    encoders = {key: NOISE[key] for key in ("motor_angle", "link_angle")}
+
+    def log_with(noise):  # of the encoders; that of the torques stays
+        for key, deviation in encoders.items():
+            monkeypatch.setitem(NOISE, key, noise * deviation)
+        return log_of(rows, np.random.default_rng(3))
+
+    clean, noisy = log_with(0.0), log_with(noise)
+    inertia = identify(clean, **options).estimates["rotor_inertia"].value
+    found = identify(noisy, **{**options, "window": 0.001})
+    (doubt,) = found.doubts
+    lowered = 1.0 - found.estimates["rotor_inertia"].value / inertia
+    assert lowered > 0.05 and found.attenuation == pytest.approx(lowered, rel=0.2)
+    assert names(doubt, "motor_angle lowers rotor_inertia", f"{found.attenuation:.0%}")
+    longer = float(doubt.split("--window ")[1].split()[0])
+    again = identify(noisy, **{**options, "window": longer})
+    assert not again.doubts
+    assert again.estimates["rotor_inertia"].value == pytest.approx(inertia, rel=0.02)
+
+
+def test_stencil_is_that_of_the_accelerations():
+    """The response to one mean that deviates."""
+    impulse = mean_acceleration(np.eye(9)[4], 0.5)
+    assert impulse[2:7] == pytest.approx(4.0 * ACCELERATION_STENCIL, rel=1e-12)
 
 
 def test_windows_too_long_for_the_kinematic_error_are_doubted(bench):
