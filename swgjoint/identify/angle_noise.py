@@ -13,21 +13,23 @@ from __future__ import annotations
 import numpy as np
 
 from swgjoint.identify.least_squares import covariance_of, rms
-from swgjoint.identify.log import ACCELERATION_STENCIL
+from swgjoint.identify.log import ACCELERATION_STENCIL, BenchLog
 from swgjoint.identify.model import Model
 from swgjoint.typing import Array
 
-_ORDER = 6  # differences of the means that leave their noise and none of the motion
+_ORDER = 6  # differences that leave noise and hardly any motion
 _TO_DEVIATION = 0.6745  # median of the absolute values of a unit normal distribution
 
 
-def inertia_attenuation(model: Model, information: Array, residual: Array) -> float:
+def inertia_attenuation(
+    log: BenchLog, model: Model, information: Array, residual: Array
+) -> float:
     """Part of the rotor inertia that noise of the motor angle hides [-].
 
-    Zero if the inertia is not estimated. The noise of the window means is assumed to be
-    white, and is estimated from their sixth differences.
+    Zero if the inertia is not estimated.
 
     Args:
+        log: The log, with the same number of samples in every window.
         model: The fitted model.
         information: Product of the weighted Jacobian and its transpose.
         residual: Measured minus modelled motor torque [N·m]. Shape (n,).
@@ -36,11 +38,25 @@ def inertia_attenuation(model: Model, information: Array, residual: Array) -> fl
     if "rotor_inertia" not in names:
         return 0.0
     at = names.index("rotor_inertia")
-    # of the acceleration, what other parameters cannot explain determines the inertia
+    # the part of the acceleration that no other parameter explains tells the inertia
     variance = rms(residual) ** 2 / covariance_of(information, 1.0)[at, at]
-    binomial = np.poly1d([1.0, -1.0]) ** _ORDER
-    differences = np.diff(model.samples.motor_angle, _ORDER)
-    deviation = float(np.median(np.abs(differences))) / _TO_DEVIATION
-    angle_variance = deviation**2 / float(binomial.coef @ binomial.coef)
-    noise = angle_variance * float(ACCELERATION_STENCIL @ ACCELERATION_STENCIL)
+    noise = _variance(log, model) * float(ACCELERATION_STENCIL @ ACCELERATION_STENCIL)
     return float(residual.size * noise / model.step**4 / variance)
+
+
+def _variance(log: BenchLog, model: Model) -> float:
+    """Variance of the noise in the window means of the motor angle [rad²].
+
+    The noise is assumed to be white. Fast motion looks like noise of the means, hardly
+    like noise of the samples; the smaller estimate counts.
+    """
+    means = model.samples.motor_angle
+    of_samples = _noise(log.motor_angle) * means.size / log.motor_angle.size
+    return min(_noise(means), of_samples)
+
+
+def _noise(angle: Array) -> float:
+    """Variance of white noise on an even motion, from its sixth differences [rad²]."""
+    binomial = (np.poly1d([1.0, -1.0]) ** _ORDER).coef
+    deviation = float(np.median(np.abs(np.diff(angle, _ORDER)))) / _TO_DEVIATION
+    return deviation**2 / float(binomial @ binomial)

@@ -290,7 +290,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         correlation=kappa,
         attenuation=0.0
         if motor is None
-        else inertia_attenuation(model, information, motor),
+        else inertia_attenuation(log, model, information, motor),
         notes=(*notes, *no_orders, *small, *remarks(model, drive, residuals)),
     )
     return replace(result, doubts=_doubts_of(result, estimates))
