@@ -34,6 +34,8 @@ ACCELERATIONS = 2
 """Number of plugin states that precede the hysteresis states."""
 BRISTLE = 2
 """Number of plugin states of the friction, which follow the hysteresis states."""
+SLIPPED = 2.0
+"""Second state of a friction bristle that slipped in the last step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,6 +333,7 @@ class JointDrive:
                     beta - float(relaxed) if known else 0.0,
                     float(np.dot(b, state[2:])),
                     (float(got.torque) + slipping) / self.ratio,
+                    slipped=known == SLIPPED,
                 )
         return self.signals(*state, slipping=slipping, friction=friction)
 

@@ -114,19 +114,29 @@ class Friction:
             self.bending + self.coulomb + more + self.load * np.abs(input_torque)
         )
 
-    def torque(self, rotation: float, speed: float, input_torque: float) -> float:
+    def torque(
+        self,
+        rotation: float,
+        speed: float,
+        input_torque: float,
+        *,
+        slipped: bool = False,
+    ) -> float:
         """Friction torque F after a monotone rotation from the relaxed bristle [N·m].
 
         Args:
             rotation: Rotation beta from the position of the relaxed bristle [rad].
             speed: Relative speed nu [rad/s].
             input_torque: Elastic torque on the input, T/i [N·m].
+            slipped: Whether the bristle slipped in the time step that led here. It then
+                slips on while it moves the same way, even if its yield torque has grown
+                since the middle of the step.
         """
         reach = float(self.yield_torque(speed, input_torque)) / self.stiffness
         stretch = min(max(rotation, -reach), reach)
         # at its reach the bristle slips, even if round-off leaves it just inside
-        slips = abs(rotation) >= (1.0 - _ROUND_OFF) * reach and rotation * speed > 0.0
-        creep = 0.0 if slips else self.damping * speed
+        slips = slipped or abs(rotation) >= (1.0 - _ROUND_OFF) * reach
+        creep = 0.0 if slips and rotation * speed > 0.0 else self.damping * speed
         return self.stiffness * stretch + creep + self.viscous * speed
 
     def steady(self, speed: float, input_torque: float) -> float:

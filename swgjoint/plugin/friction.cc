@@ -36,9 +36,11 @@ double Friction::Reach(double speed, double torque) const {
   return slip / own_stiffness_;
 }
 
-double Friction::Torque(double x, double reach, double speed) const {
-  // at its reach the bristle keeps slipping, even if round-off leaves it just inside
-  const bool slips = std::fabs(x) >= (1 - kRoundOff) * reach && x * speed > 0;
+double Friction::Torque(double x, double reach, double speed, bool slipped) const {
+  // at its reach the bristle keeps slipping, even if round-off leaves it just inside;
+  // in the scheme the reach is that of the middle of the step, which may be smaller
+  const bool slips =
+      (slipped || std::fabs(x) >= (1 - kRoundOff) * reach) && x * speed > 0;
   const double creep = slips ? 0 : damping_ * speed;
   return stiffness_ * std::clamp(x, -reach, reach) + creep + viscous_ * speed;
 }

@@ -37,8 +37,9 @@ class Friction {
   // Largest stretch [rad] at a relative speed and a torque along the torsion.
   double Reach(double speed, double torque) const;
 
-  // Torque at one state; x is the rotation from where the bristle is relaxed.
-  double Torque(double x, double reach, double speed) const;
+  // Torque at one state; x is the rotation from where the bristle is relaxed, and
+  // `slipped` states whether it slipped in the step of the scheme that led there.
+  double Torque(double x, double reach, double speed, bool slipped) const;
 
   // Solves the predicted step, in which the speed changes by `free` without friction
   // and by -response per unit of friction torque. Returns the friction torque.

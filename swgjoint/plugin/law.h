@@ -20,7 +20,8 @@ namespace swgjoint {
 class Law {
  public:
   static constexpr int kAccelerations = 2;  // states before those of the hysteresis
-  static constexpr int kBristle = 2;  // rotation where it is relaxed, 1 once it is known
+  static constexpr int kBristle = 2;  // rotation where it is relaxed, and one of these:
+  static constexpr double kKnown = 1, kSlipped = 2;  // 0 unknown; slipped in a step
 
   // Results of Predict or Evaluate that Finish needs, within one step.
   struct Step {
@@ -111,7 +112,8 @@ class Law {
       const double* bristle = Bristle(state);
       const double speed = Rotation(v);
       const double x = bristle[1] != 0 ? Rotation(q) - bristle[0] : 0;
-      *rubs = friction_->Torque(x, friction_->Reach(speed, value->torque), speed);
+      const double reach = friction_->Reach(speed, value->torque);
+      *rubs = friction_->Torque(x, reach, speed, bristle[1] == kSlipped);
     }
   }
 
@@ -229,7 +231,7 @@ class Law {
       hysteresis_.Slip(0, losses_, &value);
       const double reach = friction_->Reach(Rotation(v), value.torque);
       bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
-      bristle[1] = 1;
+      bristle[1] = kKnown;
     }
     if (!step->scheme) return;
     const DriveValue& g = step->value;
@@ -241,7 +243,7 @@ class Law {
       torque += friction_->b() * (rub.force + h * rub.metric * change);
       const double dx = h * (Rotation(step->v) + 0.5 * change);
       bristle[0] = step->rotation + dx - friction_->After(rub, dx);
-      bristle[1] = 1;
+      bristle[1] = std::fabs(rub.stretch + dx) > rub.reach ? kSlipped : kKnown;
     }
     Store(state, dv * (1 / h) + step->weight * torque);
   }

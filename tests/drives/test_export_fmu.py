@@ -26,6 +26,7 @@ from swgjoint.joint.reference import (
     scheme_force,
 )
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.sheet.loop import torque_loop
 
@@ -155,6 +156,30 @@ def test_a_chirp_equals_the_twin(lossy, tmp_path, varies):
     assert np.ptp(found[:, 0]) > 1.0
     size = np.abs(twin).max(axis=0)
     assert (np.abs(found - twin).max(axis=0) < 1e-9 * size).all()
+
+
+def test_the_output_torque_accelerates_the_load_with_friction(tmp_path):
+    """Friction keeps to its yield torque while the load on a slip grows.
+
+    In the scheme, the bristle is at the yield torque of the middle of the step, which
+    is then smaller than that of the state. With the bristle damping of a sticking
+    bristle, the output torque is wrong by 9 of 22 N·m.
+    """
+    law = Friction(stiffness=70.0, coulomb=0.07, static=0.07, load=0.07, damping=0.07)
+    drive = replace(DriveMap.linear(3e4), friction=law)
+    h, n = 1e-3, 600
+    motor = 0.25 * np.sin(8.0 * np.pi * h * np.arange(n))
+    fmu = fmu_of(drive, tmp_path, by_steps=True)
+    assert fmu.start()
+    torque, speed = [], []
+    for k in range(n):
+        assert fmu.set(motor_torque=motor[k]) and fmu.step(k * h, h), fmu.said
+        for values, name in ((torque, "output_torque"), (speed, "output_speed")):
+            values += fmu.get(name)
+    # the mean torque of two steps is that of the state between them
+    wanted = LOAD * (np.array(speed[2:]) - speed[:-2]) / (2.0 * h)
+    # 2 % = curvature of the torque over two steps and the step in which it sticks
+    assert np.abs(torque[1:-1] - wanted).max() < 0.03 * np.abs(wanted).max()
 
 
 def test_a_stiffness_loop_equals_the_twin(lossy, tmp_path):

@@ -97,9 +97,7 @@ def test_trajectory_equals_twin(bench, rubbing):
     np.testing.assert_allclose(
         b.data.qpos[b.q] / [ratio, 1], twin.q / [ratio, 1], rtol=0, atol=1e-9
     )
-    np.testing.assert_allclose(
-        b.bristle, [twin.relaxed, 1.0], rtol=0, atol=1e-8 * ratio
-    )
+    np.testing.assert_allclose(b.bristle[0], twin.relaxed, rtol=0, atol=1e-8 * ratio)
     assert sum(f.offset == 70.0 * f.stretch for f in twin.rubs) < 300
 
 
@@ -292,7 +290,7 @@ def test_copies_continue_bitwise(bench, synthetic_map, integrator, friction_law)
     )
     b.place(0.1, -3e-3, 3.0, 0.05)
     mujoco.mj_step(b.model, b.data, 50)
-    assert b.bristle[1] == 1.0
+    assert b.bristle[1] > 0.0
     twin, fresh = copy.copy(b.data), mujoco.MjData(b.model)
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     mujoco.mj_setState(b.model, fresh, full_state(b, b.data), kind)
@@ -464,3 +462,25 @@ def test_rk4_is_refused_where_the_bristle_would_not_hold(bench, law, what):
     assert region.ok and not any(w.number for w in data.warning)
     # the first swing goes a little over the reach
     assert abs(data.qpos[:]).max() < 2.0 * reach
+
+
+def test_observed_friction_slips_on_while_its_yield_torque_grows(bench):
+    """The observed torque accelerates the link, also while the load on a slip grows.
+
+    In the scheme, the bristle is at the yield torque of the middle of the step, which
+    is then smaller than that of the state. With the bristle damping of a sticking
+    bristle, the observed torque is wrong by 10 of 17 N·m.
+    """
+    law = Friction(stiffness=70.0, coulomb=0.07, static=0.07, load=0.07, damping=0.07)
+    b = bench(replace(DriveMap.linear(3e4), friction=law), damping_ratio=0.02)
+    torque, rate = [], []
+    for k in range(600):
+        b.data.qfrc_applied[b.v[0]] = 0.25 * np.sin(8e-3 * np.pi * k)
+        mujoco.mj_step(b.model, b.data)
+        torque.append(float(b.drive.observe(b.model, b.data).torque))
+        rate.append(b.data.qvel[b.v[1]])
+    # the mean torque of two steps is that of the state between them
+    wanted = b.drive.link_inertia * (np.array(rate[2:]) - rate[:-2]) / 2e-3
+    # 2.4 % = curvature of the torque over two steps and the step in which it sticks
+    apart = np.abs(torque[1:-1] - wanted).max()
+    assert apart < 0.03 * np.abs(wanted).max()
