@@ -466,6 +466,12 @@ def test_a_search_that_finds_nothing_is_one_line():
         ),
         (
             "[plan]",
+            '[meshing]\nfigures = ["transmission_error_pp_arcsec"]\n'
+            "[confirm]\npositions = 1\n[plan]",
+            ("confirm.positions", "transmission_error_pp_arcsec", "2"),
+        ),
+        (
+            "[plan]",
             '[confirm]\nmodel = "2d"\n[plan]',
             ("confirm.model", "meshing", "maps"),
         ),

@@ -9,6 +9,7 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
+from swgjoint.explore.sweep.figures import MESHING_FIGURES
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.keys import kind_of, known_keys
 from swgjoint.explore.sweep.points import points_of, values_of
@@ -307,6 +308,19 @@ def test_all_faults_are_listed_at_once():
     assert lines[0].count("rated_torque_Nm") == 2  # the nearest, and among all
     assert names(lines[1], "plan.parameters[0].high", "1.2 mm", "1.5 mm")
     assert names(lines[2], "plan.parameters[1].values", "low", "high")
+
+
+@pytest.mark.parametrize("figure", MESHING_FIGURES)
+def test_a_range_needs_two_positions(figure):
+    """One position has no peak to peak: it was zero, which met any limit."""
+    head = f'design = "reference-2d"\n[meshing]\nfigures = ["{figure}"]\npositions = '
+    plan = GRID + parameter(RIM, "values = [1.0]")
+    assert sweep(plan, f"{head}2\n").meshing.positions == 2
+    if "_pp_" not in figure:
+        assert sweep(plan, f"{head}1\n").meshing.positions == 1
+        return
+    with pytest.raises(InputError, match=naming("meshing.positions", figure, "2")):
+        sweep(plan, f"{head}1\n")
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,9 @@ class OptimisationFile(AskedFile):
                 faults.append(("confirm.positions", "unused without meshing"))
             if confirm.model is not None and self.spec is None and self.run is None:
                 faults.append(("confirm.model", "used only by meshing and maps"))
+        if confirm is not None and self.meshing is not None:
+            if fault := self.meshing.range_fault(confirm.positions):
+                faults.append(("confirm.positions", fault))
         varied = {key for p in self.plan.parameters for key in p.keys}
         if confirm is not None and confirm.refinement and REFINEMENT in varied:
             told = f"{REFINEMENT} is also a parameter; accepted: one of the two"

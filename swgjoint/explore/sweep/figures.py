@@ -47,6 +47,8 @@ of the wave generator is also a peak-to-peak value. The number of pairs is the m
 the positions. The stiffness is the reciprocal of the mean compliance under the torque,
 including cup and mounting.
 """
+RANGES = tuple(name for name in MESHING_FIGURES if "_pp_" in name)
+"""Figures of the meshing task that are ranges, for which one position has no value."""
 SPEC_FIGURES = tuple(
     key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
 )

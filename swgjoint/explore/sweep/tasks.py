@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from swgjoint.explore.sweep.figures import (
     MESHING_FIGURES,
+    RANGES,
     RUN_FIGURES,
     SIZE_FIGURES,
     SPEC_FIGURES,
@@ -60,12 +61,24 @@ class MeshingTask(FigureTask):
     """Fidelity; by default 3d for a design with a cup, else 2d."""
 
     @model_validator(mode="after")
-    def _loaded(self) -> MeshingTask:
+    def _fits(self) -> MeshingTask:
+        faults = []
         if self.torque_Nm == 0 and STIFFNESS in self.figures:
             # with clearance, an unloaded output moves freely and has no stiffness
             fault = f"0 N·m: {STIFFNESS} needs a nonzero torque"
-            raise Fault(("torque_Nm", fault))
+            faults.append(("torque_Nm", fault))
+        if fault := self.range_fault(self.positions):
+            faults.append(("positions", fault))
+        if faults:
+            raise Fault(*faults)
         return self
+
+    def range_fault(self, positions: int | None) -> str:
+        """Reason why the figures cannot be computed from that many positions, or ""."""
+        ranges = [name for name in self.figures if name in RANGES]
+        if positions != 1 or not ranges:
+            return ""
+        return f"1: the peak to peak of {', '.join(ranges)} needs at least 2 positions"
 
 
 class SpecTask(FigureTask):
