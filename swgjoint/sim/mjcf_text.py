@@ -18,6 +18,8 @@ from swgjoint.joint.drive import JointDrive
 _SIDES = ("right", "left", "up", "down", "front", "back")
 _FILES = ("file", *(f"file{side}" for side in _SIDES))
 """Attributes of assets that name a file."""
+_SECTIONS = ("asset", "deformable")
+"""Sections whose elements name files: skins are in the second one."""
 _OF_TEXTURES = ("texture",)
 """Assets that the engine looks up in its folder of textures."""
 
@@ -116,7 +118,7 @@ def _text(values: ArrayLike) -> str:
 def _collect_files(
     root: ElementTree.Element, spec: mujoco.MjSpec, folder: str
 ) -> dict[str, bytes]:
-    """Content of all files of the assets, whose references then point to ``folder``."""
+    """Content of all files of assets and skins, which then refer to ``folder``."""
     compiler = root.find("compiler")
     base = Path(spec.modelfiledir)
     named = {"meshdir": spec.meshdir, "texturedir": spec.texturedir}
@@ -124,7 +126,8 @@ def _collect_files(
         for key in (*named, "assetdir", "strippath"):
             compiler.attrib.pop(key, None)
     files: dict[str, bytes] = {}
-    for asset in (part for section in root.iterfind("asset") for part in section):
+    sections = (section for tag in _SECTIONS for section in root.iterfind(tag))
+    for asset in (part for section in sections for part in section):
         key = "texturedir" if asset.tag in _OF_TEXTURES else "meshdir"
         for attribute in _FILES:
             reference = asset.get(attribute)

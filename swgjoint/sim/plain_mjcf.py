@@ -37,7 +37,7 @@ class MjcfExport:
     path: Path
     """The file."""
     assets: tuple[Path, ...]
-    """Meshes and textures beside it, in the folder that the file refers to."""
+    """Meshes, textures and skins, in the folder beside it to which it refers."""
     drives: dict[str, JointDrive]
     """Drives by joint name, in the order of the model."""
     without_drive: tuple[str, ...]
@@ -66,9 +66,10 @@ def export_mjcf(
     see :func:`swgjoint.attach`. A comment at the head of the file states for every
     drive by how much it differs from level ``full``.
 
-    Meshes and textures are copied to the folder ``<name>_assets`` beside the file; both
-    can be moved together. Their names contain a hash of their content, so that an
-    earlier export of the same name stays complete until the new file replaces it.
+    Meshes, textures and skins are copied to the folder ``<name>_assets`` beside the
+    file; both can be moved together. Their names contain a hash of their content, so
+    that an earlier export of the same name stays complete until the new file replaces
+    it.
 
     Args:
         arm: Path of an MJCF or URDF file, or the name of a bundled arm.

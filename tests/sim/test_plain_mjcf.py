@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import subprocess
 import sys
 import warnings
@@ -287,8 +288,12 @@ def test_meshes_move_with_the_file(tmp_path):
 
 
 def test_files_of_every_kind_are_found(tmp_path):
-    """Meshes of an included file, textures of one and six files, a height field."""
+    """Mesh of an included file, textures of one and six, a height field, a skin."""
     arm = make_arm(tmp_path / "a")
+    # a triangle, and a bone with its name, frame and vertices
+    skin = struct.pack("<4i9f3i", 3, 0, 1, 1, *range(9), *range(3))
+    skin += struct.pack("<40s7f4i3f", b"link", *range(7), 3, *range(3), 1, 1, 1)
+    (tmp_path / "a" / "parts" / "s.skn").write_bytes(skin)
     for name, grey in (("x", 0.2), ("y", 0.8)):
         imsave(tmp_path / "a" / f"{name}.png", np.full((8, 8, 3), grey))
     (tmp_path / "a" / "parts" / "x.png").write_bytes(
@@ -304,15 +309,15 @@ def test_files_of_every_kind_are_found(tmp_path):
     )
     assets = f"""<include file="more.xml"/><asset>
       <texture name="one" type="2d" file="deep/x.png"/><texture type="skybox" {sides}/>
-      <hfield name="h" file="x.png" size="1 1 .1 .1"/></asset>"""
+      <hfield name="h" file="x.png" size="1 1 .1 .1"/><skin file="s.skn"/></asset>"""
     text = ONE_HINGE.replace(mesh, assets)
     arm.write_text(text.replace("<compiler", '<compiler strippath="true"'))
     result = swgjoint.export_mjcf(arm, tmp_path / "out.xml", "CSG-17-100")
-    assert len(result.assets) == 4  # two files x.png of different content
+    assert len(result.assets) == 5  # two files x.png of different content
     one, other = (
         mujoco.MjModel.from_xml_path(str(path)) for path in (arm, result.path)
     )
-    assert (other.nmesh, other.ntex, other.nhfield) == (1, 2, 1)
+    assert (other.nmesh, other.ntex, other.nhfield, other.nskin) == (1, 2, 1, 1)
     np.testing.assert_array_equal(other.tex_data, one.tex_data)
     np.testing.assert_array_equal(other.mesh_vert, one.mesh_vert)
 
