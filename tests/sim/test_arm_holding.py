@@ -16,7 +16,7 @@ from swgjoint.sim.arm.rigid_arm import RigidArm
 
 EVERY_KIND = """
 <mujoco>
-  <compiler angle="degree" eulerseq="zyx"/>
+  <compiler angle="degree" eulerseq="zyx"/><size nkey="3"/>
   <worldbody>
     <geom name="floor" type="plane" size="2 2 .1"/>
     <frame pos=".1 0 .3" euler="20 0 0">
@@ -53,7 +53,7 @@ def quiet(path: Path | str, **reading: object) -> RigidArm:
         return RigidArm(str(path), reading=ArmReading(**reading))
 
 
-@pytest.mark.parametrize("pose", [None, "away", "key_1"])
+@pytest.mark.parametrize("pose", [None, "away", "key_1", "key_2"])
 @pytest.mark.parametrize("driven", [("first", "wrist"), ("turn",), ("wrist",)])
 def test_what_is_held_stays_where_the_file_has_it(driven, pose, tmp_path):
     """All bodies are where the file's own model puts them, for any kind of joint."""
@@ -63,7 +63,8 @@ def test_what_is_held_stays_where_the_file_has_it(driven, pose, tmp_path):
     assert set(arm.joints) == set(driven)
     whole = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(whole)
-    named = {None: whole.qpos0, "away": whole.key_qpos[0], "key_1": whole.key_qpos[1]}
+    keys = zip(("away", "key_1", "key_2"), whole.key_qpos, strict=True)
+    named = {None: whole.qpos0, **dict(keys)}
     for q in np.random.default_rng(2).uniform(-2.0, 2.0, (4, len(arm.joints))):
         data.qpos[:] = named[pose]
         data.joint("turn").qpos = 0.35

@@ -25,7 +25,8 @@ _SHAPE_NAME = re.compile(
 def open_model(path: Path) -> mujoco.MjSpec:
     """Read an MJCF or URDF file; links without a joint remain separate bodies.
 
-    Bodies, joints and keyframes without a name get one, such as ``joint_0``.
+    Bodies, joints and keyframes without a name get one, such as ``joint_0``, and so do
+    the keyframes that ``<size nkey>`` reserves, which are the reference position.
     Shapes of a URDF file do not collide, because adjacent links overlap and the format
     cannot exclude such contacts. Shapes whose mesh is missing or in a format that the
     engine does not read are dropped with a warning.
@@ -46,6 +47,8 @@ def open_model(path: Path) -> mujoco.MjSpec:
         _find_meshes(spec, path)
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
+    for _ in range(len(spec.keys), spec.nkey):
+        spec.add_key()  # <size nkey> adds these when the model is compiled
     for kind, elements in (
         ("body", spec.bodies),
         ("joint", spec.joints),
