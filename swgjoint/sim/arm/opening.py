@@ -21,6 +21,10 @@ _SHAPE_NAME = re.compile(
     r"""(<(?:visual|collision)\b[^<>]*?)\sname\s*=\s*(?:"[^"]*"|'[^']*')"""
 )
 
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_TEMPLATE = re.compile(rb"<xacro:|\$[{(]")
+"""What xacro replaces; its output keeps the namespace and a comment that names it."""
+
 
 def open_model(path: Path) -> mujoco.MjSpec:
     """Read an MJCF or URDF file; links without a joint remain separate bodies.
@@ -86,7 +90,7 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
         return spec
     except (ValueError, OSError) as exc:
         line = " ".join(str(exc).split())
-        if path.is_file() and b"xacro" in path.read_bytes():
+        if path.is_file() and _TEMPLATE.search(_COMMENT.sub(b"", path.read_bytes())):
             line += f"; it is a URDF template; accepted: the output of 'xacro {path}'"
         raise InputError(f"{path}: cannot be read as MJCF or URDF: {line}") from None
 
