@@ -10,6 +10,7 @@ import warnings
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
@@ -59,3 +60,21 @@ def test_more_iterations_than_usual_stay(tmp_path):
     )
     option = RigidArm(str(path)).model.opt
     assert (option.iterations, option.tolerance) == (500, 1e-14)
+
+
+def test_masses_that_come_from_shapes_are_told(tmp_path):
+    """Moving links of a URDF file that states no mass are filled with water."""
+    box = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
+    tensor = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    one = f'<inertial><mass value="3"/>{tensor}</inertial>'
+    joint = '<joint name="j{}" type="continuous"><parent link="{}"/><child link="{}"/>'
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        f'<robot name="a"><link name="base">{box}</link><link name="full">{one}{box}'
+        f'</link><link name="bare">{box}</link>{joint.format(1, "base", "full")}'
+        f"</joint>{joint.format(2, 'full', 'bare')}</joint></robot>"
+    )
+    with pytest.warns(UserWarning, match=naming("arm.urdf", "for bare;", "1000")):
+        arm = RigidArm(str(path))
+    masses = [arm.model.body(name).mass[0] for name in ("full", "bare")]
+    np.testing.assert_allclose(masses, [3.0, 1.0])

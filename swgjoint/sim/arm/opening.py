@@ -33,7 +33,8 @@ def open_model(path: Path) -> mujoco.MjSpec:
     the keyframes that ``<size nkey>`` reserves, which are the reference position.
     Shapes of a URDF file do not collide, because adjacent links overlap and the format
     cannot exclude such contacts. Shapes whose mesh is missing or in a format that the
-    engine does not read are dropped with a warning.
+    engine does not read are dropped with a warning, and another one names the links of
+    a URDF file whose mass the engine takes from their shapes.
 
     Args:
         path: MJCF or URDF file; its suffix may be in upper case.
@@ -49,6 +50,7 @@ def open_model(path: Path) -> mujoco.MjSpec:
     if path.suffix.lower() == ".urdf":
         spec.compiler.discardvisual = False  # keep shapes that do not collide
         _find_meshes(spec, path)
+        _tell_masses_of_shapes(spec, path)
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
     for _ in range(len(spec.keys), spec.nkey):
@@ -130,6 +132,25 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
     if reasons:
         warnings.warn(
             f"{path}: shapes without a usable mesh are left out: {'; '.join(reasons)}",
+            stacklevel=3,
+        )
+
+
+def _tell_masses_of_shapes(spec: mujoco.MjSpec, path: Path) -> None:
+    """Warn of moving links without a mass, which the engine fills with water."""
+    names: list[str] = []
+    moving: set[str] = set()
+    for body in spec.bodies[1:]:  # parents first
+        if body.joints or body.parent.name in moving:
+            moving.add(body.name)
+            solid = any(geom.density > 0.0 for geom in body.geoms)
+            if solid and not body.explicitinertial:
+                names.append(body.name)
+    if names:
+        warnings.warn(
+            f"{path}: the file states no mass for {', '.join(names)}; assumed: their"
+            " shapes are filled with water (1000 kg/m³); accepted: <inertial> in these"
+            " links",
             stacklevel=3,
         )
 
