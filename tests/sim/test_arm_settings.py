@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 from messages import naming
 
+from swgjoint.errors import InputError
+from swgjoint.sim.arm.gentle_sweep import place_arm
+from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.view.run import run_scene
@@ -78,3 +81,16 @@ def test_masses_that_come_from_shapes_are_told(tmp_path):
         arm = RigidArm(str(path))
     masses = [arm.model.body(name).mass[0] for name in ("full", "bare")]
     np.testing.assert_allclose(masses, [3.0, 1.0])
+
+
+def test_a_link_without_mass_may_be_held(tmp_path):
+    """Only links that move need a mass: the helper of a gripper is held here."""
+    tip = '<body name="tip"><joint name="aux" axis="0 1 0"/></body>'
+    path = tmp_path / "arm.xml"
+    path.write_text(FILE.format(settings="").replace("</body>", f"{tip}</body>", 1))
+    with pytest.raises(InputError, match=naming("arm.xml", "mjMINVAL", "'tip'")):
+        place_arm(str(path), reading=ArmReading())
+    driven = ("lift", "elbow")
+    arm, start = place_arm(str(path), reading=ArmReading(driven=driven))
+    assert arm.joints == driven and len(start) == 2
+    assert set(arm.held) == {"aux"} and arm.model.body("tip").mass[0] == 0.0

@@ -66,7 +66,9 @@ def place_arm(
     Raises:
         InputError: If the arm cannot be used or has no such pose.
     """
-    whole = RigidArm(reference, reading=replace(reading, driven=()))
+    every = replace(reading, driven=())
+    # a link without mass, such as a helper of a gripper, may move on held joints only
+    whole = RigidArm(reference, reading=every, kinematics_only=bool(reading.driven))
     tried: list[tuple[str, RigidArm, Array]] = []
     for name, keyframe, angles in _poses(whole, pose):
         arm = _in_pose(reference, whole, reading, keyframe, angles)

@@ -14,6 +14,7 @@ import numpy as np
 from swgjoint.errors import InputError
 from swgjoint.models_path import find
 from swgjoint.sim.arm.compiling import compile_spec as compile_spec
+from swgjoint.sim.arm.compiling import skeleton
 from swgjoint.sim.arm.file import read_arm
 from swgjoint.sim.arm.number_checks import check_numbers
 from swgjoint.sim.arm.reading import ArmReading
@@ -46,6 +47,7 @@ class RigidArm:
         *,
         tool_site: str = "tool",
         reading: ArmReading | None = None,
+        kinematics_only: bool = False,
     ) -> None:
         """Load an arm.
 
@@ -53,6 +55,8 @@ class RigidArm:
             reference: Path or bundled name.
             tool_site: Site at the tool, or a body whose frame is the tool frame.
             reading: Hinges that move, and pose of held joints; None moves every hinge.
+            kinematics_only: Whether shapes are left out and masses are meaningless, as
+                for the poses of an arm whose massless links may be held.
 
         Raises:
             InputError: If the file is missing, is neither MJCF nor URDF, has no hinge,
@@ -72,7 +76,8 @@ class RigidArm:
                 f"{self.path}: the arm has no hinge joint"
                 f"{f' ({others})' if others else ''}; a drive needs one"
             )
-        self.model = compile_spec(self.spec(), where=str(self.path))
+        compiled = skeleton if kinematics_only else compile_spec
+        self.model = compiled(self.spec(), where=str(self.path))
         check_numbers(self.model, where=str(self.path))
         model = self.model
         self.joints = tuple(model.joint(j).name for j in range(model.njnt))
