@@ -129,8 +129,8 @@ class Surroundings:
         body = hinge.parent
         if body.joints[0].name != name:
             raise InputError(
-                f"joint {name!r} is not the first joint of body {body.name!r}; give it"
-                " a body of its own"
+                f"joint {name!r} is not the first joint of body {body.name!r};"
+                " accepted: a body of its own for it, or no drive (option --joints)"
             )
         if hinge.actgravcomp and self.gravcomp:
             raise InputError(

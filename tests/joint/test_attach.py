@@ -397,3 +397,13 @@ def test_an_unknown_rotor_is_refused(spec, synthetic_map):
             spec, joint="elbow", drive=synthetic_map, rotor_inertia=1e-5, rotor="stiff"
         )
     assert spec.body("elbow_rotor") is None
+
+
+def test_a_second_hinge_of_a_body_says_what_is_accepted():
+    """A body of its own, or no drive."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body name="wrist"><geom size=".1"/>'
+        '<joint name="yaw"/><joint name="roll"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(InputError, match=naming("'roll'", "'wrist'", "--joints")):
+        attach(spec, joint="roll", drive=DriveMap.linear(1e4), rotor_inertia=1e-5)

@@ -20,8 +20,8 @@ _REMEDIES = {
     "positive eigenvalues": _BALANCE,
     "larger than mjMINVAL": _MASS_ALONE,
     "Error opening file": (
-        "; accepted: the meshes of an MJCF file in their places, or a copy of the file"
-        " without these shapes whose bodies have an <inertial>"
+        "; accepted: the meshes and textures of an MJCF file in their places, or a"
+        " copy of the file without these shapes whose bodies have an <inertial>"
     ),
 }
 """What to change, by a part of the engine's message."""
