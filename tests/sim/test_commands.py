@@ -13,6 +13,7 @@ from swgjoint.cli.shared.load_text import design_line, load_line, loss_line
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.view.run import run_scene
+from swgjoint.view.words import NOISE_NOTE
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
 SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
@@ -168,6 +169,10 @@ def test_repeatability_of_a_scene_without_chance_is_a_dash():
     tool = {"site": "tool", "path_rms_mm": None, "rp_mm": 1e-12, "ap_mm": 0.58}
     assert names(tool_line(tool, random=False), "AP 0.5800 mm", "RP -", "random")
     assert names(tool_line(tool | {"rp_mm": 0.01}, random=True), "RP 0.0100 mm")
+    assert NOISE_NOTE not in tool_line(tool, random=False)
+    # a tool on the axis of the joint
+    still = {"path_rms_mm": 0.0, "path_max_mm": 1e-9}
+    assert names(tool_line(tool | still, random=False), "- rms", NOISE_NOTE)
 
 
 def joint_at(peak: float, rated: float) -> dict:

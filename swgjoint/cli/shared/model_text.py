@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from swgjoint.view.words import above_noise
+from swgjoint.view.words import NOISE_NOTE, above_noise
 
 
 def rotor_lines(
@@ -102,7 +102,11 @@ def tool_line(tool: dict[str, Any], *, random: bool) -> str:
         if tool.get(key) is not None:
             parts.append(f"{name} {_mm(tool[key])}")
     name = "tool" if tool["site"] == "tool" else f"tool {tool['site']}"
-    return f"{name}: {', '.join(parts)}" if parts else ""
+    told = (tool.get(f"{key}_mm") for key in ("path_rms", "ap", "at", "rt"))
+    # as for a tool on the axis of the last joint
+    faint = any(value is not None and above_noise(value) is None for value in told)
+    note = f" ({NOISE_NOTE})" if faint else ""
+    return f"{name}: {', '.join(parts)}{note}" if parts else ""
 
 
 def _mm(value: float) -> str:
