@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,8 +57,11 @@ note instead of a doubt [-].
 Encoder noise delays the hysteresis element, which the fit balances by negative damping
 of 0.05 to 0.2 % of the torque on simulated benches.
 """
-HIDDEN = 0.002
-"""Part of the rotor inertia that noise may hide in a recommended window [-]."""
+SHIFTED = 0.05
+"""Shift by noise, relative to a parameter, above which it is a doubt instead of a note
+[-]. The intervals of logs with little noise of the torques are far narrower."""
+SETTINGS = ("zero", "link_skew")
+"""Parameters of the log, not of the drive."""
 OVERLOAD = 20.0
 """Largest torque of a log relative to the rated torque [-]; the ratcheting torque of
 catalogue drives is at most 16 times the rated torque (``models/catalogue``)."""
@@ -287,29 +291,37 @@ def doubts_of(
     return lines
 
 
-def noise_doubts(
-    estimates: Mapping[str, Estimate], attenuation: float, window: float
-) -> list[str]:
-    """A doubt if noise of the motor angle moves the rotor inertia off its interval.
+def describe_shifts(
+    estimates: Mapping[str, Estimate], shifts: Mapping[str, float]
+) -> tuple[str, float]:
+    """A line on parameters that noise shifts beyond their intervals, and the largest.
 
     Args:
         estimates: Estimates of all parameters by name.
-        attenuation: Part of the inertia that the noise hides [-].
-        window: Duration of an averaging window [s].
+        shifts: Shift of each parameter by noise of the angles, in its unit.
+
+    Returns:
+        The line, empty if there are none, and the largest shift as a fraction of its
+        parameter (of the amplitude for kinematic errors) [-].
     """
-    inertia = estimates.get("rotor_inertia")
-    if inertia is None:
-        return []
-    hidden = attenuation / max(1.0 - attenuation, 1e-3) * inertia.value
-    if hidden <= inertia.high - inertia.value:
-        return []
-    # the variance of noise in the accelerations falls with the fifth power
-    longer = window * (attenuation / HIDDEN) ** 0.2
-    share = min(attenuation, 1.0)
-    return [
-        f"noise of motor_angle lowers rotor_inertia by about {share:.0%}, which its"
-        f" interval does not include; use --window {longer:.2g} or longer"
-    ]
+    parts, largest = [], 0.0
+    for name, e in estimates.items():
+        shift = shifts.get(name, 0.0)
+        if name in SETTINGS or abs(shift) <= e.high - e.value:
+            continue
+        parts.append(f"{name} by about {shift:.2g} {e.unit}")
+        size = abs(e.value)
+        if name.startswith("error_"):
+            other = estimates[name[:-3] + ("sin" if name.endswith("cos") else "cos")]
+            size = hypot(size, other.value)
+        largest = max(largest, abs(shift) / max(size, 1e-300))
+    if not parts:
+        return "", 0.0
+    line = (
+        f"noise of the angles shifts {', '.join(parts)}, which the intervals do not"
+        " include; use a longer --window, or angles with less noise"
+    )
+    return line, largest
 
 
 def negative(

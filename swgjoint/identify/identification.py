@@ -52,17 +52,18 @@ from swgjoint.flags import check_flags
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.gear.ratings import Ratings
-from swgjoint.identify.angle_noise import inertia_attenuation
+from swgjoint.identify.angle_noise import shifts_by_noise
 from swgjoint.identify.checks import (
+    SHIFTED,
     SMALL,
     SURE,
     check_angles,
     check_ratio,
     check_torques,
     check_torsion,
+    describe_shifts,
     doubts_of,
     negative,
-    noise_doubts,
     remarks,
     without_skew,
 )
@@ -131,8 +132,8 @@ class Identified:
     """Effect of each parameter on the torques, relative to their rms [-]."""
     correlation: float
     """Correlation factor kappa of the covariance [-]."""
-    attenuation: float = 0.0
-    """Part of the rotor inertia that noise of the motor angle hides [-]."""
+    shifts: Mapping[str, float] = field(default_factory=dict)
+    """Shift of each parameter by noise of the angles, in its unit."""
     skew: float = 0.0
     """Delay by which the link angles were corrected before this fit [s]; ``samples``
     contain the corrected angles."""
@@ -256,7 +257,8 @@ def _doubts_of(
     measured = result.model.measured_torques()
     left = {key: rms(r) / rms(measured[key]) for key, r in result.residuals.items()}
     units = [note for note in result.notes if "plausible: " in note]
-    noise = noise_doubts(estimates, result.attenuation, result.model.step)
+    line, share = describe_shifts(estimates, result.shifts)
+    noise = [line] if share > SHIFTED else []
     return (*doubts_of(estimates, left, result.effects, result.model), *noise, *units)
 
 
@@ -278,8 +280,10 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         return _without_element(why, log, options)
     drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
     effects = effects_of(model, values, residuals, jacobian)
-    motor = residuals.get("motor_torque")
     small = [line for line, size in negative(estimates, effects) if size <= SMALL]
+    shifts = shifts_by_noise(log, model, values, residuals)
+    line, share = describe_shifts(estimates, shifts)
+    small += [line] if line and share <= SHIFTED else []
     result = Identified(
         estimates=estimates,
         drive=drive,
@@ -288,9 +292,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         residuals=residuals,
         effects=effects,
         correlation=kappa,
-        attenuation=0.0
-        if motor is None
-        else inertia_attenuation(log, model, information, motor),
+        shifts=shifts,
         notes=(*notes, *no_orders, *small, *remarks(model, drive, residuals)),
     )
     return replace(result, doubts=_doubts_of(result, estimates))

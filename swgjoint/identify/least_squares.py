@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -35,20 +36,13 @@ def solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
     measured = model.measured_torques()
     weight = {key: 1.0 / max(rms(x), 1e-12) for key, x in measured.items()}
 
-    def residual(x: Array, weight: Mapping[str, float]) -> Array:
-        got = model.torques(x)
-        return np.concatenate(
-            [(got[key] - measured[key]) * w for key, w in weight.items()]
-        )
-
     for _ in range(_ROUNDS):
         solution = least_squares(
-            residual,
+            partial(_weighted, model, weight),
             values,
             bounds=bounds,
             x_scale=scale,
             max_nfev=60,
-            args=(weight,),
         )
         if not np.isfinite(solution.x).all():
             raise ComputationError(
@@ -58,16 +52,48 @@ def solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
         values = solution.x
         got = model.torques(values)
         off = {key: measured[key] - got[key] for key in measured}
-        # weight by each channel's own residual; a perfect log has none
-        weight = {
-            key: 1.0 / max(rms(r), 1e-9 * rms(measured[key]), 1e-12)
-            for key, r in off.items()
-        }
+        weight = _weights(off, measured)
     # rescale the Jacobian to the final weights for the covariance
     rows = [len(r) for r in off.values()]
     old = np.sqrt([np.mean(r**2) for r in np.split(solution.fun, rows[:-1])])
     jacobian = solution.jac / np.repeat(np.maximum(old, 1e-9), rows)[:, None]
     return values, off, np.asarray(jacobian)
+
+
+def _weights(
+    residuals: Mapping[str, Array], measured: Mapping[str, Array]
+) -> dict[str, float]:
+    """Weight of each channel by its own residual; a perfect log has none."""
+    return {
+        key: 1.0 / max(rms(r), 1e-9 * rms(measured[key]), 1e-12)
+        for key, r in residuals.items()
+    }
+
+
+def _weighted(model: Model, weight: Mapping[str, float], values: Array) -> Array:
+    """Modelled minus measured torques of all channels, weighted [-]."""
+    got, measured = model.torques(values), model.measured_torques()
+    return np.concatenate([(got[key] - measured[key]) * w for key, w in weight.items()])
+
+
+def newton_step(model: Model, values: Array, residuals: Mapping[str, Array]) -> Array:
+    """First change of the parameters in a fit that begins at given values.
+
+    Args:
+        model: Model of a log.
+        values: Parameters of a similar log.
+        residuals: Measured minus modelled torque of that log by channel [N·m].
+    """
+    from scipy.optimize import least_squares
+
+    weight = _weights(residuals, model.measured_torques())
+    # the Jacobian at the start, by differences like those of the fit
+    scale = np.array([p.scale for p in model.unknowns])
+    weighted = partial(_weighted, model, weight)
+    jacobian = least_squares(weighted, values, x_scale=scale, max_nfev=1).jac
+    size = np.linalg.norm(jacobian, axis=0)
+    step = np.linalg.lstsq(jacobian / size, -weighted(values), rcond=None)[0]
+    return np.asarray(step / size)
 
 
 def correlation_factor(residual: Array) -> float:

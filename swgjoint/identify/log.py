@@ -35,8 +35,6 @@ JITTER = 0.5
 """Largest distance of a time from an even one, in steps, that counts as jitter [-]."""
 WHOLE = 1e-3
 """Largest distance of the samples per window from a whole number [-]."""
-ACCELERATION_STENCIL = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0
-"""Weights of five window means in their second derivative, times the window squared."""
 FEWEST = 200
 """Smallest number of averaged samples for a fit."""
 

@@ -158,6 +158,8 @@ def test_a_small_negative_damping_is_a_note():
     damping = found.estimates["damping"]
     assert damping.high < 0.0 and 0.0 < found.effects["damping"] < 0.01
     assert any(note.startswith("damping -") for note in found.notes)
+    # the stiffness is 3 % too low, more than its interval of 1 %
+    assert any("noise of the angles shifts hysteresis" in note for note in found.notes)
     assert found.doubts == ()
 
 
