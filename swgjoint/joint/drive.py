@@ -315,9 +315,9 @@ class JointDrive:
             first = int(model.plugin_stateadr[instance]) + ACCELERATIONS
             count = len(self.elements)
             rest = data.plugin_state[first : first + count]
-            elastic = 0.0
+            # along the torsion, as the laws of both losses take it
+            elastic = float(self.drive.torque(torsion, *state[:2]))
             if vary_with_load(self.elements):
-                elastic = float(self.drive.torque(torsion, *state[:2]))
                 # the slip of the last step, with its yield torsions
                 after = first + count + (0 if self.friction is None else BRISTLE)
                 limit = data.plugin_state[after : after + count]
@@ -332,7 +332,7 @@ class JointDrive:
                 friction = self.friction.torque(
                     beta - float(relaxed) if known else 0.0,
                     float(np.dot(b, state[2:])),
-                    (float(got.torque) + slipping) / self.ratio,
+                    (elastic + slipping) / self.ratio,
                     slipped=known == SLIPPED,
                 )
         return self.signals(*state, slipping=slipping, friction=friction)

@@ -484,3 +484,23 @@ def test_observed_friction_slips_on_while_its_yield_torque_grows(bench):
     # 2.4 % = curvature of the torque over two steps and the step in which it sticks
     apart = np.abs(torque[1:-1] - wanted).max()
     assert apart < 0.03 * np.abs(wanted).max()
+
+
+def test_observed_friction_is_that_of_the_engine(bench):
+    """Also where the spring is damped: the yield torque takes the elastic torque alone.
+
+    With the damping torque, the bristle seems to stick, and the observed torque is
+    wrong by up to its largest value.
+    """
+    law = Friction(stiffness=70.0, coulomb=0.07, static=0.07, load=0.07, damping=0.07)
+    drive = replace(DriveMap.linear(3e4), friction=law)
+    b = bench(drive, damping_ratio=0.02, step=1e-4, integrator="RK4")
+    observed, acting = [], []
+    for k in range(1000):
+        b.data.qfrc_applied[b.v[0]] = 0.25 * np.sin(4e-3 * np.pi * k)
+        mujoco.mj_step(b.model, b.data)
+        now = copy.copy(b.data)
+        mujoco.mj_forward(b.model, now)
+        observed.append(float(b.drive.observe(b.model, b.data).torque))
+        acting.append(now.qfrc_passive[b.v[1]])
+    np.testing.assert_allclose(observed, acting, rtol=0, atol=1e-6 * max(acting))
