@@ -1,10 +1,11 @@
 """Shift of the identified parameters by noise of the angles.
 
-Noise of the encoders moves the slider of the hysteresis element, and second differences
-turn it into accelerations, to which a fit then attributes too small an inertia. Both
-grow with the variance of the noise, and intervals from a covariance contain neither.
-They are estimated as what the same noise does to the parameters once more, by one step
-of Gauss and Newton. The mean for noise and its opposite leaves the shift alone.
+Encoder noise moves the slider of the hysteresis element, and its second differences
+enter the accelerations, so that the fitted inertia is too small. Both shifts grow with
+the variance of the noise, and confidence intervals from a covariance do not include
+them. To estimate the shifts, noise of the same variance is added to the log, and one
+Gauss-Newton step gives the resulting change of the parameters. The mean of this change
+for the noise and for its opposite contains the shift but no random error.
 
 Source:
     Cook and Stefanski (1994), "Simulation-extrapolation estimation in parametric
@@ -23,7 +24,7 @@ from swgjoint.identify.log import BenchLog
 from swgjoint.identify.model import Model
 from swgjoint.typing import Array
 
-_ORDER = 6  # differences that leave noise and hardly any motion
+_ORDER = 6  # order of differences in which almost no motion is left
 _TO_DEVIATION = 0.6745  # median of the absolute values of a unit normal distribution
 _ANGLES = ("motor_angle", "link_angle")
 
@@ -49,7 +50,7 @@ def shifts_by_noise(
     for sign in (1.0, -1.0):
         noisy = {key: getattr(log, key) + sign * noise[key] for key in _ANGLES}
         again = _model_of(replace(log, **noisy), model)
-        if len(again.unknowns) != values.size:  # at the edge of what the log tells
+        if len(again.unknowns) != values.size:  # the log barely determines a parameter
             return {}
         steps.append(newton_step(again, values, residuals))
     shifts = np.mean(steps, axis=0)
@@ -81,8 +82,8 @@ def _model_of(log: BenchLog, model: Model) -> Model:
 def _variance(samples: Array, means: Array) -> float:
     """Variance of white noise in the samples of an angle [rad²].
 
-    Fast motion looks like noise of the window means, and slow motion over few counts
-    of an encoder like noise of the samples; the smaller estimate counts.
+    Fast motion increases the estimate from window means, and slow motion over few
+    encoder counts the one from samples. The smaller of both is used.
 
     Args:
         samples: The angle [rad]. Shape (n_samples,).

@@ -315,9 +315,11 @@ class JointDrive:
             first = int(model.plugin_stateadr[instance]) + ACCELERATIONS
             count = len(self.elements)
             rest = data.plugin_state[first : first + count]
-            # along the torsion, as the laws of both losses take it
-            elastic = float(self.drive.torque(torsion, *state[:2]))
-            if vary_with_load(self.elements):
+            elastic, varies = 0.0, vary_with_load(self.elements)
+            if varies or self.friction is not None:
+                # both losses depend on the torque along the torsion, without damping
+                elastic = float(self.drive.torque(torsion, *state[:2]))
+            if varies:
                 # the slip of the last step, with its yield torsions
                 after = first + count + (0 if self.friction is None else BRISTLE)
                 limit = data.plugin_state[after : after + count]

@@ -20,8 +20,10 @@ namespace swgjoint {
 class Law {
  public:
   static constexpr int kAccelerations = 2;  // states before those of the hysteresis
-  static constexpr int kBristle = 2;  // rotation where it is relaxed, and one of these:
-  static constexpr double kKnown = 1, kSlipped = 2;  // 0 unknown; slipped in a step
+  // States of the bristle: the rotation at which it is relaxed, and whether this is
+  // known (otherwise 0) and the bristle slipped in the last step of the scheme.
+  static constexpr int kBristle = 2;
+  static constexpr double kKnown = 1, kSlipped = 2;
 
   // Results of Predict or Evaluate that Finish needs, within one step.
   struct Step {

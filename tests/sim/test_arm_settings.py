@@ -65,7 +65,7 @@ def test_more_iterations_than_usual_stay(tmp_path):
     assert (option.iterations, option.tolerance) == (500, 1e-14)
 
 
-def test_masses_that_come_from_shapes_are_told(tmp_path):
+def test_masses_that_come_from_shapes_are_reported(tmp_path):
     """Moving links of a URDF file that states no mass are filled with water."""
     box = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
     tensor = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'

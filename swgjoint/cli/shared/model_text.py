@@ -102,9 +102,9 @@ def tool_line(tool: dict[str, Any], *, random: bool) -> str:
         if tool.get(key) is not None:
             parts.append(f"{name} {_mm(tool[key])}")
     name = "tool" if tool["site"] == "tool" else f"tool {tool['site']}"
-    told = (tool.get(f"{key}_mm") for key in ("path_rms", "ap", "at", "rt"))
-    # as for a tool on the axis of the last joint
-    faint = any(value is not None and above_noise(value) is None for value in told)
+    # a tool on the axis of the last joint does not move
+    values = (tool.get(f"{key}_mm") for key in ("path_rms", "ap", "at", "rt"))
+    faint = any(value is not None and above_noise(value) is None for value in values)
     note = f" ({NOISE_NOTE})" if faint else ""
     return f"{name}: {', '.join(parts)}{note}" if parts else ""
 

@@ -23,7 +23,7 @@ _SHAPE_NAME = re.compile(
 
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _TEMPLATE = re.compile(rb"<xacro:|\$[{(]")
-"""What xacro replaces; its output keeps the namespace and a comment that names it."""
+"""Text that xacro replaces. Its output keeps the namespace and a comment on xacro."""
 
 
 def open_model(path: Path) -> mujoco.MjSpec:
@@ -33,8 +33,8 @@ def open_model(path: Path) -> mujoco.MjSpec:
     the keyframes that ``<size nkey>`` reserves, which are the reference position.
     Shapes of a URDF file do not collide, because adjacent links overlap and the format
     cannot exclude such contacts. Shapes whose mesh is missing or in a format that the
-    engine does not read are dropped with a warning, and another one names the links of
-    a URDF file whose mass the engine takes from their shapes.
+    engine does not read are dropped with a warning. Another warning names the links of
+    a URDF file whose mass the engine computes from their shapes.
 
     Args:
         path: MJCF or URDF file; its suffix may be in upper case.
@@ -50,7 +50,7 @@ def open_model(path: Path) -> mujoco.MjSpec:
     if path.suffix.lower() == ".urdf":
         spec.compiler.discardvisual = False  # keep shapes that do not collide
         _find_meshes(spec, path)
-        _tell_masses_of_shapes(spec, path)
+        _warn_of_missing_masses(spec, path)
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
     for _ in range(len(spec.keys), spec.nkey):
@@ -136,7 +136,7 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
         )
 
 
-def _tell_masses_of_shapes(spec: mujoco.MjSpec, path: Path) -> None:
+def _warn_of_missing_masses(spec: mujoco.MjSpec, path: Path) -> None:
     """Warn of moving links without a mass, which the engine fills with water."""
     names: list[str] = []
     moving: set[str] = set()
