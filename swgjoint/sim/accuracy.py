@@ -107,8 +107,6 @@ def attempt(
     scene: Scene,
     setting: Setting,
     drives: Mapping[str, DriveMap] | None = None,
-    *,
-    midway: bool = False,
 ) -> SettingOutcome:
     """Run a scene at a setting; refusal and divergence are reported as outcomes.
 
@@ -116,8 +114,6 @@ def attempt(
         scene: The scene.
         setting: Level, integrator and time step.
         drives: Maps by drive reference, used instead of loading or building them.
-        midway: Whether the inputs of a step are those at its middle, see
-            :func:`hold_midway`.
     """
     try:
         whole = assemble_setting(scene, setting, drives)
@@ -125,20 +121,17 @@ def attempt(
         return SettingOutcome(
             run=None, assembly=None, outcome="refused", reason=str(exc)
         )
-    return attempt_assembled(whole, midway=midway)
+    return attempt_assembled(whole)
 
 
-def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcome:
+def attempt_assembled(whole: Assembly) -> SettingOutcome:
     """Run a compiled scene; divergence is reported as an outcome.
 
     Args:
         whole: The compiled scene.
-        midway: Whether the inputs of a step are those at its middle, see
-            :func:`hold_midway`.
     """
-    kept = thin_samples(hold_midway(whole) if midway else whole)
     try:
-        run = simulate(kept, name=whole.scene.name)
+        run = simulate(thin_samples(whole), name=whole.scene.name)
     except ComputationError as exc:
         return SettingOutcome(
             run=None, assembly=whole, outcome="diverged", reason=str(exc)
@@ -165,34 +158,6 @@ def thin_samples(whole: Assembly) -> Assembly:
     if n < 2 or not fits or whole.loops.sampled:
         return whole
     return replace(whole, sub_steps=n * whole.sub_steps)
-
-
-def hold_midway(whole: Assembly) -> Assembly:
-    """Copy whose inputs during a step are those at its middle, for reference solutions.
-
-    Explicit integrators hold the inputs at the start of a step throughout the step. The
-    inputs are therefore half a step late on average, which is an error of first order
-    in the step, whatever the order of the integrator. A scene with a sampled loop is
-    returned unchanged, because its law needs the reference at the control instants.
-    """
-    if whole.loops.sampled:
-        return whole
-
-    def middle(values: Array) -> Array:
-        return np.vstack([0.5 * (values[1:] + values[:-1]), values[-1:]])
-
-    path = whole.trajectory
-    return replace(
-        whole,
-        trajectory=replace(
-            path,
-            position=middle(path.position),
-            velocity=middle(path.velocity),
-            acceleration=middle(path.acceleration),
-        ),
-        feedforward=middle(whole.feedforward),
-        prescribed=middle(whole.prescribed),
-    )
 
 
 def errors(run: Run, reference: Run) -> dict[str, float]:

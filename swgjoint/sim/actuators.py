@@ -160,7 +160,9 @@ def control_inputs(assembly: Assembly) -> Array:
     """Inputs of motors, loads and disturbances at every engine step.
 
     The integrator ``discrete`` evaluates the loop at the end of a step and uses the
-    reference at that instant; other integrators evaluate the loop at the start. At
+    reference at that instant; Euler integrators evaluate the loop at the start. RK4
+    evaluates it over the whole step with a constant reference, that of its middle: one
+    of the start would be late by half a step, an error of first order. At
     level ``kinematic`` the prescribed error is added to the reference, and the motor
     input includes the torque that accelerates the rotor inertia along this error; see
     :mod:`swgjoint.joint.prescribed`. For sampled loops the inputs contain only this
@@ -172,29 +174,51 @@ def control_inputs(assembly: Assembly) -> Array:
     path, ratio, loops = assembly.trajectory, assembly.ratio, assembly.loops
     angle = ratio * (path.position + assembly.prescribed)
     speed = ratio * (path.velocity + assembly.prescribed_rate)
-    at_end = assembly.scene.simulation.integrator == "discrete"
-    taken = slice(1, None) if at_end else slice(None, -1)
     acceleration = np.diff(assembly.prescribed_rate, axis=0) / assembly.step
     extra = assembly.rotor_inertia * ratio * acceleration
+    angle, speed, feedforward = (
+        _of_steps(values, assembly.model.opt.integrator)
+        for values in (angle, speed, assembly.feedforward)
+    )
     if loops.sampled:
         motors = extra
     else:
-        folded = loops.stiffness * angle + loops.damping * speed + assembly.feedforward
-        motors = folded[taken] + extra
+        motors = loops.stiffness * angle + loops.damping * speed + feedforward + extra
     columns = [
-        np.column_stack(
-            [angle[taken, j], speed[taken, j], assembly.feedforward[taken, j] + extra_j]
-        )
+        np.column_stack([angle[:, j], speed[:, j], feedforward[:, j] + extra_j])
         if loops.setpoints(j)
         else motors[:, j : j + 1]
         for j, extra_j in enumerate(extra.T)
     ]
     load = assembly.load[assembly.load != 0.0]
-    middle = 0.5 * (path.time[1:] + path.time[:-1])
-    acting = [disturbance_at(d, middle)[:, None] for d in assembly.disturbances]
+    acting = [
+        disturbance_at(d, _middle(path.time))[:, None] for d in assembly.disturbances
+    ]
     return np.hstack(
         [*columns, np.broadcast_to(load, (len(motors), load.size)), *acting]
     )
+
+
+def _of_steps(values: Array, integrator: int) -> Array:
+    """Values of every step that its loop uses, see :func:`control_inputs`.
+
+    Args:
+        values: Values at the ends of the steps (n, n_joints).
+        integrator: Integrator of the engine.
+
+    Returns:
+        Values of the steps (n - 1, n_joints).
+    """
+    if integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        return values[1:]
+    if integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        return _middle(values)
+    return values[:-1]
+
+
+def _middle(values: Array) -> Array:
+    """Means of successive values (n, ...), shape (n - 1, ...)."""
+    return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
 def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
@@ -275,7 +299,8 @@ def wanted_torque(
         wanted = setpoint[::parts] + feedback - loops.damping * theta_rate
         return np.stack([wanted, wanted])
     # mean input over the sub-steps of a step
-    held = setpoint[:-1].reshape(-1, parts, len(ratio)).mean(axis=1)
+    held = _of_steps(setpoint, assembly.model.opt.integrator)
+    held = held.reshape(-1, parts, len(ratio)).mean(axis=1)
     held -= loops.damping * np.diff(theta, axis=0) / (parts * assembly.step)
     first = held + feedback[:-1]
     return np.stack([np.vstack([first[:1], x]) for x in (first, held + feedback[1:])])

@@ -34,7 +34,7 @@ from swgjoint.sim.motion.trajectory import time_grid
 def best(bench):
     """The bench by DOP853."""
     setting = Setting(level="full", integrator="RK4", step=1e-4)
-    got = attempt(bench.scene, setting, bench.drives, midway=True)
+    got = attempt(bench.scene, setting, bench.drives)
     return exact(got.run, got.assembly)
 
 
@@ -169,11 +169,11 @@ def test_nothing_reaches_it(bench):
     """The message names the best that was reached."""
     with pytest.raises(
         ComputationError,
-        match=naming("bench", "0.005arcmin", "full", "ms", "arcmin", "--error"),
+        match=naming("bench", "1e-04arcmin", "full", "ms", "arcmin", "--error"),
     ):
         advise(
             bench.scene,
-            parse_bound("0.005arcmin"),
+            parse_bound("1e-04arcmin"),
             drives=bench.drives,
             steps=(1e-3, 2e-3),
             levels=("rigid", "full"),

@@ -62,6 +62,26 @@ def test_feedforward_of_the_inertia_lets_the_rigid_arm_follow(bench, synthetic_m
     np.testing.assert_allclose(exact.output_torque, needed, atol=0.02)
 
 
+def test_a_rigid_arm_follows_within_the_order_of_rk4_steps(bench, synthetic_map):
+    """With all torques fed forward: 1e-5 of the travel, and a quarter at half the step.
+
+    A reference held from the start of a step is half a step late: 1e-3 of the travel.
+    """
+    sweep = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.2, "end_deg": {"joint": 10.0}}
+    lag = []
+    for step in (2e-3, 1e-3):
+        run = bench(
+            synthetic_map,
+            controller__feedforward="gravity_inertia",
+            defaults__level="rigid",
+            trajectory=sweep,
+            simulation={"duration_s": 1.0, "step_s": step, "integrator": "RK4"},
+        )
+        lag.append(np.abs(run.position - run.reference).max())
+    assert lag[0] < 2e-5 * np.ptp(run.reference)
+    assert lag[0] / lag[1] == pytest.approx(4.0, rel=0.1)
+
+
 def test_a_joint_at_rest_stays_at_rest(bench, synthetic_map):
     """The start is an equilibrium: with load and cogging, nothing moves."""
     run = bench(

@@ -195,8 +195,7 @@ def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
 def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
     """Solve a level with negligible time-step error.
 
-    The method is RK4 with inputs taken in the middle of each step; for scene ``bench``
-    at level ``full`` it is DOP853.
+    The method is RK4; for scene ``bench`` at level ``full`` it is DOP853.
 
     Args:
         bench: Scene with its drives.
@@ -212,7 +211,7 @@ def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
     runs, assemblies = [], []
     for h in (step, 2.0 * step):
         setting = Setting(level=level, integrator="RK4", step=h)
-        got = attempt(bench.scene, setting, bench.drives, midway=True)
+        got = attempt(bench.scene, setting, bench.drives)
         if got.run is None or got.assembly is None:
             raise ComputationError(
                 f"reference of scene {bench.name!r}, {level}, {setting.name}:"
