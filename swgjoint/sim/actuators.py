@@ -161,9 +161,10 @@ def control_inputs(assembly: Assembly) -> Array:
 
     The integrator ``discrete`` evaluates the loop at the end of a step and uses the
     reference at that instant; Euler integrators evaluate the loop at the start. RK4
-    evaluates it over the whole step with a constant reference, that of its middle: one
-    of the start would be late by half a step, an error of first order. At
-    level ``kinematic`` the prescribed error is added to the reference, and the motor
+    evaluates it over the whole step with a constant reference, that of its middle. The
+    reference of the start would be late by half a step, an error of first order.
+
+    At level ``kinematic`` the prescribed error is added to the reference, and the motor
     input includes the torque that accelerates the rotor inertia along this error; see
     :mod:`swgjoint.joint.prescribed`. For sampled loops the inputs contain only this
     torque, to which the loop adds its own.
@@ -200,7 +201,7 @@ def control_inputs(assembly: Assembly) -> Array:
 
 
 def _of_steps(values: Array, integrator: int) -> Array:
-    """Values of every step that its loop uses, see :func:`control_inputs`.
+    """Values that the loop uses in every step, see :func:`control_inputs`.
 
     Args:
         values: Values at the ends of the steps (n, n_joints).
